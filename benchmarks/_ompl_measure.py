@@ -66,7 +66,7 @@ class Method:
         """Section `planner` of its preset."""
         confine = "mask" if self.scope == "whole map" else self.scope
         ompl = f"planner: {self.planner}, confine: {confine}, budget_s: {self.budget_s}"
-        return load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={{{ompl}}}"]).planner
+        return load_preset("ompl", overrides=[f"planner.ompl={{{ompl}}}"]).planner
 
     @cached_property
     def digest(self) -> str:

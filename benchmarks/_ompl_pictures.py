@@ -41,7 +41,7 @@ def draw(out: Path) -> list[Path]:
         figure = Figure(figsize=(9, 17), layout="constrained")
         for ax, (scope, confine) in zip(figure.subplots(3, 1), SCOPES, strict=True):
             settings = f"planner.ompl={{planner: {planner}, confine: {confine}}}"
-            preset = load_preset("ompl-rrtconnect", overrides=[settings])
+            preset = load_preset("ompl", overrides=[settings])
             is_whole = scope == "whole map"
             plan = OmplPlanner(grid, preset.planner, None if is_whole else field_of).plan(
                 path.cells, (poses[0], poses[1]), None, tells_search=True

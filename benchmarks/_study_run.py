@@ -40,6 +40,18 @@ GRAPHS = (
 """Graphs of waypoints, made for each map, by their names in tables. Their module is imported where
 they are made: it needs scikit-image."""
 
+SAMPLING = tuple(
+    NamedMethod("preset", "ompl", f"ompl-{name}", {"planner.ompl.planner": planner})
+    for name, planner in {
+        "rrtconnect": "RRTConnect",
+        "rrtstar": "RRTstar",
+        "informed-rrtstar": "InformedRRTstar",
+        "bitstar": "BITstar",
+        "prmstar": "PRMstar",
+    }.items()
+)
+"""The preset `ompl` with one planner each, by their names in tables."""
+
 _LATE_S = 120.0
 """Silence beyond the limit that loading kernels and judging may add."""
 _SPEAK_S = 15.0
@@ -106,12 +118,11 @@ def parts_of(plan: Plan) -> list[Part]:
     samplers = [name for name in others if "ompl" in name]
     known = [*BASELINES, *(name for name in others if name not in samplers)]
     known = [name for name in known if name not in plan.without]
-    names = [n for n in hn.preset_names() if n not in {REFERENCE, *plan.without}]
-    own = [name for name in names if not name.startswith("ompl-")]
+    own = [n for n in hn.preset_names() if n not in {REFERENCE, "ompl", *plan.without}]
     by_costs = [name for name in own if load_preset(name).planner.refusal_of_costs() is None]
     knowing = [name for name in known if _takes_costs(name)]
     line = load_preset(BESIDE_OMPL, overrides=["planner.smooth=line-of-sight"])
-    sampling = [name for name in names if name.startswith("ompl-") and _is_measured(name)]
+    sampling = [one for one in SAMPLING if one.name not in plan.without and _is_measured("ompl")]
     return [
         Part(
             "lengths",
@@ -129,7 +140,14 @@ def parts_of(plan: Plan) -> list[Part]:
             plan.repeat,
             COSTS,
         ),
-        Part("ompl", (*sampling, line, "shortest"), tuple(samplers), plan.ompl_pairs, 0),
+        Part(
+            "ompl",
+            (line, "shortest"),
+            tuple(samplers),
+            plan.ompl_pairs,
+            0,
+            methods=tuple(sampling),
+        ),
     ]
 
 

@@ -129,7 +129,7 @@ def main() -> int:
         return 0
     if not names:
         parser.error("no map: the table needs --data or HYBRIDNAV_DATA, and --maps that match")
-    all_presets = ",".join(name for name in hn.preset_names() if not name.startswith("ompl-"))
+    all_presets = ",".join(name for name in hn.preset_names() if name != "ompl")
     presets = presets_of((given.presets or all_presets).split(","))
     files = {name: Path(given.data) / name for name in names}
     try:

@@ -83,7 +83,7 @@ def main() -> None:
     print("| preset | queries/s, one thread | two threads | ratio |")
     print("|---|---|---|---|")
     for preset in hn.preset_names():
-        if preset.startswith("ompl-"):
+        if preset == "ompl":
             continue
         planner = hn.HybridPlanner(topology, preset=preset)
         per_second(planner, endpoints, 2, options.seconds, many=options.many)

@@ -24,7 +24,7 @@ from hybridnav.explore import explore
 from hybridnav.graphs import build_route_graph
 from hybridnav.mapping import Mapper, SimulatedLaser, SimulatedSonars
 
-PRESETS = [name for name in hn.preset_names() if not name.startswith("ompl-")]
+PRESETS = [name for name in hn.preset_names() if name != "ompl"]
 """OMPL is a library of others, which takes its sines where it finds them."""
 
 

@@ -17,7 +17,17 @@ from benchmarks._study_data import collect
 from benchmarks._study_maps import StudyMap
 from benchmarks._study_page import page
 from benchmarks._study_pdf import MOST_PAGES, charts_of, sheets_of
-from benchmarks._study_run import GRAPHS, PLANS, Part, Plan, parts_of, read_note, rivals, run
+from benchmarks._study_run import (
+    GRAPHS,
+    PLANS,
+    SAMPLING,
+    Part,
+    Plan,
+    parts_of,
+    read_note,
+    rivals,
+    run,
+)
 from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
 from benchmarks._study_tables import tables_of
 from hybridnav.config import load_preset
@@ -355,7 +365,9 @@ def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
     lengths, costs, ompl = parts_of(PLANS[name])
     asked = {*lengths.baselines, *ompl.baselines, *lengths.presets, *ompl.presets, *costs.presets}
     there, missing = rivals()
-    known = {*BASELINES, *there, *hn.preset_names()} - {REFERENCE}
+    asked |= {method.name for method in ompl.methods}
+    known = {*BASELINES, *there, *hn.preset_names(), *(one.name for one in SAMPLING)}
+    known -= {REFERENCE, "ompl"}
     assert known - asked == set(PLANS[name].without)
     assert missing.keys() == RIVALS.keys() - set(there)
     assert {"octile", "paper", "shortest"} <= set(lengths.presets)
@@ -364,8 +376,8 @@ def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
     assert {method.name for method in lengths.methods} == {"route graph", "swagger-like"}
     assert {"robot", "shortest"} <= set(costs.presets)
     assert costs.costs == ("clearance",)
-    names = [preset for preset in ompl.presets if isinstance(preset, str)]
-    assert {"ompl-rrtconnect", "ompl-bitstar", "shortest"} <= set(names)
+    assert "shortest" in ompl.presets
+    assert {"ompl-rrtconnect", "ompl-bitstar"} <= {method.name for method in ompl.methods}
 
 
 def test_a_quarter_asks_a_quarter_of_the_pairs():

@@ -90,7 +90,7 @@ def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
     ("preset", "processors", "start", "jobs"),
     [
         ("shortest", 2, "cold", ["mesh"]),
-        ("ompl-rrtconnect", 2, "cold", ["mesh"]),
+        ("ompl", 2, "cold", ["mesh"]),
         ("octile", 2, "cold", ["jumps"]),
         ("robot", 2, "cold", []),
         ("shortest", 1, "cold", []),

@@ -52,7 +52,7 @@ def _refused(capsys, code, *arguments):
     ],
 )
 def test_a_footprint_that_is_none_is_refused(capsys, footprint, words):
-    ompl = ("--preset", "ompl-rrtconnect", "--set", "planner.ompl.space=se2")
+    ompl = ("--preset", "ompl", "--set", "planner.ompl.space=se2")
     told = _refused(capsys, 2, *QUERY, *ompl, "--set", f"planner.ompl.footprint={footprint}")
     assert words in told
 

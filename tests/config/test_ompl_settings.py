@@ -84,7 +84,7 @@ def test_the_parameters_are_those_that_ompl_declares(planner: str) -> None:
 )
 def test_a_bad_setting_is_one_line_that_names_it(settings: str, words: list[str]) -> None:
     with pytest.raises(hn.PresetError) as raised:
-        load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={{{settings}}}"])
+        load_preset("ompl", overrides=[f"planner.ompl={{{settings}}}"])
     text = str(raised.value)
     assert "\n" not in text
     assert len(text) < 500
@@ -101,7 +101,10 @@ def test_a_footprint_is_a_list_a_string_a_polygon_or_its_text() -> None:
 
 
 def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
-    preset = load_preset("ompl-bitstar", overrides=["planner.ompl.parameters.rewire_factor=1.5"])
+    preset = load_preset(
+        "ompl",
+        overrides=["planner.ompl.planner=BITstar", "planner.ompl.parameters.rewire_factor=1.5"],
+    )
     assert preset.planner.ompl is not None
     assert preset.planner.ompl.parameters == {"rewire_factor": 1.5}
     plain = load_preset("octile", overrides=["planner.refine=ompl"])
@@ -109,7 +112,7 @@ def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
     with pytest.raises(hn.PresetError, match="refine: ompl"):
         load_preset("octile", overrides=["planner.ompl.budget_s=2"])
     with pytest.raises(hn.PresetError, match="smooth"):
-        load_preset("ompl-bitstar", overrides=["planner.smooth=line-of-sight"])
+        load_preset("ompl", overrides=["planner.smooth=line-of-sight"])
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.6])
@@ -134,8 +137,8 @@ def test_clearance_weighs_walls_and_is_never_less_than_the_length(yaw_rad: float
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_settings_that_go_only_together_are_checked_together(order: tuple[int, int]) -> None:
     given = ["planner.ompl.space=dubins", "planner.ompl.turning_radius_m=0.8"]
-    preset = load_preset("ompl-rrtconnect", overrides=[given[index] for index in order])
+    preset = load_preset("ompl", overrides=[given[index] for index in order])
     assert preset.planner.ompl is not None
     assert (preset.planner.ompl.space, preset.planner.ompl.turning_radius_m) == ("dubins", 0.8)
     with pytest.raises(hn.PresetError, match="dubins or reeds-shepp needs turning_radius_m"):
-        load_preset("ompl-rrtconnect", overrides=given[:1])
+        load_preset("ompl", overrides=given[:1])

@@ -82,7 +82,7 @@ def test_the_files_state_both_sections_and_only_known_keys(name):
 
 def test_an_unknown_name_lists_the_names_there_are(monkeypatch, write):
     monkeypatch.chdir(write("planner: {}\n", "mine.yaml").parent)
-    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*octile, ompl-.*with \.yaml"):
+    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*octile, ompl, .*with \.yaml"):
         hn.load_preset("mine")
     with pytest.raises(FileNotFoundError, match="''"):
         hn.load_preset("")
@@ -306,3 +306,23 @@ def test_another_method_stands_for_portals_with_a_warning(
         again = hn.load_preset("octile", overrides=["planner.coarse=portals", *overrides])
     assert again == preset
     assert "portals" not in hn.preset_names()
+
+
+@pytest.mark.parametrize(
+    ("name", "planner"),
+    [
+        ("ompl-rrtconnect", "RRTConnect"),
+        ("ompl-rrtstar", "RRTstar"),
+        ("ompl-informed-rrtstar", "InformedRRTstar"),
+        ("ompl-bitstar", "BITstar"),
+        ("ompl-prmstar", "PRMstar"),
+    ],
+)
+def test_a_name_of_earlier_versions_works_and_states_what_to_write(name, planner):
+    setting = f"planner.ompl.planner={planner}"
+    with pytest.warns(FutureWarning, match=f"--preset ompl --set {setting}") as told:
+        old = hn.load_preset(name, overrides=["planner.ompl.seed=3"])
+    assert (len(told), told[0].filename) == (1, __file__)
+    new = hn.load_preset("ompl", overrides=[setting, "planner.ompl.seed=3"])
+    assert old.model_dump(exclude={"name"}) == new.model_dump(exclude={"name"})
+    assert (old.name, new.name) == (name, "ompl")

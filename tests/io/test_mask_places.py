@@ -206,8 +206,8 @@ def test_the_zone_lies_where_it_was_drawn(floor: Any) -> None:
     assert (np.asarray(blocked.cells) == np.argwhere(expected)).all()
 
 
-QUICK = [name for name in hn.preset_names() if not name.startswith("ompl-")]
-SOME_OMPL = ["ompl-rrtconnect"]
+QUICK = [name for name in hn.preset_names() if name != "ompl"]
+SOME_OMPL = ["ompl"]
 
 
 @pytest.mark.parametrize("preset", QUICK + SOME_OMPL)

@@ -350,7 +350,7 @@ def test_walks_know_their_arcs_on_maps_of_one_column():
 
 def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
     pytest.importorskip("ompl")
-    planner = planner_of(TWO_DOORS, "ompl-rrtconnect")
+    planner = planner_of(TWO_DOORS, "ompl")
     with pytest.raises(hn.InvalidValueError, match="without OMPL"):
         by_homotopy(planner, (1.5, 1.5), (12.5, 2.5), 2)
     query: tuple[Any, ...] = (
@@ -364,7 +364,7 @@ def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
         "homotopy",
     )
     query += ("--alternatives", "2")
-    assert cli(*query, "--preset", "ompl-rrtconnect").refuses(2, "without OMPL")
+    assert cli(*query, "--preset", "ompl").refuses(2, "without OMPL")
 
 
 def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811

@@ -281,7 +281,7 @@ def test_ompl_plans_by_other_doors_too():
     pytest.importorskip("ompl")
     rng = np.random.default_rng(5)
     floor = random_floor(rng)
-    planner = planner_of(floor, "ompl-rrtconnect")
+    planner = planner_of(floor, "ompl")
     ends = planner.topology.grid.frame.points_of([(1, 1), (13, 13)])
     found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_stretch=3.0)
     plain = planner.plan(*ends)

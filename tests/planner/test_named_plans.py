@@ -152,9 +152,7 @@ def driving():
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=labels())
 
     def make(*settings):
-        preset = load_preset(
-            "ompl-rrtconnect", overrides=[f"planner.ompl.{setting}" for setting in settings]
-        )
+        preset = load_preset("ompl", overrides=[f"planner.ompl.{setting}" for setting in settings])
         return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=preset)
 
     return make
@@ -183,7 +181,7 @@ def test_a_named_stop_faces_the_way_on_a_turned_map():
     rooms = RoomLabels(("hall",), np.zeros(classes.shape, dtype=np.int32), points)
     planner = hn.HybridPlanner(
         hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms)),
-        preset=load_preset("ompl-rrtconnect", overrides=["planner.ompl.space=se2"]),
+        preset=load_preset("ompl", overrides=["planner.ompl.space=se2"]),
     )
     east, west, again = map(np.asarray, stops_of(planner, ["east", "west", "west"]))
     assert [east[2], west[2]] == pytest.approx([0.7 - math.pi] * 2)
@@ -342,7 +340,7 @@ def test_every_length_and_cost_names_its_metric(cli, map_file):
     assert " m (octile), by " in classes.out
     pytest.importorskip("ompl")
     weigh = ("--set", "planner.ompl.objective=clearance", "--set", "planner.ompl.clearance_m=3")
-    done = cli(*query, "--at", "point", "--preset", "ompl-rrtconnect", *weigh)
+    done = cli(*query, "--at", "point", "--preset", "ompl", *weigh)
     told = dict(line.split(maxsplit=1) for line in done.out.splitlines())
     assert told["length"].endswith(" m")
     assert told["cost"].endswith(" (clearance-weighted)")
@@ -354,7 +352,7 @@ def test_plan_takes_stops_with_headings(cli, map_file):
     pytest.importorskip("ompl")
     done = cli(
         *("plan", map_file, "--from", "kitchen", "--to", "8.25,0.75,1.5", "--robot-radius", "0"),
-        *("--preset", "ompl-rrtconnect", "--set", "planner.ompl.space=se2", "--json"),
+        *("--preset", "ompl", "--set", "planner.ompl.space=se2", "--json"),
     )
     assert done.answer["status"] == "solved"
     assert done.answer["waypoints"] == ["kitchen", [8.25, 0.75, 1.5]]

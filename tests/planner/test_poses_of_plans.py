@@ -34,7 +34,7 @@ def planner_of(topology: hn.TopologicalMap, preset: str) -> hn.HybridPlanner:
     pytest.importorskip("ompl")
     turning = "" if preset not in {"dubins", "reeds-shepp"} else ", turning_radius_m: 0.04"
     section = f"planner.ompl={{space: {preset}, budget_s: 0.4{turning}}}"
-    chosen = load_preset("ompl-rrtconnect", overrides=[section])
+    chosen = load_preset("ompl", overrides=[section])
     return hn.HybridPlanner(topology, preset=chosen)
 
 

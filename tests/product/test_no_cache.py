@@ -71,7 +71,7 @@ def test_a_folder_that_is_set_takes_what_was_compiled(locked, tmp_path):
 def test_the_command_works_and_says_so_in_one_line(locked):
     figure = ROOT / "maps" / "figure1" / "figure1.yaml"
     query = ("--start", "0.5,1.5", "--goal", "3.5,1.5", "--robot-radius", "0")
-    settings = ("--set", "planner.allow_unexplored=true", "--preset", "ompl-rrtconnect")
+    settings = ("--set", "planner.allow_unexplored=true", "--preset", "ompl")
     done = _python(locked, "-m", "hybridnav", "plan", figure, *query, *settings)
     assert done.returncode == 0, done.stderr
     assert "solved" in done.stdout

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 N_THREADS = 4
-OVER_CELLS = [name for name in hn.preset_names() if not name.startswith("ompl-")]
-BY_OMPL = [name for name in hn.preset_names() if name.startswith("ompl-")]
+OVER_CELLS = [name for name in hn.preset_names() if name != "ompl"]
+BY_OMPL = ["BITstar", "InformedRRTstar", "PRMstar", "RRTConnect", "RRTstar"]
 
 
 def grid_with_rooms(seed: int, side: int = 90) -> hn.OccupancyGrid:
@@ -109,14 +109,15 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
 
 
 @pytest.mark.parametrize(
-    "preset",
+    "name",
     [BY_OMPL[0], *(pytest.param(name, marks=pytest.mark.full) for name in BY_OMPL[1:])],
 )
-def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(preset: str) -> None:
+def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(name: str) -> None:
     pytest.importorskip("ompl")
     grid = grid_with_rooms(seed=6, side=60)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0))
-    settings = load_preset(preset, overrides=["planner.ompl.budget_s=0.15"])
+    overrides = [f"planner.ompl.planner={name}", "planner.ompl.budget_s=0.15"]
+    settings = load_preset("ompl", overrides=overrides)
     planner = hn.HybridPlanner(topology, preset=settings)
     closed = hn.Blocked(cells=np.argwhere(grid.enterable())[::500])
     endpoints = grid.frame.points_of(np.argwhere(grid.enterable())[[0, 700, -1]])

@@ -47,6 +47,15 @@ _REFINED_BY = {
 }
 """What refines each coarse search; OMPL refines them all."""
 
+_OLD_NAMES = {
+    "ompl-rrtconnect": "RRTConnect",
+    "ompl-rrtstar": "RRTstar",
+    "ompl-informed-rrtstar": "InformedRRTstar",
+    "ompl-bitstar": "BITstar",
+    "ompl-prmstar": "PRMstar",
+}
+"""Presets of earlier versions, which were `ompl` with one of OMPL's planners each."""
+
 _REFINERS = ("grid-astar", "ompl", "none")
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
@@ -273,7 +282,7 @@ def preset_names() -> list[str]:
     Examples
     --------
     >>> hn.preset_names()[:3]
-    ['grid-astar', 'octile', 'ompl-bitstar']
+    ['grid-astar', 'octile', 'ompl']
     """
     return sorted({file.stem for folder in _FOLDERS for file in folder.glob("*.yaml")})
 
@@ -303,7 +312,8 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     ----------
     source
         Name of a preset that comes with the package, or a path to a YAML file: anything with a
-        suffix or a separator is a path. A `Preset` stays as it is.
+        suffix or a separator is a path. A `Preset` stays as it is. Names of earlier versions, as
+        `ompl-bitstar`, still work, with a warning that states what to write instead.
     overrides
         Settings that win over the file, each `section.key=value`, the value in YAML; checked
         together.
@@ -328,7 +338,7 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     """
     is_gone = not isinstance(source, Preset) and os.fspath(source) == "portals"
     found = "octile" if is_gone else source
-    preset = found if isinstance(found, Preset) else _read(_find(found))
+    preset = found if isinstance(found, Preset) else _renamed(found) or _read(_find(found))
     tree, given = preset.model_dump(), list(overrides)
     if is_gone:  # the section takes another one for it, by all of its settings
         tree["planner"]["coarse"] = "portals"
@@ -336,6 +346,21 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
         _apply(tree, override)
     # All at once, for some keys go only together.
     return _checked(tree, where="setting ") if given or is_gone else preset
+
+
+def _renamed(source: PathLike) -> Preset | None:
+    """Return what a name of earlier versions stands for, under that name; None for others."""
+    name = os.fspath(source)
+    if name not in _OLD_NAMES:
+        return None
+    setting = f"planner.ompl.planner={_OLD_NAMES[name]}"
+    warnings.warn(
+        f"preset {name} is now ompl with one setting: write --preset ompl --set {setting}, or "
+        f'load_preset("ompl", overrides=["{setting}"])',
+        FutureWarning,
+        stacklevel=3,
+    )
+    return load_preset("ompl", overrides=[setting]).model_copy(update={"name": name})
 
 
 def _read(path: Path) -> Preset:

@@ -72,7 +72,7 @@ class HybridPlanner:
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another;
         when the costs are those of another map, or the preset cannot plan by costs; when the map
-        allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl-*`).
+        allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl`).
 
     Examples
     --------
