@@ -12,10 +12,11 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
+from benchmarks.rivals import needed_package
 from hybridnav._files import replace_file
 from hybridnav.config import load_preset
 from hybridnav.errors import HybridNavError, InvalidValueError
-from hybridnav.harness.methods import BASELINES, REFERENCE, RIVALS, baseline_spec, preset_spec
+from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, evaluate
 
@@ -39,6 +40,28 @@ GRAPHS = (
 )
 """Graphs of waypoints, made for each map, by their names in tables. Their module is imported where
 they are made: it needs scikit-image."""
+
+RIVALS = (
+    *(
+        NamedMethod("class", f"benchmarks.rivals:{made_of}", name)
+        for name, made_of in {
+            "nano-astar": "NanoAstar",
+            "networkx": "Networkx",
+            "pyastar2d": "Pyastar2d",
+            "pyroutingkit": "RoutingKit",
+            "tcod": "Tcod",
+        }.items()
+    ),
+    NamedMethod("class", "benchmarks.rivals_any_angle:ExtremityPathfinder", "extremitypathfinder"),
+    NamedMethod("class", "benchmarks.rivals_any_angle:OmplWhole", "ompl-whole"),
+    NamedMethod(
+        "class",
+        "benchmarks.rivals_any_angle:OmplWhole",
+        "ompl-whole-prmstar",
+        {"planner": "PRMstar"},
+    ),
+)
+"""Planners of others, by their names in tables."""
 
 SAMPLING = tuple(
     NamedMethod("preset", "ompl", f"ompl-{name}", {"planner.ompl.planner": planner})
@@ -99,28 +122,29 @@ class Part:
     methods: tuple[NamedMethod, ...] = ()
 
 
-def rivals() -> tuple[list[str], dict[str, str]]:
+def rivals() -> tuple[list[NamedMethod], dict[str, str]]:
     """Return the planners of others that can be asked, and why others cannot."""
     there, missing = [], {}
-    for name in RIVALS:
+    for rival in RIVALS:
         try:
-            baseline_spec(name)
+            needed_package(class_of(rival.source).package)
         except HybridNavError as error:
-            missing[name] = str(error)
+            missing[rival.name] = str(error)
         else:
-            there.append(name)
+            there.append(rival)
     return there, missing
 
 
 def parts_of(plan: Plan) -> list[Part]:
     """Return the parts of the study, with all methods that are there."""
     others, _ = rivals()
-    samplers = [name for name in others if "ompl" in name]
-    known = [*BASELINES, *(name for name in others if name not in samplers)]
-    known = [name for name in known if name not in plan.without]
+    samplers = [one for one in others if "ompl" in one.name]
+    others = [one for one in others if one not in samplers]
+    known = [name for name in BASELINES if name not in plan.without]
     own = [n for n in hn.preset_names() if n not in {REFERENCE, "ompl", *plan.without}]
     by_costs = [name for name in own if load_preset(name).planner.refusal_of_costs() is None]
-    knowing = [name for name in known if _takes_costs(name)]
+    knowing = [name for name in known if _takes_costs(BASELINES[name][0])]
+    others_knowing = [one for one in others if _takes_costs(one.source)]
     line = load_preset(BESIDE_OMPL, overrides=["planner.smooth=line-of-sight"])
     sampling = [one for one in SAMPLING if one.name not in plan.without and _is_measured("ompl")]
     return [
@@ -130,7 +154,7 @@ def parts_of(plan: Plan) -> list[Part]:
             tuple(known),
             plan.pairs,
             plan.repeat,
-            methods=GRAPHS,
+            methods=(*others, *GRAPHS),
         ),
         Part(
             "costs",
@@ -139,14 +163,15 @@ def parts_of(plan: Plan) -> list[Part]:
             plan.pairs,
             plan.repeat,
             COSTS,
+            tuple(others_knowing),
         ),
         Part(
             "ompl",
             (line, "shortest"),
-            tuple(samplers),
+            (),
             plan.ompl_pairs,
             0,
-            methods=tuple(sampling),
+            methods=(*samplers, *sampling),
         ),
     ]
 
@@ -160,8 +185,8 @@ def _is_measured(name: str) -> bool:
     return True
 
 
-def _takes_costs(name: str) -> bool:
-    made_of: Any = class_of((BASELINES | RIVALS)[name][0])
+def _takes_costs(path: str) -> bool:
+    made_of: Any = class_of(path)
     return "costs" in inspect.signature(made_of).parameters
 
 

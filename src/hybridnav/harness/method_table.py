@@ -6,7 +6,6 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.config import Preset
-from hybridnav.harness.methods import BASELINES, RIVALS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,10 +45,9 @@ def _kind(record: Record) -> str:
     kind = "class"
     if record.get("preset") is not None:
         kind, made_by = "preset", str(record["preset"].get("name", made_by))
-    elif made_by in BASELINES:
-        kind = "baseline"
-    elif made_by in RIVALS:
-        kind = "planner of others"
+    elif ":" not in made_by:
+        # Earlier versions had names for planners of others, and noted the versions of these.
+        kind = "planner of others" if "version" in record else "baseline"
     # A class is shown by the name that it gives itself.
     is_named = made_by != record["method"] or kind == "class"
     return f"{kind} {made_by}" if is_named else kind

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import inspect
 import json
 import os
@@ -12,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.baselines.packages import needed_package
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.graph_method import GraphMethod
@@ -52,28 +50,7 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
 `TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
 as `module:class`."""
 
-RIVALS: dict[str, tuple[str, dict[str, Any]]] = {
-    "extremitypathfinder": ("hybridnav.baselines.rivals_any_angle:ExtremityPathfinder", {}),
-    "nano-astar": ("hybridnav.baselines.rivals:NanoAstar", {}),
-    "networkx": ("hybridnav.baselines.rivals:Networkx", {}),
-    "ompl-whole": ("hybridnav.baselines.rivals_any_angle:OmplWhole", {}),
-    "ompl-whole-prmstar": (
-        "hybridnav.baselines.rivals_any_angle:OmplWhole",
-        {"planner": "PRMstar"},
-    ),
-    "pyastar2d": ("hybridnav.baselines.rivals:Pyastar2d", {}),
-    "pyroutingkit": ("hybridnav.baselines.rivals:RoutingKit", {}),
-    "tcod": ("hybridnav.baselines.rivals:Tcod", {}),
-}
-"""Planners of others, named like baselines."""
-
-_PACKAGES = {"nano-astar": "nano_astar"}
-"""Packages of rivals that have another name than the rival."""
-
 ON_PLACES = frozenset({"simple-graph"})
-
-
-_KNOWN = BASELINES | RIVALS
 
 
 @dataclass(frozen=True)
@@ -211,11 +188,9 @@ def baseline_spec(
         When there is none of that name, or its class cannot be imported.
     """
     if ":" not in name:
-        name = baseline_name(name, _KNOWN)
-    if name in RIVALS:
-        _require(name)
-    class_of(_KNOWN.get(name, (name, {}))[0])
-    spec = MethodSpec(name, None, source="" if name in _KNOWN else source_hash(name))
+        name = baseline_name(name, BASELINES)
+    class_of(BASELINES.get(name, (name, {}))[0])
+    spec = MethodSpec(name, None, source="" if name in BASELINES else source_hash(name))
     if named is not None and (named.name or named.settings or named.grid):
         settings = named.settings
         spec = replace(spec, name=named.name or name, factory=name, settings=settings)
@@ -223,24 +198,6 @@ def baseline_spec(
         return spec
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
     return replace(spec, pyramid=pyramid | _given(merge_distance_m, seed))
-
-
-def rival_version(name: str) -> str:
-    """Return package and version of a planner of others; empty for other methods."""
-    if name not in RIVALS:
-        return ""
-    package = "ompl" if name.startswith("ompl") else name
-    return f"{package} {importlib.metadata.version(package)}"
-
-
-def _require(rival: str) -> None:
-    """Refuse to continue without the package of a rival."""
-    if rival.startswith("ompl"):
-        from hybridnav.refine.ompl import require_ompl  # noqa: PLC0415 - as above
-
-        require_ompl()
-    else:
-        needed_package(_PACKAGES.get(rival, rival))
 
 
 def named_spec(
@@ -331,7 +288,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         costs = None
         method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
     else:
-        path, options = _KNOWN.get(spec.made_by, (spec.made_by, {}))
+        path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
         made_of = class_of(path)
         options = options | spec.settings
         if not _takes(made_of, "costs"):

@@ -17,7 +17,7 @@ from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
-from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare, rival_version
+from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
@@ -185,7 +185,6 @@ def _about(scene: Scene, task: Task) -> Record:
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
         "metric": task.method.metric,
         "made_by": task.method.made_by,
-        **({"version": version} if (version := rival_version(task.method.made_by)) else {}),
         **({"settings": task.method.settings} if task.method.settings else {}),
         **({"grid": task.method.grid} if task.method.grid else {}),
         "preset": None if task.method.preset is None else _plain(task.method.preset),

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.baselines.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, Tcod
-from hybridnav.baselines.rivals_any_angle import ExtremityPathfinder, OmplWhole
+from benchmarks._study_run import RIVALS
+from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, Tcod
+from benchmarks.rivals_any_angle import ExtremityPathfinder, OmplWhole
 from hybridnav.costs import CostLayer
 from hybridnav.errors import InvalidValueError, OmplError, UnsuitableMapError
 from hybridnav.grid import CellClass, OccupancyGrid
-from hybridnav.harness.methods import RIVALS, baseline_spec, prepare
+from hybridnav.harness.methods import baseline_spec, named_spec, prepare
 from hybridnav.metrics import CheapestCost, ScipyOptimum, VisibilityGraph, judge_line, judge_path
 
 
@@ -194,7 +195,7 @@ def test_weights_that_would_overflow_are_refused_in_one_line():
 
 
 def test_each_rival_has_a_version_and_settings():
-    assert RIVALS.keys() == CASES.keys() | {"ompl-whole-prmstar"}
+    assert {rival.name for rival in RIVALS} == CASES.keys() | {"ompl-whole-prmstar"}
     grid = grid_of(["...", ".#.", "..."])
     for name, case in CASES.items():
         method = made(name, grid)
@@ -202,7 +203,9 @@ def test_each_rival_has_a_version_and_settings():
         assert method.version.split()[1][0].isdigit()
         assert method.settings
         getattr(method, "close", bool)()
-    prepared = prepare(baseline_spec("ompl-whole-prmstar"), grid)
+    rival = next(rival for rival in RIVALS if rival.name == "ompl-whole-prmstar")
+    spec = named_spec(rival, merge_distance_m=None, by_costs=False, clear_edges_only=False)
+    prepared = prepare(spec, grid)
     assert "PRMstar, up to 1 s a query, seed 1" in prepared.method.settings  # type: ignore[attr-defined]
     prepared.close()
 
@@ -212,7 +215,13 @@ def test_a_rival_that_is_not_installed_is_refused_in_one_line(name, monkeypatch)
     monkeypatch.setitem(sys.modules, CASES[name].package, None)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     with pytest.raises((InvalidValueError, OmplError), match=r"needs .*pip install"):
-        baseline_spec(name)
+        CASES[name].made_of(grid_of(["..."]))
+
+
+@pytest.mark.parametrize("rival", RIVALS, ids=lambda rival: rival.name)
+def test_a_name_of_earlier_versions_is_answered_with_what_to_write(rival):
+    with pytest.raises(InvalidValueError, match=f"baseline {rival.name} .* write {rival.source}"):
+        baseline_spec(rival.name)
 
 
 def test_networkx_is_not_asked_for_a_graph_that_does_not_fit():

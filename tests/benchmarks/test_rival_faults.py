@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from benchmarks.rivals_any_angle import count_corners
 from hybridnav.baselines.protocol import MethodResult
-from hybridnav.baselines.rivals_any_angle import count_corners
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.analysis import load_study
@@ -16,8 +16,8 @@ from hybridnav.harness.method_table import rows_of_methods
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
+from tests.benchmarks.test_rivals import CASES
 from tests.harness.small_runs import ROOMS, run_here, write_map
-from tests.harness.test_rivals import CASES
 
 N_PAIRS = 12
 
@@ -61,6 +61,11 @@ def boast(answer):
 LIES = {straight: "paths", short: "paths", nothing: "no path", boast: "bounds"}
 
 
+def path_of(name):
+    made_of = CASES[name].made_of
+    return f"{made_of.__module__}:{made_of.__qualname__}"
+
+
 def run(folder, names):
     settings = RunSettings(
         maps=(str(write_map(folder, ROOMS)),), presets=(), baselines=names, pairs=N_PAIRS
@@ -84,7 +89,7 @@ def test_a_planted_fault_of_a_rival_is_found(name, lie, tmp_path, monkeypatch):
     monkeypatch.setattr(
         case.made_of, "between", lambda method, *pair: lie(honest(method, *pair)), raising=True
     )
-    outcome = run(tmp_path, (name,)).of_method(name)[0]
+    outcome = run(tmp_path, (path_of(name),)).of_method(name)[0]
     row = consistency_row([outcome])
     assert int(row[f"{LIES[lie]} wrong"]) > 0
     assert len(outcome.faults) > 3
@@ -98,7 +103,7 @@ def test_rivals_as_they_are_have_no_fault(tmp_path):
     for name, case in CASES.items():
         pytest.importorskip(case.package, reason=f"{case.package} is not installed")
         there.append(name)
-    run(tmp_path, tuple(there))
+    run(tmp_path, tuple(path_of(name) for name in there))
     study = write_outputs(tmp_path / "run")
     assert study.faults == []
     assert set(study.labels) == {"grid-astar", *there}
@@ -111,9 +116,10 @@ def test_rivals_as_they_are_have_no_fault(tmp_path):
     assert "RRTConnect, up to 1 s a query, seed 1, simplified" in report
 
 
-def test_a_rival_that_refuses_the_map_is_in_the_table_with_its_version(tmp_path):
+def test_a_rival_that_refuses_the_map_is_in_the_table_with_its_file(tmp_path):
     pytest.importorskip("extremitypathfinder", reason="extremitypathfinder is not installed")
-    few = NamedMethod("baseline", "extremitypathfinder", "few", {"max_vertices": 4})
+    path = "benchmarks.rivals_any_angle:ExtremityPathfinder"
+    few = NamedMethod("class", path, "few", {"max_vertices": 4})
     settings = RunSettings(
         maps=(str(write_map(tmp_path, ROOMS)),), presets=("octile",), methods=(few,), pairs=3
     )
@@ -121,8 +127,8 @@ def test_a_rival_that_refuses_the_map_is_in_the_table_with_its_version(tmp_path)
     study = load_study(tmp_path / "run")
     assert (study.faults, study.failures) == ([], 0)
     row = next(row for row in rows_of_methods(study) if row["method"] == "few")
-    assert row["kind"] == "planner of others extremitypathfinder"
-    assert str(row["version"]).startswith("extremitypathfinder ")
+    assert row["kind"] == f"class {path}"
+    assert str(row["version"]).startswith("file ")
     assert row["settings"] == "max_vertices 4"
     # This map's own vertices, not those of the map on which methods are warmed up.
     n_corners = count_corners(hn.load_map(settings.maps[0], robot_radius_m=0).classes == 1)
@@ -136,7 +142,7 @@ def test_contraction_hierarchies_plan_by_the_costs_of_a_run(tmp_path):
     settings = RunSettings(
         maps=(str(write_map(tmp_path, ROOMS)),),
         presets=(),
-        baselines=("pyroutingkit", "hpa-star"),
+        baselines=("benchmarks.rivals:RoutingKit", "hpa-star"),
         pairs=N_PAIRS,
         costs=("clearance",),
     )

@@ -1,16 +1,22 @@
-"""Planners of others on the whole grid, as methods of the harness; each needs its own package."""
+"""Planners of others on the whole grid, as methods of the harness; each needs its own package.
+
+    hybridnav evaluate MAP --baseline benchmarks.rivals:Tcod
+
+`rivals_any_angle` has those whose paths are not of cells.
+"""
 
 from __future__ import annotations
 
+import importlib
+import importlib.metadata
 import math
 import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines.packages import Rival, needed_package
 from hybridnav.baselines.protocol import CUT_CORNERS, CostClaim, MethodResult
-from hybridnav.errors import UnsuitableMapError
+from hybridnav.errors import InvalidValueError, UnsuitableMapError
 from hybridnav.grid import CellClass
 from hybridnav.search.moves import STEPS, legal_moves, moves_along
 
@@ -19,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
 
@@ -31,6 +37,67 @@ MAX_ROUTINGKIT_CELLS = 100_000
 """Free cells up to which pyroutingkit prepares unless it is told: 0.15 to 0.3 ms each."""
 
 
+def needed_package(package: str) -> Any:
+    """Return a package that only one rival needs.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not installed.
+    """
+    try:
+        return importlib.import_module(package.replace("-", "_"))
+    except ImportError:
+        raise InvalidValueError(
+            f"this method needs {package}: pip install 'hybridnav[bench]'"
+        ) from None
+
+
+def refuse_corner_cutting(grid: OccupancyGrid) -> None:
+    """Refuse a map on which paths may cut corners, which no any-angle path does.
+
+    Raises
+    ------
+    UnsuitableMapError
+        When they may.
+    """
+    if grid.corner_cutting:
+        raise UnsuitableMapError(
+            "its any-angle paths never pass between two blocked cells that meet at a corner, and "
+            "this run lets paths do so"
+        )
+
+
+class Rival:
+    """What rivals share: a version, no regions, and the same answers where nothing is to be
+    planned."""
+
+    region_of = None
+    package: str
+    """Its package, as it is installed; "-" is "_" where it is imported."""
+
+    def __init__(self, grid: OccupancyGrid, settings: str) -> None:
+        self.version = f"{self.package} {importlib.metadata.version(self.package)}"
+        self.settings = settings
+        """Its settings in a few words, for tables."""
+        self.free: BoolArray = grid.classes == CellClass.FREE
+        self.n_nodes = int(self.free.sum())
+        self.n_edges = 0
+        self.memory_bytes = 0
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two cells; there is no path from or to one that is not free."""
+        if not (self.free[start] and self.free[goal]):
+            return MethodResult(None)
+        if start == goal:
+            return MethodResult(np.array([start], dtype=np.int64))
+        return self.between(start, goal)
+
+    def between(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two different free cells."""
+        raise NotImplementedError
+
+
 class Tcod(Rival):
     """Dijkstra of python-tcod over the legal moves, until the goal is reached.
 
@@ -38,11 +105,12 @@ class Tcod(Rival):
     octile optimum by rounding.
     """
 
-    name = "tcod"
+    name = package = "tcod"
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        path = needed_package("tcod.path")
-        super().__init__(grid, "tcod", "Dijkstra, costs 70 and 99")
+        needed_package("tcod")
+        path = importlib.import_module("tcod.path")
+        super().__init__(grid, "Dijkstra, costs 70 and 99")
         # On a single row or column tcod reports loops in its own paths.
         single = [(0, int(size == 1)) for size in grid.shape]
         moves = legal_moves(np.pad(self.free, single), grid.corner_cutting)
@@ -66,7 +134,7 @@ class Tcod(Rival):
         finder.add_root(start)
         cells = finder.path_to(goal)
         seconds = {"refine": time.perf_counter() - began}
-        if len(cells) < 2:  # noqa: PLR2004 - the goal alone: not reached
+        if len(cells) < 2:
             return MethodResult(None, seconds=seconds)
         return MethodResult(np.asarray(cells, dtype=np.int64), seconds=seconds)
 
@@ -83,11 +151,11 @@ class Pyastar2d(Rival):
     passes between two blocked cells has no such remedy: then there is no answer.
     """
 
-    name = "pyastar2d"
+    name = package = "pyastar2d"
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._find = needed_package("pyastar2d").astar_path
-        super().__init__(grid, "pyastar2d", "A*, allow_diagonal")
+        super().__init__(grid, "A*, allow_diagonal")
         self._costs = np.where(self.free, np.float32(1), np.float32(np.inf))
         self.memory_bytes = self._costs.nbytes
 
@@ -120,10 +188,10 @@ class Pyastar2d(Rival):
 class Networkx(Rival):
     """A* of networkx over a graph of the legal moves."""
 
-    name = "networkx"
+    name = package = "networkx"
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        super().__init__(grid, "networkx", "A*, octile heuristic")
+        super().__init__(grid, "A*, octile heuristic")
         if self.n_nodes > MAX_NETWORKX_CELLS:
             raise UnsuitableMapError(
                 f"a graph of networkx is made of up to {MAX_NETWORKX_CELLS:,} free cells, this map "
@@ -155,11 +223,11 @@ class Networkx(Rival):
 class NanoAstar(Rival):
     """A* of nano-astar, whose diagonals pass no blocked cell; it knows no other rule."""
 
-    name = "nano-astar"
+    name = package = "nano-astar"
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        self._find = needed_package("nano_astar").astar
-        super().__init__(grid, "nano-astar", "A*, diagonal, octile heuristic")
+        self._find = needed_package("nano-astar").astar
+        super().__init__(grid, "A*, diagonal, octile heuristic")
         self._cuts_corners = grid.corner_cutting
         self._blocked = np.ascontiguousarray(~self.free, dtype=np.uint8)
         self.memory_bytes = self._blocked.nbytes
@@ -190,7 +258,7 @@ class RoutingKit(Rival):
         Free cells up to which it prepares, which takes 0.15 to 0.3 ms a cell.
     """
 
-    name = "pyroutingkit"
+    name = package = "pyroutingkit"
 
     def __init__(
         self,
@@ -211,7 +279,7 @@ class RoutingKit(Rival):
         self._node_of[tuple(self._cells.T)] = np.arange(len(self._cells))
         tails, heads, prices = self._arcs(grid)
         units = _units_of(prices, len(self._cells))
-        super().__init__(grid, "pyroutingkit", f"a straight step is {units:,} units")
+        super().__init__(grid, f"a straight step is {units:,} units")
         self.n_edges = len(tails) // 2
         # A step of price p weighs from p - 1 / (2 units) to p + 1 / (2 units), and p is at least 1.
         self._factor = (1 + 0.5 / units) / (1 - 0.5 / units)
@@ -275,7 +343,7 @@ def _units_of(prices: FloatArray, n_cells: int) -> int:
     """
     dearest = float(prices.max(initial=1.0)) * max(n_cells, 1)
     units = min(_MOST_UNITS, int(_MOST_WEIGHT / dearest) - 1)
-    if units < 10:  # noqa: PLR2004 - an error of 5 %
+    if units < 10:
         raise UnsuitableMapError(
             f"its weights are below 2^31 along any path, too few for {n_cells:,} free cells with "
             f"steps of up to {float(prices.max()):.3g}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines.packages import Rival, needed_package, refuse_corner_cutting
+from benchmarks.rivals import Rival, needed_package, refuse_corner_cutting
 from hybridnav.baselines.protocol import AnyAngleResult, MethodResult
 from hybridnav.config import OmplSettings
 from hybridnav.errors import UnsuitableMapError
@@ -44,13 +44,13 @@ class ExtremityPathfinder(Rival):
         When there are more, or paths may cut corners.
     """
 
-    name = "extremitypathfinder"
+    name = package = "extremitypathfinder"
 
     def __init__(self, grid: OccupancyGrid, *, max_vertices: int = MAX_VERTICES) -> None:
         package = needed_package("extremitypathfinder")
         refuse_corner_cutting(grid)
         settings = f"up to {max_vertices:,} vertices"
-        super().__init__(grid, "extremitypathfinder", settings)
+        super().__init__(grid, settings)
         self._frame = grid.frame
         self._rooms = polygons_of(self.free, max_vertices)
         self._room_of = _rooms_of(self.free, self._rooms)
@@ -168,7 +168,7 @@ class OmplWhole(Rival):
         When paths may cut corners.
     """
 
-    name = "ompl-whole"
+    name, package = "ompl-whole", "ompl"
 
     def __init__(  # noqa: PLR0913 - the settings of a section
         self,
@@ -191,7 +191,7 @@ class OmplWhole(Rival):
         )
         words = f"{planner}, up to {budget_s:g} s a query, seed {seed}"
         given = "".join(f", {key} {value}" for key, value in own.parameters.items())
-        super().__init__(grid, "ompl", words + (", simplified" if simplify else "") + given)
+        super().__init__(grid, words + (", simplified" if simplify else "") + given)
         self._frame, self._budget_s = grid.frame, own.budget_s
         self._worker = Worker(Setup(grid, None, own, allow_unexplored=False))
 
