@@ -11,7 +11,7 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._costs_measure import RADIUS_M, bench_of, clocked
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.search.grid_search import GridSearch
 

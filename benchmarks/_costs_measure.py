@@ -13,7 +13,7 @@ import numpy as np
 import hybridnav as hn
 from benchmarks._costs_judge import EPSILON, by_dijkstra, judged
 from benchmarks._queries_measure import read
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.overlay import OverlaySearch, prepare_overlay

@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
+from benchmarks.worlds import office_world
 from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
 
 CORNERS = ((0.9, 0.3), (0.9, -0.3), (-0.9, -0.3), (-0.9, 0.3))
 """A robot of 0.6 x 1.8 m."""

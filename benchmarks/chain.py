@@ -22,7 +22,7 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ import pytest
 
 import hybridnav as hn
 from benchmarks.rivals_any_angle import count_corners
+from benchmarks.worlds import figure1_world
 from hybridnav.baselines.protocol import MethodResult
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.kinds import consistency_row
 from hybridnav.harness.method_table import rows_of_methods

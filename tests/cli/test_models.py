@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world
+from benchmarks.worlds import figure1_world
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("--start", "0.55,0.55", "--goal", "2.55,2.85")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from benchmarks.worlds import figure1_world
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
-from hybridnav.grid.worlds import figure1_world
 from hybridnav.io import load_movingai_map, load_ros_map
 
 if TYPE_CHECKING:

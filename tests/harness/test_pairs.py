@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, OccupancyGrid
-from hybridnav.grid.worlds import office_world
 from hybridnav.harness.pairs import (
     STRATA,
     Pair,

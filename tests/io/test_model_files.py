@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world
+from benchmarks.worlds import figure1_world
 from hybridnav.io.models import container
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world
+from benchmarks.worlds import figure1_world
 from hybridnav.io.models import structures
 from hybridnav.jumps import JumpSearch
 from hybridnav.jumps.build import JumpGraph

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.worlds import office_world
 from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import office_world
 from hybridnav.jumps import JumpPaths, JumpSearch, build_jump_graph, contract_graph
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.search.test_movingai_optima import problem_set, scenario_files

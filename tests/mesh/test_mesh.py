@@ -17,8 +17,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from benchmarks.worlds import office_world, tiled
 from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import office_world, tiled
 from hybridnav.mesh import (
     ConvexMesh,
     CornerGraph,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world, office_world
+from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.pairs import sample_pairs
 from tests.certificates import (
     ROUNDING,

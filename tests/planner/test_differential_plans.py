@@ -12,8 +12,8 @@ import pytest
 import hybridnav as hn
 from benchmarks._ompl_checks import CORNERS, Walls
 from benchmarks._ompl_checks import rooms as rooms_with_doors
+from benchmarks.worlds import office_world
 from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
 from tests.refine.test_differential import assert_turns_and_drives
 
 pytest.importorskip("ompl")

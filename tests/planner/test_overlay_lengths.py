@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.metrics import judge_path

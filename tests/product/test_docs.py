@@ -15,8 +15,8 @@ import pytest
 import yaml
 
 import hybridnav as hn
+from benchmarks.worlds import figure1_world
 from docs.extensions import notebook_pages
-from hybridnav.grid.worlds import figure1_world
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
+from benchmarks.worlds import World, office_world, write_world
 from hybridnav.grid import Frame
-from hybridnav.grid.worlds import World, office_world, write_world
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))

@@ -292,14 +292,17 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     pages = {f"hybridnav/harness/{page}.html.j2" for page in ("check", "report")}
     assets = source / "hybridnav" / "view" / "assets"
     pages |= {path.relative_to(source).as_posix() for path in assets.iterdir()}
+    maps = {
+        f"hybridnav/maps/{n}/{n}.{end}" for n in ("figure1", "office") for end in ("pgm", "yaml")
+    }
     others = {"hybridnav/py.typed", "hybridnav/topology/room_judge.npz", *pages}
     assert "hybridnav/__init__.pyi" in stubs
-    assert content == modules | stubs | presets | others
+    assert content == modules | stubs | presets | maps | others
     assert len(names) == len(set(names))
     assert any(name.endswith("licenses/LICENSE") for name in names)
 
 
-def test_the_unpacked_wheel_finds_its_presets(wheel, tmp_path):
+def test_the_unpacked_wheel_finds_its_presets_and_maps(wheel, tmp_path):
     shutil.unpack_archive(wheel, tmp_path / "site", "zip")
     script = "import hybridnav, sys; from hybridnav.cli import main; main()"
     options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path / "site")}}
@@ -309,6 +312,9 @@ def test_the_unpacked_wheel_finds_its_presets(wheel, tmp_path):
     assert [f"{line.split()[0]}.yaml" for line in done.stdout.splitlines()] == PLANNERS
     shown = _python("-c", script, "preset", "show", "paper", **options).stdout
     assert yaml.safe_load(shown) == yaml.safe_load(hn.load_preset("paper").to_yaml())
+    script = "import hybridnav as hn; print(hn.example_map('figure1'), hn.example_map())"
+    maps = _python("-c", script, **options)
+    assert (maps.stdout, maps.stderr) == (f"{hn.example_map('figure1')} {hn.example_map()}\n", "")
 
 
 def test_a_wheel_made_from_the_source_distribution_is_the_same(wheel, tmp_path):

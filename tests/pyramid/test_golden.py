@@ -15,8 +15,8 @@ import sys
 import numpy as np
 import pytest
 
+from benchmarks.worlds import figure1_world, office_world, tiled
 from hybridnav.grid import Frame, OccupancyGrid
-from hybridnav.grid.worlds import figure1_world, office_world, tiled
 from hybridnav.pyramid import DualGraphPyramid
 
 GOLDEN = {

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from benchmarks.worlds import office_world
 from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
 from hybridnav.metrics import segment_faults
 from tests.refine.troubled_query import TroubledQuery
 
@@ -195,7 +195,7 @@ def test_nothing_outlives_a_planner_that_is_killed(tmp_path: Path) -> None:
     code = f"""
 import hybridnav as hn
 from functools import partial
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from hybridnav.planner import ompl_plans
 from tests.refine.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
@@ -302,7 +302,7 @@ def test_who_ignores_the_ends_of_children_gets_answers_too() -> None:
 import signal
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 grid = office_world().grid(robot_radius_m=0.25)
 topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
 preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])

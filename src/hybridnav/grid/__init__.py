@@ -1,4 +1,4 @@
-"""Occupancy grids: probabilities, frame, clearance, islands, rooms on cells, generated worlds.
+"""Occupancy grids: probabilities, frame, clearance, islands, rooms on cells.
 
 Names load on first use: how many cells a grid may have is known without numpy.
 """

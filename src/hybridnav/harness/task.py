@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from hybridnav.costs import CostLayer
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
@@ -23,6 +22,7 @@ from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
 from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
 from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
+from hybridnav.io import example_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -359,7 +359,7 @@ def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     """
     if (spec.digest, by_costs) in _WARM:
         return
-    grid = figure1_world().grid(robot_radius_m=0)
+    grid = example_map("figure1", robot_radius_m=0)
     layer = CostLayer.clearance(grid) if by_costs else None
     with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
         Judge(grid, prepared, reference=False, costs=layer)

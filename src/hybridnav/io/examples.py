@@ -1,23 +1,24 @@
-"""The project's own maps, made in memory because an installed package has no map files."""
+"""The project's own maps, which come with the package."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.worlds import figure1_world, office_world
+from hybridnav.io.ros import load_ros_map
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.worlds import World
 
-_WORLDS: dict[str, Callable[[], World]] = {"figure1": figure1_world, "office": office_world}
+_PACKAGE = Path(__file__).parents[1]
+_FOLDERS = (_PACKAGE / "maps", _PACKAGE.parents[1] / "maps")
+"""Folders of maps: inside an installed package, or beside `src` in a checkout."""
+_NAMES = ("figure1", "office")
 
 
 def example_map(name: str = "office", *, robot_radius_m: float | None = None) -> OccupancyGrid:
-    """Make one of the project's own maps, the same as its file in the repository's `maps/`.
+    """Load one of the project's own maps, a file in the repository's `maps/`.
 
     Parameters
     ----------
@@ -45,10 +46,10 @@ def example_map(name: str = "office", *, robot_radius_m: float | None = None) ->
     >>> hn.example_map("figure1").class_counts()
     {'free': 330, 'unexplored': 341, 'occupied': 205, 'blocked': 324}
     """
-    make = _WORLDS.get(name)
-    if make is None:
+    if name not in _NAMES:
         raise InvalidValueError(
-            f"there is no example map {name!r:.80}, only {' and '.join(sorted(_WORLDS))}: "
+            f"there is no example map {name!r:.80}, only {' and '.join(_NAMES)}: "
             "load a map of your own with load_map"
         )
-    return make().grid(robot_radius_m=robot_radius_m)
+    files = [folder / name / f"{name}.yaml" for folder in _FOLDERS]
+    return load_ros_map(next(filter(Path.is_file, files)), robot_radius_m=robot_radius_m)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid.worlds_base import FREE, OCCUPIED, UNEXPLORED
+from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, FloatArray
-    from hybridnav.grid.frame import Frame
+    from hybridnav.grid import Frame
 
 Point = tuple[float, float]
 Rect = tuple[float, float, float, float]
@@ -94,7 +94,7 @@ def wobble(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
 def hide_depths(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
     """Keep only the skin of every obstacle that the scan can have hit, 2 or 3 cells deep."""
     seen = grown(cells == FREE, 2)
-    seen |= grown(seen, 1) & (_patches(cells.shape, 6, rng) < 0.3)  # noqa: PLR2004
+    seen |= grown(seen, 1) & (_patches(cells.shape, 6, rng) < 0.3)
     return np.where((cells == OCCUPIED) & ~seen, UNEXPLORED, cells)
 
 
@@ -105,10 +105,10 @@ def speckle(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
     in_the_open = (cells == FREE) & ~grown(cells != FREE, 12)
     draw = rng.random(cells.shape)
     noisy = cells.copy()
-    noisy[(wall & (draw < 0.02)) | (beside & (draw < 0.006))] = UNEXPLORED  # noqa: PLR2004
-    noisy[beside & (draw > 0.994)] = OCCUPIED  # noqa: PLR2004
-    noisy[in_the_open & (draw < 0.0001)] = UNEXPLORED  # noqa: PLR2004
-    noisy[in_the_open & (draw > 0.99992)] = OCCUPIED  # noqa: PLR2004
+    noisy[(wall & (draw < 0.02)) | (beside & (draw < 0.006))] = UNEXPLORED
+    noisy[beside & (draw > 0.994)] = OCCUPIED
+    noisy[in_the_open & (draw < 0.0001)] = UNEXPLORED
+    noisy[in_the_open & (draw > 0.99992)] = OCCUPIED
     return noisy
 
 

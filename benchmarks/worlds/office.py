@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.grid.frame import Frame
-from hybridnav.grid.worlds_base import FREE, OCCUPIED, UNEXPLORED, World
-from hybridnav.grid.worlds_scan import (
+from benchmarks.worlds.scan import (
     Point,
     Rect,
     glimpse,
@@ -18,6 +16,8 @@ from hybridnav.grid.worlds_scan import (
     window,
     wobble,
 )
+from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED, World
+from hybridnav.grid.frame import Frame
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray

@@ -10,18 +10,12 @@ from PIL import Image
 from scipy import ndimage
 
 import hybridnav as hn
+from benchmarks.worlds import World, figure1_world, office_world, tiled, write_world
+from benchmarks.worlds.__main__ import main
+from benchmarks.worlds.office import DOORS, ROOMS
+from benchmarks.worlds.scan import window
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.grid.worlds import (
-    World,
-    figure1_world,
-    main,
-    office_world,
-    tiled,
-    write_world,
-)
-from hybridnav.grid.worlds_office import DOORS, ROOMS
-from hybridnav.grid.worlds_scan import window
 
 MAPS = Path(__file__).parents[2] / "maps"
 RADIUS_M = 0.25
@@ -79,11 +73,11 @@ def test_committed_files_are_what_the_generator_makes(tmp_path):
         assert (tmp_path / path).read_bytes() == (MAPS / path).read_bytes(), path
 
 
-@pytest.mark.parametrize("name", ["office", "figure1"])
-def test_an_example_map_is_its_file_without_the_file(name, tmp_path, monkeypatch):
+@pytest.mark.parametrize("world", [office_world(), figure1_world()], ids=lambda world: world.name)
+def test_an_example_map_is_its_world(world, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    made = hn.example_map(name, robot_radius_m=RADIUS_M)
-    loaded = hn.load_map(MAPS / name / f"{name}.yaml", robot_radius_m=RADIUS_M)
+    loaded = hn.example_map(world.name, robot_radius_m=RADIUS_M)
+    made = world.grid(robot_radius_m=RADIUS_M)
     assert np.array_equal(made.classes, loaded.classes)
     assert np.array_equal(made.probability, loaded.probability)
     assert (made.frame, made.name) == (loaded.frame, loaded.name)
@@ -125,7 +119,7 @@ def test_a_map_needs_a_plain_file_name(tmp_path, name):
 
 def test_command_line_wants_one_folder(capsys):
     assert main([]) == 2
-    assert "usage: python -m hybridnav.grid.worlds FOLDER" in capsys.readouterr().err
+    assert "usage: python -m benchmarks.worlds FOLDER" in capsys.readouterr().err
 
 
 def test_a_world_keeps_its_pixels_to_itself():

@@ -1,60 +1,101 @@
-"""The project's own maps, generated: `python -m hybridnav.grid.worlds maps` writes their files."""
+"""Generated worlds: the pixels of a map file, their frame and their thresholds; their files."""
 
 from __future__ import annotations
 
 import re
-import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from hybridnav._copies import copies_alike
 from hybridnav._files import replace_file
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid.frame import Frame
+from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.limits import MAX_CELLS
-from hybridnav.grid.worlds_base import FREE, OCCUPIED, UNEXPLORED, World
-from hybridnav.grid.worlds_office import office_world
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from hybridnav._typing import ByteArray, PathLike
+    from hybridnav.grid import Frame
 
-__all__ = ["World", "figure1_world", "main", "office_world", "tiled", "write_world"]
+FREE = np.uint8(254)
+UNEXPLORED = np.uint8(205)
+OCCUPIED = np.uint8(0)
+"""The three grey values that map_server writes."""
 
 _LINK_M = 1.0
 _LINK_WALL_CELLS = 2
 
 
-def figure1_world() -> World:
-    """Return two regions that meet twice, and a third inside one: a map after the paper's Fig. 1.
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class World:
+    """A generated map, as in a map_server file.
 
-    The free region A fills the left, the unexplored region B the right of a walled area of 40 x
-    30 cells. An obstacle lies across the line between them, so that A and B meet along two
-    separate boundaries, above and below it; the unexplored island C lies inside A. There is no
-    noise. With a robot radius of 0, a merge distance that spans the map and any linkage, the
-    topological map has
+    Parameters
+    ----------
+    pixels
+        Grey values as in the image file, shape `(rows, cols)`, uint8: the top row, which has the
+        highest y, comes first. 0 is occupied, 205 unexplored, 254 free; copied.
+    frame
+        Resolution and pose of the map; cell (0, 0) is the lower-left pixel.
+    name
+        Name of the map in messages and pictures.
+    free_threshold, occupied_threshold
+        U1 and U2 of the paper: `free_thresh` and `occupied_thresh` of the map file.
 
-    * 3 places: A (free), B and C (unexplored);
-    * 4 arcs: two between A and B, one between A and C, and the self-loop of A round C;
-    * 3 faces: two protected ones (the obstacle and the wall) and the face between the arc of C and
-    the self-loop round it, so that V - E + F = 2.
-
-    Returns
-    -------
-    World
-        0.1 m cells, origin (0, 0).
+    Raises
+    ------
+    InvalidValueError
+        When the pixels are no two-dimensional uint8 array.
     """
-    row, col = np.indices((30, 40))
-    # The line between A and B leans by one cell every four rows: no boundary is a straight one.
-    cells = np.where(col < 19 + row // 4, FREE, UNEXPLORED)
-    cells[(row - 15) ** 2 + (col - 9) ** 2 <= 18] = UNEXPLORED  # noqa: PLR2004
-    cells[(row - 15) ** 2 + (col - 22) ** 2 <= 20] = OCCUPIED  # noqa: PLR2004
-    cells[[0, -1], :] = OCCUPIED
-    cells[:, [0, -1]] = OCCUPIED
-    return World(cells[::-1], Frame(resolution_m=0.1), "figure1")
+
+    pixels: ByteArray
+    frame: Frame
+    name: str
+    free_threshold: float = 0.196
+    occupied_threshold: float = 0.65
+
+    def __post_init__(self) -> None:
+        pixels = np.array(self.pixels, order="C")
+        if pixels.dtype != np.uint8 or pixels.ndim != 2:
+            raise InvalidValueError(
+                "the pixels of a world must be a two-dimensional uint8 array, "
+                f"got {pixels.dtype} of shape {pixels.shape}"
+            )
+        pixels.flags.writeable = False
+        object.__setattr__(self, "pixels", pixels)
+
+    def grid(self, *, robot_radius_m: float | None = None) -> OccupancyGrid:
+        """Return the occupancy grid of the world, with the same classes as its loaded map file.
+
+        Parameters
+        ----------
+        robot_radius_m
+            Radius in metres by which occupied cells are inflated, 0 for a robot that is a point;
+            None as in `OccupancyGrid`.
+
+        Returns
+        -------
+        OccupancyGrid
+            Probabilities `1 - pixel / 255`, row 0 at the lowest y.
+
+        Raises
+        ------
+        InvalidValueError
+            When the radius is negative or not finite.
+        """
+        darkness = ((255 - np.arange(256)) / 255).astype(np.float32)
+        return OccupancyGrid(
+            darkness[self.pixels[::-1]],
+            self.frame,
+            free_threshold=self.free_threshold,
+            occupied_threshold=self.occupied_threshold,
+            robot_radius_m=robot_radius_m,
+            name=self.name,
+        )
 
 
 def tiled(world: World, *, rows: int, cols: int) -> World:
@@ -196,17 +237,3 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
     path = target / f"{name}.yaml"
     replace_file(path, "".join(f"{line}\n" for line in lines).encode("ascii"))
     return path
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Write the maps of the project into the folder that is the only argument."""
-    if len(arguments) != 1:
-        sys.stderr.write("usage: python -m hybridnav.grid.worlds FOLDER\n")
-        return 2
-    for world in (office_world(), figure1_world()):
-        write_world(world, Path(arguments[0]) / world.name, world.name)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
