@@ -9,7 +9,7 @@ from hybridnav.grid import Frame
 
 
 def figure1_world() -> World:
-    """Return two regions that meet twice, and a third inside one: the map of the paper's Fig. 1.
+    """Return two regions that meet twice, and a third inside one: a map after the paper's Fig. 1.
 
     The free region A fills the left, the unexplored region B the right of a walled area of 40 x
     30 cells. An obstacle lies across the line between them, so that A and B meet along two

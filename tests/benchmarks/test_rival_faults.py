@@ -11,11 +11,11 @@ from benchmarks.worlds import figure1_world
 from hybridnav.baselines.protocol import MethodResult
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.kinds import consistency_row
-from hybridnav.harness.method_table import rows_of_methods
+from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.tables import rows_of_methods
 from tests.benchmarks.test_rivals import CASES
 from tests.harness.small_runs import ROOMS, run_here, write_map
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.rows import rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from tests.harness.small_runs import ROOMS, run_here, write_map
 

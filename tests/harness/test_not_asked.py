@@ -11,16 +11,19 @@ import pytest
 
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.harness.ahead import ahead_of_presets
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.columns import EFFICIENCY_COLUMNS, loss_columns
-from hybridnav.harness.method_table import rows_of_methods
+from hybridnav.harness.columns import (
+    EFFICIENCY_COLUMNS,
+    figures,
+    loss_columns,
+    rows_of_map,
+    rows_of_study,
+)
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.rows import figures, rows_of_map, rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import Row
+from hybridnav.harness.tables import Row, ahead_of_presets, rows_of_methods
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
 N_PAIRS = 8

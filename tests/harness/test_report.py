@@ -21,10 +21,10 @@ from hybridnav.harness.report import (
     CounterExample,
     MapSection,
     ReportData,
-    Table,
     WorstCase,
     render_report,
 )
+from hybridnav.harness.tables import Table
 
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 NAMES = ["grid A*", "weighted A*", "HPA*", "Thrun's map", "exact overlay", "corridor", "portal"]

@@ -297,5 +297,5 @@ def compare(
     rows = compare_runs(first, second, metric=_yardstick(metric))
     for over in dict.fromkeys(row["loss over"] for row in rows):
         own = [row for row in rows if row["loss over"] == over]
-        columns = [column for column in own[0] if column != "loss over"]
-        answer(f"## Loss over {over}\n\n{to_markdown(own, columns)}\n")
+        table = to_markdown([{key: row[key] for key in row if key != "loss over"} for row in own])
+        answer(f"## Loss over {over}\n\n{table}\n")

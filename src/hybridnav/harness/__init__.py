@@ -3,9 +3,8 @@
 S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1998.
 """
 
-from hybridnav.harness.analysis import Study, load_study
+from hybridnav.harness.analysis import Study, load_study, to_frame
 from hybridnav.harness.compare import compare_runs
-from hybridnav.harness.frames import to_frame
 from hybridnav.harness.names import NamedMethod, read_methods
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate

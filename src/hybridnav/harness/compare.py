@@ -9,9 +9,9 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.columns import OPTIMA
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import loss_of, nanmean, query_key
+from hybridnav.harness.yardstick import OPTIMA
 from hybridnav.metrics import paired_difference
 
 if TYPE_CHECKING:

@@ -195,9 +195,8 @@ class Outcome:
 
     def losses_over(self, optimum: Optimum) -> FloatArray:
         """Return lengths, or with "weighted" costs, over an optimum, minus one."""
-        if optimum == "weighted":
-            return self.weighted_losses
-        return self.octile_losses if optimum == "octile" else self.any_angle_losses
+        losses: FloatArray = getattr(self, f"{optimum.replace('-', '_')}_losses")
+        return losses
 
     @cached_property
     def expansions(self) -> FloatArray:

@@ -23,6 +23,31 @@ Optimum = Literal["any-angle", "octile", "weighted"]
 """What the losses of one table refer to."""
 
 
+YARDSTICKS: dict[Yardstick, tuple[Optimum, ...]] = {
+    "both": ("any-angle", "octile"),
+    "any-angle": ("any-angle",),
+    "octile": ("octile",),
+    "weighted": ("weighted",),
+}
+"""The optima that losses refer to, one table each, by the metric that is asked for."""
+
+OPTIMA: dict[Optimum, str] = {
+    "any-angle": "the any-angle optimum",
+    "octile": "the octile optimum",
+    "weighted": "the least cost of paths of cells",
+}
+"""The name of each optimum in captions."""
+
+REFERS_TO: dict[Yardstick, str] = {
+    "both": "the any-angle optimum in one table, the octile optimum in another, which any-angle "
+    "paths are not in",
+    "any-angle": "the any-angle optimum, for all paths",
+    "octile": "the octile optimum; any-angle paths have none",
+    "weighted": "the least cost of paths of cells, for the costs of all paths",
+}
+"""What losses refer to, in words."""
+
+
 def check_yardstick(metric: str) -> None:
     """Raise `InvalidValueError` if there is no such yardstick."""
     if metric not in get_args(Yardstick):
