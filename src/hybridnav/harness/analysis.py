@@ -245,40 +245,40 @@ def to_frame(study: Study) -> pd.DataFrame:
 
 
 def _columns(outcome: Outcome) -> dict[str, object]:
-    pairs = outcome.references
-    return {
+    pairs, frame = outcome.references, outcome.frame
+    ends = {
+        f"{end}_{axis}": [record[end][at] for record in pairs]
+        for end in ("start", "goal")
+        for at, axis in enumerate(("row", "col"))
+    }
+    columns: dict[str, object] = {
         "map": outcome.map_name,
         "method": outcome.label,
         "metric": outcome.metric,
         "kind": [record["kind"] for record in pairs],
-        "start_row": [record["start"][0] for record in pairs],
-        "start_col": [record["start"][1] for record in pairs],
-        "goal_row": [record["goal"][0] for record in pairs],
-        "goal_col": [record["goal"][1] for record in pairs],
-        "length_m": outcome.lengths_m,
-        "octile_optimum_m": outcome.optima_m,
-        "any_angle_optimum_m": outcome.any_angle_optima_m,
-        "loss": outcome.losses,
-        "octile_loss": outcome.octile_losses,
-        "any_angle_loss": outcome.any_angle_losses,
-        "seconds": outcome.seconds,
-        "reference_seconds": outcome.reference_seconds,
-        "expanded": outcome.expansions,
-        **(_of_costs(outcome) if outcome.costs else {}),
+        **ends,
+        "length_m": frame["lengths_m"],
+        "octile_optimum_m": frame["optima_m"],
+        "any_angle_optimum_m": frame["any_angle_optima_m"],
+        "loss": frame["losses"],
+        "octile_loss": frame["octile_losses"],
+        "any_angle_loss": frame["any_angle_losses"],
+        "seconds": frame["seconds"],
+        "reference_seconds": frame["reference_seconds"],
+        "expanded": frame["expansions"],
     }
-
-
-def _of_costs(outcome: Outcome) -> dict[str, object]:
-    return {
-        "costs": outcome.costs,
-        "cost_m": outcome.costs_m,
-        "weighted_optimum_m": outcome.weighted_optima_m,
-        "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
-        "cost_grid_bound_m": outcome.figure("cost_grid_bound_m"),
-        "weighted_loss": outcome.weighted_losses,
-        "gap": outcome.gaps,
-        "grid_gap": outcome.grid_gaps,
-    }
+    if outcome.costs:
+        columns |= {
+            "costs": outcome.costs,
+            "cost_m": frame["costs_m"],
+            "weighted_optimum_m": frame["weighted_optima_m"],
+            "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
+            "cost_grid_bound_m": outcome.figure("cost_grid_bound_m"),
+            "weighted_loss": frame["weighted_losses"],
+            "gap": frame["gaps"],
+            "grid_gap": frame["grid_gaps"],
+        }
+    return columns
 
 
 def _own_names(records: Iterable[Record]) -> dict[str, str]:
