@@ -16,7 +16,7 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
 from hybridnav.config import load_preset
-from hybridnav.harness.hybrid_method import _nbytes
+from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.outcome import loss_of
 from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum

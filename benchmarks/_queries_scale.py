@@ -22,7 +22,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks._queries_measure import SLACK, YARDSTICK, read
-from hybridnav.harness.hybrid_method import _nbytes
+from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.tables import to_markdown
 from hybridnav.mesh import MeshSearch, build_mesh

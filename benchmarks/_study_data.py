@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.records import Record
-    from hybridnav.harness.times import Circumstances
+    from hybridnav.harness.timing import Circumstances
 
 LEAST_SOLVED = 0.99
 """Share of the pairs that a method solves which is compared over the pairs in common."""

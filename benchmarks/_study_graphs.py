@@ -21,7 +21,7 @@ from benchmarks._swagger_like import (
 )
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.graphs import WaypointGraph, build_route_graph
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.adapters import GraphMethod
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 

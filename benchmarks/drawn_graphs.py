@@ -23,7 +23,7 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.harness import AnyAngleOptimum
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.adapters import GraphMethod
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.tables import to_markdown
 from hybridnav.metrics import judge_line

@@ -15,7 +15,7 @@ from hybridnav.baselines import AnyAngleResult, MethodResult
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
-from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.adapters import HybridMethod
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch

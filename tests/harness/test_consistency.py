@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
+from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
-from hybridnav.harness.hybrid_method import HybridMethod
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
 from hybridnav.harness.pairs import Pair, sample_pairs

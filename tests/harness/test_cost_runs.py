@@ -20,8 +20,7 @@ from hybridnav.harness import (
     write_outputs,
 )
 from hybridnav.harness.columns import rows_of_study
-from hybridnav.harness.paths import decode_path
-from hybridnav.harness.records import RECORDS_FILE, read_records
+from hybridnav.harness.records import RECORDS_FILE, decode_path, read_records
 from hybridnav.poses import Motion
 from tests.harness import faulty_costs as faulty
 from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map

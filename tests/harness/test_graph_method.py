@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness import RunSettings, evaluate, load_study
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.adapters import GraphMethod
 from hybridnav.harness.records import read_records
 from hybridnav.metrics import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of

@@ -19,7 +19,7 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.paths import decode_path, encode_path
+from hybridnav.harness.records import decode_path, encode_path
 from hybridnav.io.movingai import Scenario
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 

@@ -19,8 +19,7 @@ from hybridnav.harness.pairs import Pair, sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.scenes import MapSpec, read_scene
-from hybridnav.harness.times import circumstances_of
-from hybridnav.harness.timing import TimingTask
+from hybridnav.harness.timing import TimingTask, circumstances_of
 from hybridnav.io import load_map
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map

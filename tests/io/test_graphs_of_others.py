@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridnav as hn
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.adapters import GraphMethod
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.metrics import judge_line, segment_faults
 

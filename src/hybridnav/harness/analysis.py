@@ -12,7 +12,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
 from hybridnav.harness.records import commands_of, latest_sources, read_records
-from hybridnav.harness.times import Circumstances, circumstances_of, lay_times
+from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
 if TYPE_CHECKING:

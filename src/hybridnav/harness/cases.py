@@ -11,8 +11,7 @@ from hybridnav.errors import MapError
 from hybridnav.grid import MAX_CELLS, Frame
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.paths import decode_path
-from hybridnav.harness.records import map_digest
+from hybridnav.harness.records import decode_path, map_digest
 from hybridnav.harness.report import CounterExample, WorstCase
 from hybridnav.harness.scenes import MapSpec, read_map
 from hybridnav.metrics import chords_of

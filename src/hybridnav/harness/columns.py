@@ -19,7 +19,7 @@ from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile, query_key
 from hybridnav.harness.tables import METHOD_COLUMNS, text_of
 from hybridnav.harness.yardstick import OPTIMA
-from hybridnav.metrics import distance_buckets, summarise
+from hybridnav.metrics import summarise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -393,23 +393,4 @@ def rows_of_study(study: Study) -> list[Row]:
         if label in partly:
             row |= dict.fromkeys(EFFICIENCY_COLUMNS, math.nan)
         rows.append(row)
-    return rows
-
-
-def rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
-    """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
-    for each method on a map, over the pairs that all methods solved."""
-    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
-    common = pairs_in_common(outcomes)
-    rows = []
-    for outcome in outcomes:
-        buckets = distance_buckets(outcome.optima_m)
-        losses = np.where(outcome.among(common), outcome.losses_over(optimum), math.nan)
-        row: Row = {"method": outcome.label}
-        for at, label in enumerate(buckets.labels):
-            inside = losses[(buckets.indices == at) & np.isfinite(losses)]
-            if len(inside):
-                row[f"{label} ({len(inside)})"] = 100 * nanmean(inside)
-        if len(row) > 1:
-            rows.append(row)
     return rows

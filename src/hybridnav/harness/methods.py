@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.graph_method import GraphMethod
-from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.adapters import GraphMethod, HybridMethod, OnOwnGrid
 from hybridnav.harness.names import baseline_name, class_of, source_hash
-from hybridnav.harness.own_grid import OnOwnGrid
 from hybridnav.io import load_graph
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap

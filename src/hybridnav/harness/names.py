@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.own_grid import checked_grid
+from hybridnav.harness.adapters import checked_grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -19,7 +19,7 @@ from hybridnav.harness.contradictions import (
     is_any_angle,
     octile_optimum_m,
 )
-from hybridnav.harness.paths import path_steps
+from hybridnav.harness.records import path_steps
 from hybridnav.metrics import thrun_count
 
 if TYPE_CHECKING:

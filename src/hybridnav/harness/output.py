@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._files import replace_file, without_controls
-from hybridnav.harness.analysis import Study, load_study
+from hybridnav.harness.analysis import Study, load_study, pairs_in_common
 from hybridnav.harness.cases import cases_of, counter_examples
 from hybridnav.harness.columns import (
     CONSISTENCY_COLUMNS,
@@ -16,12 +16,11 @@ from hybridnav.harness.columns import (
     EFFICIENCY_COLUMNS,
     MEANINGS,
     loss_columns,
-    rows_by_distance,
     rows_of_map,
     rows_of_study,
 )
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import Outcome, nanquantile
+from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
 from hybridnav.harness.report import MapSection, ReportData, render_report
 from hybridnav.harness.tables import (
     METHOD_COLUMNS,
@@ -34,6 +33,7 @@ from hybridnav.harness.tables import (
     with_values,
 )
 from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
+from hybridnav.metrics import distance_buckets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.harness.cases import CaseKey
     from hybridnav.harness.tables import Row
-    from hybridnav.harness.yardstick import Yardstick
+    from hybridnav.harness.yardstick import Optimum, Yardstick
 
 _EFFICIENCY = "Efficiency"
 _BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (pairs)"
@@ -192,6 +192,25 @@ def report_of(
     )
 
 
+def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
+    """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
+    for each method on a map, over the pairs that all methods solved."""
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
+    common = pairs_in_common(outcomes)
+    rows = []
+    for outcome in outcomes:
+        buckets = distance_buckets(outcome.optima_m)
+        losses = np.where(outcome.among(common), outcome.losses_over(optimum), math.nan)
+        row: Row = {"method": outcome.label}
+        for at, label in enumerate(buckets.labels):
+            inside = losses[(buckets.indices == at) & np.isfinite(losses)]
+            if len(inside):
+                row[f"{label} ({len(inside)})"] = 100 * nanmean(inside)
+        if len(row) > 1:
+            rows.append(row)
+    return rows
+
+
 def failures_of(study: Study) -> list[tuple[str, str]]:
     """Return for each method and map with queries without an answer the reason of the first, and
     its traceback, empty for none."""
@@ -263,7 +282,7 @@ def _section(
     shape = first.get("shape", [0, 0])
     tables = _tables(study, rows)
     for optimum in YARDSTICKS[study.metric]:
-        distance = rows_by_distance(study, name, optimum)
+        distance = _rows_by_distance(study, name, optimum)
         columns = [key for row in distance for key in row if key != "method"]
         if columns:
             caption = _BY_DISTANCE.format(OPTIMA[optimum])

@@ -19,8 +19,7 @@ from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.pairs import SAMPLER_VERSION
-from hybridnav.harness.paths import encode_path
-from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
+from hybridnav.harness.records import encode_path, environment, map_digest, pair_id, preparation_id
 from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
 from hybridnav.io import example_map
 
