@@ -56,7 +56,6 @@ RETURNED = {
     "result.Refinement",
     "route.CoarseRoute",
     "route.Corridor",
-    "route.RoomRoute",
     "topology.Component",
     "topology.Obstacle",
 }

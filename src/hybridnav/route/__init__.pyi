@@ -5,7 +5,6 @@ from .door_graph import (
     DoorRoute as DoorRoute,
     door_graph as door_graph,
 )
-from .room_search import RoomRoute as RoomRoute, RoomSearch as RoomSearch
 from .route_finder import RouteFinder as RouteFinder
 
 __all__: list[str]
