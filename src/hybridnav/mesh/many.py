@@ -6,18 +6,12 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.mesh._many_kernels import (
-    ANSWERS_FULL,
-    many_by_corners,
-    many_by_hierarchy,
-    many_by_intervals,
-)
+from hybridnav.mesh._many_kernels import ANSWERS_FULL, many
 from hybridnav.mesh._polyanya_kernels import WORK_FULL
-from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.mesh.search import NO_LIMIT, SURE, rounded_into
 
 if TYPE_CHECKING:
@@ -119,18 +113,13 @@ def _one_by_one(
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
     mesh, graph = search.mesh, search.graph
     place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
+    arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
     at = n = 0
     with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
             rest = place, asked, work.arrays, work.bounds, effort
             found = (length, bound, starts, positions), at, n
-            if graph is None:
-                blocks = mesh.block_of, search.tree
-                at, n, short = many_by_intervals(search.arrays, blocks, *rest, *found)
-            else:
-                is_contracted = isinstance(graph, CornerHierarchy)
-                answer = many_by_hierarchy if is_contracted else many_by_corners
-                at, n, short = answer(search.arrays, graph.arrays, *rest, *found)
+            at, n, short = many(search.arrays, arrays, *rest, *found)
             if short == WORK_FULL:
                 work.make_room()
             elif short == ANSWERS_FULL:
