@@ -108,7 +108,7 @@ def _all_pairs(floor: Floor, topology: hn.TopologicalMap) -> AllPairs:
 
 def room_parts(rooms: hn.Rooms) -> dict[str, set[int]]:
     """The connected parts of the free room level that each room touches."""
-    graph = nx.Graph()
+    graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(np.flatnonzero(rooms.is_free).tolist())
     inside = rooms.level.arcs[rooms.is_free[rooms.level.arcs].all(axis=1)]
     graph.add_edges_from(inside.tolist())
