@@ -2,7 +2,7 @@
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
 from hybridnav.mesh.corner_graph import CornerGraph
-from hybridnav.mesh.cut import cut_mesh, locate_polygons, renew_mesh
+from hybridnav.mesh.cut import renew_mesh
 from hybridnav.mesh.detour import DetourSearch
 from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.mesh.many import MeshPaths, shortest_paths
@@ -19,8 +19,6 @@ __all__ = [
     "MeshSearch",
     "SearchTrace",
     "build_mesh",
-    "cut_mesh",
-    "locate_polygons",
     "renew_mesh",
     "shortest_paths",
     "trace_search",

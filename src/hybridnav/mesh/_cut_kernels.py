@@ -70,7 +70,7 @@ def touched_polygons(corners, sides, place, cells):
     first, begins, twins, polygon_of = sides
     polygon_at, component = place
     n = len(first) - 1
-    near = _polygons_near(corners, sides, component, cells, polygon_at.shape[1])
+    near, is_near_known = np.empty(0, np.int32), False
     is_touched = np.zeros(n, np.bool_)
     touched = np.empty(n, np.int32)
     seen = np.full(n, -1, np.int64)
@@ -80,6 +80,10 @@ def touched_polygons(corners, sides, place, cells):
         row, col = cell // polygon_at.shape[1], cell % polygon_at.shape[1]
         inner = polygon_at[row, col]
         if inner < 0 or component[inner] < 0:
+            # In place of a removed polygon: all polygons are looked through, once.
+            if not is_near_known:
+                near = _polygons_near(corners, sides, component, cells, polygon_at.shape[1])
+                is_near_known = True
             inner = _polygon_with(corners, first, begins, near, row, col)
         if inner < 0:
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,40 +10,12 @@ import numpy as np
 from hybridnav.mesh import _cut_kernels as kernels
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import MANY, NO_CORNER
-from hybridnav.mesh._merge_kernels import are_free, polygons_of_cells
+from hybridnav.mesh._merge_kernels import are_free
 from hybridnav.mesh.build import ConvexMesh, triangulate
 from hybridnav.mesh.merge import merge_triangles, select_triangles
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
-
-
-def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh:
-    """Cut closed cells out of a mesh; see `renew_mesh`.
-
-    Parameters
-    ----------
-    mesh
-        The mesh of the map's free space, with its `polygon_at`.
-    free
-        bool (rows, cols), the free cells without the closed ones.
-    closed
-        int64 (m,), flat cells that are closed; those that are not free cut nothing.
-
-    Returns
-    -------
-    ConvexMesh
-        The mesh itself if nothing is cut.
-
-    Examples
-    --------
-    >>> from hybridnav.mesh import build_mesh, cut_mesh
-    >>> free = np.ones((3, 4), dtype=bool)
-    >>> mesh = build_mesh(free)
-    >>> cut_mesh(mesh, free, np.array([5])).n_polygons
-    2
-    """
-    return renew_mesh(mesh, free, closed[mesh.polygon_at.ravel()[closed] >= 0])
 
 
 def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
@@ -66,8 +38,9 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     -------
     ConvexMesh
         The polygons that were removed stay as walled-in ones, with -1 as their `component`; those
-        in their place come last. `polygon_at` is that of `mesh`, see `locate_polygons`; a search
-        looks for cells of removed polygons, and for freed ones, among the last polygons.
+        in their place come last. `polygon_at` is that of `mesh`: a search looks for cells of
+        removed polygons, and for freed ones, among the last polygons. The mesh itself if nothing
+        has changed.
 
     Examples
     --------
@@ -102,39 +75,6 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     for array in arrays:
         array.flags.writeable = False
     return ConvexMesh(*arrays)
-
-
-def locate_polygons(mesh: ConvexMesh, free: BoolArray) -> ConvexMesh:
-    """Return a renewed mesh whose `polygon_at` is that of its own polygons.
-
-    The work grows with the map.
-
-    Parameters
-    ----------
-    mesh
-        A mesh of `renew_mesh`; unchanged.
-    free
-        bool (rows, cols), its free cells.
-
-    Returns
-    -------
-    ConvexMesh
-        The same polygons.
-
-    Examples
-    --------
-    >>> from hybridnav.mesh import build_mesh, locate_polygons, renew_mesh
-    >>> free = np.ones((1, 3), dtype=bool)
-    >>> mesh = build_mesh(free)
-    >>> free[0, 1] = False
-    >>> locate_polygons(renew_mesh(mesh, free, np.array([1])), free).polygon_at.tolist()
-    [[1, -1, 2]]
-    """
-    # Later polygons lie in the place of earlier ones that were removed.
-    found = polygons_of_cells(mesh.first, mesh.begins, mesh.corners, free.shape)
-    found[~free] = -1
-    found.flags.writeable = False
-    return replace(mesh, polygon_at=found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,8 +44,6 @@ NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
 SURE = 1.0 - 1e-12
 """Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
-MOST_MADE = 128
-"""Most corners of closed cells for which a query uses the graph of corners."""
 _WORTH = 20_000
 """Least number of intervals that queries expand before the graph of corners is built."""
 
@@ -106,7 +104,7 @@ class _CornerWork(_Work):
 
     def __init__(self, mesh: ConvexMesh, n_landmarks: int) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners) + MOST_MADE
+        n = len(mesh.corners)
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
         self.corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, np.empty(n, np.int32)
@@ -181,7 +179,6 @@ class MeshSearch:
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
-        self._landmarked: tuple[CornerGraph, Pool[Any]] | None = None
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock = threading.Lock()
@@ -228,29 +225,10 @@ class MeshSearch:
         if isinstance(graph, CornerHierarchy):
             self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
         elif graph is not None:
-            self._landmarked = self._with_works(graph)
-            self.corner_works = self._landmarked[1]
+            n_landmarks = graph.landmark_distances.shape[1]
+            self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
         self.edges, self._graph = edges, graph
         self.is_prepared = True
-
-    def landmarked(self) -> tuple[CornerGraph, Pool[Any]] | None:
-        """Return the graph of corners with landmarks, and its work arrays, for searches round
-        closed cells.
-
-        The landmarks are built on first use; None until the graph of corners exists.
-        """
-        if self.edges is None:
-            return None
-        if self._landmarked is None:
-            with self._lock:
-                if self._landmarked is None:
-                    graph = add_landmarks(self.mesh, self.arrays, self.edges)
-                    self._landmarked = self._with_works(graph)
-        return self._landmarked
-
-    def _with_works(self, graph: CornerGraph) -> tuple[CornerGraph, Pool[Any]]:
-        n_landmarks = graph.landmark_distances.shape[1]
-        return graph, Pool(partial(_CornerWork, self.mesh, n_landmarks))
 
     def path(
         self,
