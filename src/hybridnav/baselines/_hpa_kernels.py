@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.baselines._weighted_kernels import drop_least, push
-from hybridnav.search.arrays import grow
+from hybridnav.search.arrays import grow, pop, push
 from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 if TYPE_CHECKING:
@@ -263,7 +262,7 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
         if direct >= 0:
             least = direct
     n_cells += flood(moves, cluster_cells, start, distance, waiting)
-    keys, items = np.empty(256, np.int64), np.empty(256, np.int32)
+    heap = np.empty((256, 2), np.int64)
     size = expanded = 0
     for node in range(graph.cluster_first[start_cluster], graph.cluster_first[start_cluster + 1]):
         cell = graph.cells[node]
@@ -271,19 +270,13 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
         if cost < 0:
             continue
         cost_of[node], previous[node], mark[node] = cost, -1, is_open
-        if size == keys.size:
-            keys, items = grow(keys), grow(items)
-        push(
-            keys,
-            items,
-            size,
-            cost + octile_cost(cell // cols - goal_row, cell % cols - goal_col),
-            node,
-        )
+        if size == len(heap):
+            heap = np.concatenate((heap, heap))
+        rest = octile_cost(cell // cols - goal_row, cell % cols - goal_col)
+        push(heap, size, cost + rest, node)
         size += 1
-    while size > 0 and keys[0] < least:
-        node = np.int64(items[0])
-        drop_least(keys, items, size)
+    while size > 0 and heap[0, 0] < least:
+        node = pop(heap, size)
         size -= 1
         if mark[node] == is_closed:
             continue
@@ -302,9 +295,9 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
             if key >= least:
                 continue
             cost_of[to], previous[to], mark[to] = cost, node, is_open
-            if size == keys.size:
-                keys, items = grow(keys), grow(items)
-            push(keys, items, size, key, to)
+            if size == len(heap):
+                heap = np.concatenate((heap, heap))
+            push(heap, size, key, to)
             size += 1
     if least == _NONE:
         return np.empty(0, np.int64), expanded, n_cells

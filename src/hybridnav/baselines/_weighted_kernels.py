@@ -1,4 +1,4 @@
-"""Kernels of the searches on the whole grid: Dijkstra, weighted A*; and the heap of open cells.
+"""Kernels of the searches on the whole grid: Dijkstra, weighted A*.
 
 Marks instead of clearing: `mark` holds 2 * generation for a cell that is open in the search of this
 generation, 2 * generation + 1 for one that is closed, less for one not yet seen.
@@ -9,39 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search.arrays import grow
+from hybridnav.search.arrays import grow, pop, push
 from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
-
-
-@njit(cache=True, nogil=True)
-def push(keys, items, size, key, item):
-    """Put an item into a heap of `size` items, four below each, that has room for one more."""
-    at = size
-    while at > 0:
-        above = (at - 1) >> 2
-        if keys[above] <= key:
-            break
-        keys[at], items[at] = keys[above], items[above]
-        at = above
-    keys[at], items[at] = key, item
-
-
-@njit(cache=True, nogil=True)
-def drop_least(keys, items, size):
-    """Remove the first item, the one of the least key, from a heap of `size` items."""
-    size -= 1
-    key, item = keys[size], items[size]
-    at, below = 0, 1
-    while below < size:
-        least, least_key = below, keys[below]
-        for other in range(below + 1, min(below + 4, size)):
-            if keys[other] < least_key:
-                least, least_key = other, keys[other]
-        if key <= least_key:
-            break
-        keys[at], items[at] = least_key, items[least]
-        at, below = least, 4 * least + 1
-    keys[at], items[at] = key, item
 
 
 @guarded
@@ -127,19 +96,18 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
     """
     is_open, is_closed = 2 * generation, 2 * generation + 1
     goal_row, goal_col = goal // cols, goal % cols
-    keys = np.empty(1024, np.float64)
-    items = np.empty(1024, np.int32)
+    heap = np.empty((1024, 2))  # keys and cells
     aside = np.empty(256, np.int32)
     n_aside = expanded = 0
-    keys[0], items[0] = 0.0, start
+    heap[0, 0], heap[0, 1] = 0.0, start
     size = 1
     cost_of[start] = 0
     mark[start] = is_open
     while size > 0:
-        cell = np.int64(items[0])
+        cell = np.int64(heap[0, 1])
         if cell == goal:
             break
-        drop_least(keys, items, size)
+        pop(heap, size)
         size -= 1
         if mark[cell] == is_closed:
             continue
@@ -163,16 +131,16 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
                 n_aside += 1
                 continue
             mark[to] = is_open
-            if size == keys.size:
-                keys, items = grow(keys), grow(items)
+            if size == len(heap):
+                heap = np.concatenate((heap, heap))
             estimate = octile_cost(row + ROW_STEP[k] - goal_row, col + COL_STEP[k] - goal_col)
-            push(keys, items, size, cost + weight * estimate, to)
+            push(heap, size, cost + weight * estimate, to)
             size += 1
     if mark[goal] < is_open:
         return np.int64(-1), expanded
     bound = cost_of[goal]
     for i in range(size + n_aside):
-        cell = np.int64(items[i] if i < size else aside[i - size])
+        cell = np.int64(heap[i, 1] if i < size else aside[i - size])
         if i < size and mark[cell] == is_closed:
             continue
         estimate = octile_cost(cell // cols - goal_row, cell % cols - goal_col)

@@ -1,4 +1,4 @@
-"""Kernels of a heap of four branches: int64 (n, 2), keys and values."""
+"""Kernels of a heap of four branches: arrays (n, 2) of keys and values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def push(heap, size, key, value):
-    """Put an entry into a heap of `size`; return the new size."""
+    """Put an entry into a heap of `size`, which then has one more; it has room for that."""
     at = size
     while at > 0:
         above = at - 1 >> 2
@@ -26,19 +26,16 @@ def pop(heap, size):
     found = heap[0, 1]
     size -= 1
     key, value = heap[size, 0], heap[size, 1]
-    at = 0
-    while True:
-        below = 4 * at + 1
-        if below >= size:
-            break
-        least = below
+    at, below = 0, 1
+    while below < size:
+        least, least_key = below, heap[below, 0]
         for other in range(below + 1, min(below + 4, size)):
-            if heap[other, 0] < heap[least, 0]:
-                least = other
-        if heap[least, 0] >= key:
+            if heap[other, 0] < least_key:
+                least, least_key = other, heap[other, 0]
+        if key <= least_key:
             break
-        heap[at, 0], heap[at, 1] = heap[least, 0], heap[least, 1]
-        at = least
+        heap[at, 0], heap[at, 1] = least_key, heap[least, 1]
+        at, below = least, 4 * least + 1
     heap[at, 0], heap[at, 1] = key, value
     return found
 
