@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, Self
 import hybridnav as hn
 from hybridnav._files import printable
 from hybridnav.cli.blocked import parsed_closing
-from hybridnav.cli.common import answer, load_numba, progress_bar, read_settings, stage, timings
+from hybridnav.cli.common import answer, progress_bar, stage, timings
 from hybridnav.cli.errors import UsageError
+from hybridnav.cli.reading import load_numba, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
 from hybridnav.grid.names import place_of_name, read_point
 from hybridnav.sentences import check_language

@@ -21,18 +21,7 @@ from hybridnav.cli.building_check import (
     PairsOption,
     check_building,
 )
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_output,
-    check_picture,
-    check_room_to_be,
-    grow_topology,
-    load_model,
-    read_settings,
-    stage,
-    timings,
-)
+from hybridnav.cli.common import answer, check_output, check_picture, stage, timings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.findings import (
     FAIL_ON,
@@ -45,19 +34,19 @@ from hybridnav.cli.findings import (
     write_page,
 )
 from hybridnav.cli.options import (
-    FreeOption,
     GraphFloorOption,
     JsonOption,
-    LeastIslandOption,
     MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
     PlotOption,
-    PresetOption,
-    RadiusOption,
     RoomsOption,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.cli.reading import (
+    MapOptions,
+    check_room_to_be,
+    grow_topology,
+    load_model,
+    with_map,
+)
 
 if TYPE_CHECKING:
     from hybridnav.graphs import Finding, GraphCheck
@@ -88,6 +77,7 @@ IgnoreOption = Annotated[
 ]
 
 
+@with_map(before="align")
 def check(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
@@ -98,18 +88,14 @@ def check(
     fail_on: FailOnOption = FAIL_ON,
     along_lines: LinesOption = False,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = None,
-    robot_radius_m: RadiusOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     align: AlignOption = False,
     match: MatchOption = None,
     pairs: PairsOption = 400,
     no_stairs: NoStairsOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Find what is wrong with GRAPH on MAP: edges through walls, nodes in walls, parts that are not
     connected, doors that no edge passes, damaged entries. On a building, find that on all floors
@@ -132,11 +118,10 @@ def check(
     given = refused_options(ctx, [name for name in ctx.params if name not in ONLY_BUILDINGS])
     if given:
         raise UsageError(f"{given[0]} is for a building, and this is one map: leave it out")
-    settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
+    settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     with stage(f"reading {graph_file}", seconds, "graph"):
         graph = hn.load_graph(graph_file, floor=floor)
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)

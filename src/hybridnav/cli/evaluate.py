@@ -10,10 +10,11 @@ import typer
 import hybridnav as hn
 from hybridnav._files import printable
 from hybridnav.cli.building import is_building_file
-from hybridnav.cli.common import answer, complain, progress_bar, read_settings
+from hybridnav.cli.common import answer, complain, progress_bar
 from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
+from hybridnav.cli.reading import read_settings
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:

@@ -14,15 +14,14 @@ from hybridnav._files import printable
 from hybridnav.cli.common import (
     answer,
     check_output,
-    check_room_to_be,
     check_writable,
     extent_line,
-    load_numba,
     progress_bar,
     timings,
 )
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption
+from hybridnav.cli.reading import check_room_to_be, load_numba
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 

@@ -14,19 +14,7 @@ import hybridnav as hn
 from hybridnav._files import printable
 from hybridnav.cli.building import check_options, is_building_file, refused_options
 from hybridnav.cli.building_export import EXPORT_OPTIONS, export_building
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_output,
-    check_picture,
-    check_room_to_be,
-    grow_topology,
-    load_model,
-    progress_bar,
-    read_settings,
-    stage,
-    timings,
-)
+from hybridnav.cli.common import answer, check_output, check_picture, progress_bar, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.fleets import (
     ENDINGS,
@@ -37,19 +25,18 @@ from hybridnav.cli.fleets import (
     VehiclesOption,
 )
 from hybridnav.cli.options import (
-    FreeOption,
     JsonOption,
-    LeastIslandOption,
     MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
     PlotOption,
-    PresetOption,
-    RadiusOption,
     RoomsOption,
-    SeedOption,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.cli.reading import (
+    MapOptions,
+    check_room_to_be,
+    grow_topology,
+    load_model,
+    with_map,
+)
 
 if TYPE_CHECKING:
     from hybridnav.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
@@ -136,6 +123,7 @@ ReportOption = Annotated[
 ]
 
 
+@with_map(before="as_json")
 def export(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
@@ -153,15 +141,10 @@ def export(
     no_doors: NoDoorsOption = False,
     report: ReportOption = None,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = None,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
     5050, or its rooms or places.
@@ -195,9 +178,8 @@ def export(
             "--plot": plot is not None,
         }
         _check_plain(kind, given)
-    settings = read_settings(preset, None, robot_radius_m, seed, map_file=map_file)
+    settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
     find_rooms = kind != "places"

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hybridnav._files import printable
-from hybridnav.cli.common import complain, is_model_file, load_model
+from hybridnav.cli.common import complain
+from hybridnav.cli.reading import is_model_file, load_model
 from hybridnav.errors import ModelError
 
 if TYPE_CHECKING:
     import hybridnav as hn
-    from hybridnav.cli.common import Reading
+    from hybridnav.cli.reading import MapOptions
 
 KeepOption = Annotated[
     bool,
@@ -35,7 +36,7 @@ class Source:
 
     map_file: Path
     settings: hn.Preset
-    reading: Reading
+    reading: MapOptions
     keeps: bool = False
     folder: Path | None = None
     """None for the user's cache folder."""
@@ -102,6 +103,6 @@ class Source:
             return None
         from hybridnav.io.models import kept  # noqa: PLC0415
 
-        how = asdict(self.reading) | {"needs_rooms": needs_rooms}
-        del how["max_cells"]
+        names = ("free_threshold", "occupied_threshold", "least_island_m2")
+        how = {name: getattr(self.reading, name) for name in names} | {"needs_rooms": needs_rooms}
         return kept.key_of(self.map_file, self.settings, how, rooms_file)

@@ -11,16 +11,11 @@ import typer
 
 import hybridnav as hn
 from hybridnav._files import printable
-from hybridnav.cli.common import (
-    answer,
-    check_writable,
-    extent_line,
-    load_numba,
-    progress_bar,
-)
+from hybridnav.cli.common import answer, check_writable, extent_line, progress_bar
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.logs import is_bag, open_log
 from hybridnav.cli.options import JsonOption
+from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
 

@@ -25,28 +25,20 @@ from hybridnav.cli.building import (
     plan_in_building,
     refused_options,
 )
-from hybridnav.cli.common import Reading, check_new, check_output, check_picture, read_settings
+from hybridnav.cli.common import check_new, check_output, check_picture
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
 from hybridnav.cli.options import (
     BesideRoomsOption,
-    FreeOption,
     JsonOption,
-    LeastIslandOption,
     MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
     PlotOption,
-    PresetOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
     SmoothOption,
 )
+from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import Request
 from hybridnav.errors import brief
-from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 from hybridnav.sentences import check_language, languages
 
@@ -150,6 +142,7 @@ CompareOption = Annotated[
 ]
 
 
+@with_map(before="keep")
 def plan(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
@@ -169,15 +162,7 @@ def plan(
     blocked: BlockedOption = None,
     no_stairs: NoStairsOption = False,
     costs: CostsOption = None,
-    preset: PresetOption = None,
-    overrides: SetOption = None,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
     smooth: SmoothOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     keep: KeepOption = False,
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
@@ -186,6 +171,8 @@ def plan(
     bag: BagOption = None,
     language: LanguageOption = "en",
     as_json: JsonOption = False,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Plan a route on MAP, or over the floors of a building, from a point or room to another.
 
@@ -197,15 +184,12 @@ def plan(
         return
     given = parsed_costs(costs)
     check_language(language)
-    settings = read_settings(
-        PRESET if preset is None and given else preset,
-        [*given.overrides, *(overrides or ())],
-        robot_radius_m,
-        seed,
+    settings = reading.settings(
+        map_file,
+        preset=PRESET if given else None,
+        overrides=given.overrides,
         smooth=smooth,
-        map_file=map_file,
     )
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     closing = parsed_closing(blocked)
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:

@@ -11,10 +11,11 @@ import typer
 
 import hybridnav as hn
 from hybridnav._files import printable
-from hybridnav.cli.common import answer, check_output, load_numba, progress_bar
+from hybridnav.cli.common import answer, check_output, progress_bar
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
 from hybridnav.cli.logs import open_log
 from hybridnav.cli.options import JsonOption, MaxCellsOption
+from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
 

@@ -6,16 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav.cli.common import (
-    check_room_to_be,
-    complain,
-    grow_topology,
-    islands_figures,
-    outside,
-    refused_result,
-    stage,
-)
+from hybridnav.cli.common import complain, islands_figures, stage
 from hybridnav.cli.compiling import compiling_beside
+from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
 
 if TYPE_CHECKING:

@@ -11,32 +11,16 @@ import typer
 
 import hybridnav as hn
 from hybridnav._files import printable
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_output,
-    check_picture,
-    check_room_to_be,
-    islands_line,
-    load_model,
-    read_settings,
-    stage,
-    timings,
-)
+from hybridnav.cli.common import answer, check_output, check_picture, islands_line, stage, timings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
 from hybridnav.cli.options import (
-    FreeOption,
     JsonOption,
-    LeastIslandOption,
     MapArgument,
-    MaxCellsOption,
-    OccupiedOption,
     PlotOption,
-    PresetOption,
-    RadiusOption,
     RoomsOption,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
+from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
+from hybridnav.grid import CellClass
 from hybridnav.grid.names import Segmentation, read_point
 
 if TYPE_CHECKING:
@@ -92,24 +76,21 @@ AllOption = Annotated[
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
+@with_map(before="at")
 def rooms(
     map_file: MapArgument,
     out: OutOption = None,
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = None,
-    robot_radius_m: RadiusOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     at: AtOption = None,
     force: ForceOption = False,
     tolerance_m: ToleranceOption = None,
     everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Find the rooms of MAP, or read them from a file, and list them with their doors."""
     check_picture(plot)
@@ -126,9 +107,8 @@ def rooms(
         raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
     checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
-    settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
+    settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     grid = model.grid
     check_room_to_be(grid)

@@ -10,28 +10,18 @@ import typer
 
 from hybridnav._files import printable
 from hybridnav.cli.building import check_options, is_building_file, refused_options
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_output,
-    check_room_to_be,
-    load_model,
-    overridden,
-    read_settings,
-)
+from hybridnav.cli.common import answer, check_output
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
     BesideRoomsOption,
-    FreeOption,
-    LeastIslandOption,
     MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
-    PresetOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
+)
+from hybridnav.cli.reading import (
+    MapOptions,
+    check_room_to_be,
+    load_model,
+    with_map,
 )
 from hybridnav.cli.view_building import (
     VIEW_OPTIONS,
@@ -39,7 +29,6 @@ from hybridnav.cli.view_building import (
     building_session,
     save_building,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
@@ -76,6 +65,7 @@ BrowserOption = Annotated[
 ]
 
 
+@with_map()
 def view(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
@@ -85,14 +75,8 @@ def view(
     browser: BrowserOption = True,
     rooms_file: BesideRoomsOption = None,
     costs: CostsOption = None,
-    preset: PresetOption = None,
-    overrides: SetOption = None,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it.
 
@@ -110,11 +94,9 @@ def view(
         return
     pairs = [_endpoints(text) for text in routes or ()]
     given = parsed_costs(costs)
-    settings = read_settings(
-        PRESET if preset is None and given else preset, None, None, None, map_file=map_file
+    settings = reading.settings(
+        map_file, preset=PRESET if given else None, overrides=given.overrides
     )
-    settings = overridden(settings, [*given.overrides, *(overrides or ())], robot_radius_m, seed)
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, {}, reading)
     check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
     rooms_path = map_file.parent / _ROOMS if rooms_file is None else rooms_file
