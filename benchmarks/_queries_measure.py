@@ -20,7 +20,7 @@ from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.outcome import loss_of
 from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.io.movingai import read_scenarios
+from hybridnav.io.size import read_scenarios
 from hybridnav.metrics import judge_line, judge_path
 
 if TYPE_CHECKING:

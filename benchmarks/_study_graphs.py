@@ -28,7 +28,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.baselines import MethodResult
-    from hybridnav.baselines.protocol import Cell
+    from hybridnav.baselines.regions import Cell
     from hybridnav.grid import OccupancyGrid
 
 NODES = 2000

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines.protocol import CUT_CORNERS, CostClaim, MethodResult
+from hybridnav.baselines.regions import CUT_CORNERS, CostClaim, MethodResult
 from hybridnav.errors import InvalidValueError, UnsuitableMapError
 from hybridnav.grid import CellClass
 from hybridnav.search.moves import STEPS, legal_moves, moves_along

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.rivals import Rival, needed_package, refuse_corner_cutting
-from hybridnav.baselines.protocol import AnyAngleResult, MethodResult
+from hybridnav.baselines.regions import AnyAngleResult, MethodResult
 from hybridnav.config import OmplSettings
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.refine.ompl import Query, Setup, Worker, require_ompl

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hybridnav.baselines.hpa import HpaStar
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.io.movingai import load_movingai_map, read_scenarios
+from hybridnav.io.size import load_movingai_map, read_scenarios
 from hybridnav.search.moves import length_in_cells
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
 from tests.strategies import class_grids, drawn, examples, occupancy_grid

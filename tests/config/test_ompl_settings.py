@@ -9,7 +9,7 @@ import shapely
 import hybridnav as hn
 from hybridnav.config import OmplSettings, load_preset
 from hybridnav.config.ompl import PARAMETERS
-from hybridnav.refine.ompl.clearance import Clearance
+from hybridnav.refine.ompl.search_area import Clearance
 
 INERT = {"delay_rewiring_to_first_solution", "use_strict_queue_ordering"}
 """Parameters that OMPL still declares and says have no effect any more."""

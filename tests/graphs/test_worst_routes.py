@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.graphs.attach import Network
-from hybridnav.graphs.corners import Corners, is_among
+from hybridnav.graphs.nodes import Corners, is_among
 from hybridnav.graphs.space import FreeSpace
 
 

@@ -17,7 +17,7 @@ from hybridnav.config import Preset
 from hybridnav.grid import CellClass
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.refine.line_of_sight import LineOfSight
+from hybridnav.refine.open_cells import LineOfSight
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 

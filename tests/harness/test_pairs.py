@@ -20,7 +20,7 @@ from hybridnav.harness.pairs import (
     scenario_pairs,
 )
 from hybridnav.harness.records import decode_path, encode_path
-from hybridnav.io.movingai import Scenario
+from hybridnav.io.size import Scenario
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TWO_PARTS = occupancy_grid(drawn("....#..", "....#..", "....#.."))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
-from hybridnav.homotopy.dead_ends import DeadEnds
+from hybridnav.homotopy.search import DeadEnds
 from tests.strategies import class_grids, drawn
 
 

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 import hybridnav as hn
-from hybridnav.io import bag_limits
+from hybridnav.io import bag_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,8 +82,8 @@ def refused(bag, match):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_map_that_unpacks_to_too_much_ends_in_one_line(kind, tmp_path, monkeypatch):
-    monkeypatch.setattr(bag_limits, "MOST_BYTES", LIMIT)
-    monkeypatch.setattr(bag_limits, "MOST_TIMES", 2)
+    monkeypatch.setattr(bag_files, "MOST_BYTES", LIMIT)
+    monkeypatch.setattr(bag_files, "MOST_TIMES", 2)
     small = bag_of(tmp_path, kind, np.zeros((40, 60), np.int8))
     assert hn.load_bag_map(small).shape == (40, 60)
     (tmp_path / "bomb").mkdir()
@@ -117,10 +117,10 @@ def test_a_chunk_that_states_too_small_a_size_is_stopped_there(packing, tmp_path
 
 def test_frames_one_after_another_are_unpacked_up_to_the_limit():
     frames = bz2.compress(b"one ") + bz2.compress(b"two")
-    assert bag_limits.unpacked(bz2.BZ2Decompressor, frames, "it", 7) == b"one two"
-    with pytest.raises(bag_limits.TooLargeError, match="it unpacks to more than"):
-        bag_limits.unpacked(bz2.BZ2Decompressor, frames, "it", 6)
+    assert bag_files.unpacked(bz2.BZ2Decompressor, frames, "it", 7) == b"one two"
+    with pytest.raises(bag_files.TooLargeError, match="it unpacks to more than"):
+        bag_files.unpacked(bz2.BZ2Decompressor, frames, "it", 6)
     with pytest.raises(EOFError):
-        bag_limits.unpacked(bz2.BZ2Decompressor, frames[:-3], "it", 100)
+        bag_files.unpacked(bz2.BZ2Decompressor, frames[:-3], "it", 100)
     with pytest.raises(EOFError):
-        bag_limits.unpacked(bz2.BZ2Decompressor, bz2.compress(b"") * 20_000, "it", 100)
+        bag_files.unpacked(bz2.BZ2Decompressor, bz2.compress(b"") * 20_000, "it", 100)

@@ -25,7 +25,7 @@ from tests.strategies import Scene, examples, scenes
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav.io.models.array_specs import Structure
+    from hybridnav.io.models.structures import Structure
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]
@@ -95,7 +95,7 @@ def test_a_planner_comes_back_bit_by_bit(preset: str, tmp_path: Path, *, compres
 def test_a_graph_that_took_too_long_to_contract_comes_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hybridnav.mesh.hierarchy._MOST_LOOKED", 0)
+    monkeypatch.setattr("hybridnav.mesh.corner_graph._MOST_LOOKED", 0)
     saved = hn.HybridPlanner(topology())
     saved.prepare()
     came_back = loaded(saved, tmp_path / "m.hnm").planner()

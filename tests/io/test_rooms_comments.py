@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
-from hybridnav.view.edits import changed
-from hybridnav.view.requests import Merge, Rename, Split
+from hybridnav.view.requests import Merge, Rename, Split, changed
 from tests.strategies import drawn, examples, occupancy_grid
 
 FLOOR = drawn(

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.mesh import DetourSearch, MeshSearch, build_mesh, renew_mesh, shortest_paths
-from hybridnav.mesh import detour as detours
+from hybridnav.mesh import cut as detours
 from hybridnav.mesh import search as searches
 from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions

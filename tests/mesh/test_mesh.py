@@ -27,7 +27,7 @@ from hybridnav.mesh import (
     build_mesh,
     shortest_paths,
 )
-from hybridnav.mesh._corner_graph_kernels import edges_of
+from hybridnav.mesh._polyanya_kernels import edges_of
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
@@ -123,7 +123,7 @@ def test_a_graph_with_an_edge_without_its_reverse_is_not_used(
             first, heads = edges_of(*given)
             return first - (first > edge), np.delete(heads, edge)
 
-        monkeypatch.setattr("hybridnav.mesh._corner_graph_kernels.edges_of", all_but_one)
+        monkeypatch.setattr("hybridnav.mesh._polyanya_kernels.edges_of", all_but_one)
         search = MeshSearch(mesh)
         search.prepare()
         assert search.is_prepared

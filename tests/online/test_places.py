@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav.online.places import PLACE, PlaceTable
+from hybridnav.online.state import PLACE, PlaceTable
 
 
 def test_the_table_forgets_places_that_are_no_more():

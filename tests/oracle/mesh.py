@@ -25,7 +25,9 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
     if kind == "intervals":
         return search
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridnav.mesh.hierarchy._MOST_LOOKED", 0 if kind == "landmarks" else 10**6)
+        patch.setattr(
+            "hybridnav.mesh.corner_graph._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
+        )
         search.prepare()
     return search
 

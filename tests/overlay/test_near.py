@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridnav.overlay import build_overlay
+from hybridnav.overlay._field_kernels import search_near
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
-from hybridnav.overlay._near_kernels import search_near
 from tests.overlay.judge import WeightedJudge
 from tests.overlay.test_overlay import nested, world
 from tests.strategies import examples

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hybridnav.costs.integral import segment_cost
 from hybridnav.refine._arc_kernels import round_bends
-from hybridnav.refine._legal_cost_kernels import legal_cost
+from hybridnav.refine._cost_line_kernels import legal_cost
 from hybridnav.refine._segment_kernels import is_legal
 from tests.strategies import examples
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.cli.view_building import building_session
+from hybridnav.cli.view import building_session
 from hybridnav.view import BuildingSession, Session
 from hybridnav.view.app import make_app
 from hybridnav.view.connections import make_server

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import hybridnav as hn
-from hybridnav.cli.view_building import building_opening
+from hybridnav.cli.view import building_opening
 from hybridnav.view import BuildingOpening, BuildingSession, serve
 from tests.view.browser import WINDOW, browsing
 from tests.view.server import building_session_of, folder_in, served, write_building

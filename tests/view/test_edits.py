@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.view.edits import changed, rings_of
-from hybridnav.view.requests import Merge, Move, Rename, Split
+from hybridnav.view.requests import Merge, Move, Rename, Split, changed, rings_of
 from tests.strategies import examples
 
 if TYPE_CHECKING:

@@ -18,9 +18,8 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.viz import plot_level, plot_map, plot_places, plot_plan, save_figure, style
-from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import round_length, text_width, wrapped
-from hybridnav.viz.places import Places
+from hybridnav.viz.places import Places, colour_vertices
 from tests.strategies import class_grids, examples, occupancy_grid
 
 MAPS = Path(__file__).parents[2] / "maps"

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.baselines import _weighted_kernels
-from hybridnav.baselines.protocol import Cell, CostClaim, MethodResult
-from hybridnav.baselines.regions import array_bytes
+from hybridnav.baselines.regions import Cell, CostClaim, MethodResult, array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search.grid_search import GridSearch

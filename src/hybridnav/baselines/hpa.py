@@ -11,8 +11,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.baselines import _hpa_kernels
 from hybridnav.baselines._hpa_kernels import AbstractGraph
-from hybridnav.baselines.protocol import CUT_CORNERS, Cell, MethodResult
-from hybridnav.baselines.regions import array_bytes
+from hybridnav.baselines.regions import CUT_CORNERS, Cell, MethodResult, array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search.moves import STRAIGHT, legal_moves

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.baselines.protocol import CUT_CORNERS
-from hybridnav.baselines.regions import RegionPlanner, free_fields
+from hybridnav.baselines.regions import CUT_CORNERS, RegionPlanner, free_fields
 from hybridnav.grid import CellClass
 from hybridnav.grid.runs import unique_rows
 from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
-    from hybridnav.baselines.protocol import Cell, MethodResult
+    from hybridnav.baselines.regions import Cell, MethodResult
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
 

@@ -16,7 +16,7 @@ from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.baselines.protocol import Cell, MethodResult
+    from hybridnav.baselines.regions import Cell, MethodResult
     from hybridnav.grid import OccupancyGrid
 
 _AROUND = np.ones((3, 3), dtype=np.bool_)

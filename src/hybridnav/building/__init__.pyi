@@ -1,8 +1,8 @@
-from .alternatives import BuildingAlternatives as BuildingAlternatives
+from .answers import BuildingAlternatives as BuildingAlternatives
 from .building import Building as Building
 from .floors import Floor as Floor
 from .align import align_floors as align_floors, moved_floor as moved_floor
-from .floor_graphs import (
+from .link_nodes import (
     BuildingGraph as BuildingGraph,
     DoorLine as DoorLine,
     FloorArea as FloorArea,

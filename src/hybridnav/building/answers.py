@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import itertools
 import time
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, overload
 
 from hybridnav.building.floors import ROUNDED
 from hybridnav.building.network import START
 from hybridnav.building.plan import BuildingPlan, Ride, cost_of, stats_of
-from hybridnav.building.words import GuidedRoute
-from hybridnav.planner.itinerary import waypoint_text
+from hybridnav.planner.itinerary import heading_of, waypoint_text
 from hybridnav.result import PlanStatus
+from hybridnav.sentences import FloorChange, Instruction, Space
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from hybridnav.building.floors import Floor
     from hybridnav.building.network import LinkNetwork, Part
     from hybridnav.building.search import Endpoint, LinkSearch
-    from hybridnav.result import PlanResult, PlanStats
+    from hybridnav.planner.itinerary import Guide
+    from hybridnav.result import Path, PlanResult, PlanStats
 
 
 class Answers:
@@ -134,3 +134,137 @@ class Answers:
             return name, waypoint
         x, y = (float(number) for number in waypoint)  # type: ignore[union-attr, arg-type]
         return name, (x, y)
+
+
+# Instructions for a person on a route over floors.
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedRoute:
+    """A route over floors whose instructions are found when somebody reads them."""
+
+    guides: Sequence[Guide | None]
+    """The source of descriptions on each floor that is visited; None on one without rooms."""
+    results: Sequence[PlanResult]
+    rides: Sequence[Ride]
+    goal: str
+    """What words call the goal."""
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions; none if no floor has rooms."""
+        if all(guide is None for guide in self.guides):
+            return ()
+        found: list[Instruction] = []
+        driven_m = 0.0
+        for number, (guide, result) in enumerate(zip(self.guides, self.results, strict=True)):
+            path, ride = result.path, self.rides[number] if number < len(self.rides) else None
+            assert path is not None  # noqa: S101 - a route is solved
+            before = self.rides[number - 1] if number else None
+            here = self._on_floor(guide, path, before, heading_of(result.start))
+            here = [replace(one, at_m=one.at_m + driven_m) for one in here]
+            if before is not None and here[0].kind == "start" and len(here) > 1:
+                here = self._joined(found, here)
+            if ride is not None:
+                change = self._change(ride, self.guides[number + 1])
+                last = replace(here[-1], waypoint=None, landmark=None)
+                here[-1] = replace(last, kind="ride", change=change)
+            found += here
+            driven_m += path.length_m
+        return tuple(found)
+
+    def _joined(self, found: list[Instruction], here: list[Instruction]) -> list[Instruction]:
+        """Return the instructions on a floor behind a ride, the last one of `found`: the turn of
+        the first step belongs to the sentence of the ride, and a start that shows no direction
+        needs none."""
+        change, start = found[-1].change, here[0]
+        if change is not None and change.has_exit:
+            found[-1] = replace(found[-1], turn=start.turn)
+            return here[1:]
+        is_needed = start.landmark is not None or start.heading_rad is not None
+        return here if is_needed else here[1:]
+
+    def _change(self, ride: Ride, guide: Guide | None) -> FloorChange:
+        """Return what words say of a ride; `guide` is that of the floor where it ends."""
+        end = ride.link.end_on(ride.to_floor)
+        has_exit = guide is not None and end is not None and end.yaw_rad is not None
+        return FloorChange(ride.link.name, ride.link.kind, ride.to_floor, has_exit=has_exit)
+
+    def _on_floor(
+        self, guide: Guide | None, path: Path, before: Ride | None, heading_rad: float | None
+    ) -> list[Instruction]:
+        """Return the instructions on one floor, from a start to an arrival."""
+        if guide is None:
+            x, y = path.points[-1].tolist()
+            storey = Space(None, "storey")
+            length_m = path.length_m
+            return [Instruction("arrive", (x, y), length_m, length_m, storey, waypoint=self.goal)]
+        if before is not None:
+            end = before.link.end_on(before.to_floor)
+            heading_rad = None if end is None else end.yaw_rad
+        legs = guide.legs(path, waypoint=self.goal)
+        return list(guide.instructions([path], [legs], heading_rad=heading_rad))
+
+
+# Routes over floors by different links, and whether there may be more.
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingAlternatives(Sequence["BuildingPlan"]):
+    """The routes that `Building.alternatives` has found, the cheapest first: a sequence of them.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    >>> found = house.alternatives(("1", (0.5, 0.5)), ("1", (2.0, 2.5)), 2)
+    >>> len(found), found[0].solved, found.complete
+    (1, True, True)
+    """
+
+    found: tuple[BuildingPlan, ...]
+    """The plans; one that is not solved if there is no route."""
+    complete: bool
+    """Whether there are as many as requested, or all that keep to the limits: False where the
+    search stopped before."""
+    note: str = ""
+    """The reason why there are fewer than requested, one line; empty if there are not."""
+
+    @overload
+    def __getitem__(self, index: int) -> BuildingPlan: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[BuildingPlan, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> BuildingPlan | tuple[BuildingPlan, ...]:
+        """Return one plan, or some."""
+        return self.found[index]
+
+    def __len__(self) -> int:
+        """Return the number of plans."""
+        return len(self.found)
+
+    @classmethod
+    def of(
+        cls, found: tuple[BuildingPlan, ...], limits: tuple[int, float], *, complete: bool
+    ) -> BuildingAlternatives:
+        """Return the alternatives of a query, with the reason why there are no more.
+
+        Parameters
+        ----------
+        found
+            The plans.
+        limits
+            Most routes, and cost of one over that of the first, at most.
+        complete
+            Whether the search has looked at all sequences of links that keep to the limits.
+        """
+        count, stretch = limits
+        if not found[0].solved:
+            return cls(found, complete=True, note=f"no route was planned: {found[0].status}")
+        if len(found) >= count:
+            return cls(found, complete=True)
+        if not complete:
+            note = f"the search stopped after {len(found)} of {count} routes: there may be more"
+            return cls(found, complete=False, note=note)
+        reason = f"no other sequence of links is at most {stretch:g} times as dear as the first"
+        return cls(found, complete=True, note=f"{len(found)} of {count}: {reason}")

@@ -14,8 +14,7 @@ from hybridnav.building.checks import parts_of
 from hybridnav.building.graph_match import MatchedGraph
 from hybridnav.building.graph_network import BuildingNetwork
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs.judge import excess_of
-from hybridnav.graphs.space import LEAST_AREA_M2
+from hybridnav.graphs.space import LEAST_AREA_M2, excess_of
 from hybridnav.grid.checks import checked_between, checked_type
 from hybridnav.topology.segmentation import outside_of
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.building.building import Building
     from hybridnav.building.graph_network import GraphRoute, Position
     from hybridnav.building.plan import BuildingPlan
-    from hybridnav.graphs.judge import Excess
+    from hybridnav.graphs.space import Excess
 
 Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
 _MOST_EXAMPLES = 100

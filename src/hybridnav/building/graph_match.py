@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import frozen
-from hybridnav.building.align import moved_floor, moved_point
+from hybridnav.building.align import moved_floor, moved_point, placed_pose
 from hybridnav.building.building import Building
-from hybridnav.building.fitted import placed_pose
-from hybridnav.building.floor_graphs import BuildingGraph, FloorGraph
-from hybridnav.building.link_nodes import join_links
+from hybridnav.building.link_nodes import BuildingGraph, FloorGraph, join_links
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs.placed import placed_points
+from hybridnav.graphs.attach import placed_points
 from hybridnav.grid.checks import checked_type
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from hybridnav.building.align import Pose
-    from hybridnav.building.floor_graphs import Point
     from hybridnav.building.floors import Floor
+    from hybridnav.building.link_nodes import Point
     from hybridnav.building.links import Link
 
 AT_LINK_M = 1.0

@@ -11,15 +11,20 @@ import numpy as np
 
 from hybridnav.building.graph_match import AT_LINK_M
 from hybridnav.building.link_nodes import node_at
-from hybridnav.graphs.attach import adjacency, nearest_only, shortest_routes
-from hybridnav.graphs.placed import PlacedGraph, placed_points
+from hybridnav.graphs.attach import (
+    PlacedGraph,
+    adjacency,
+    nearest_only,
+    placed_points,
+    shortest_routes,
+)
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.building.building import Building
-    from hybridnav.building.floor_graphs import FloorGraph, Point
     from hybridnav.building.graph_match import MatchedGraph, MatchedLink
+    from hybridnav.building.link_nodes import FloorGraph, Point
     from hybridnav.graphs.attach import Network, Offsets
     from hybridnav.grid import OccupancyGrid
 

@@ -12,7 +12,7 @@ from hybridnav.cli.request import Wanted
 
 if TYPE_CHECKING:
     from hybridnav.config import Preset
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner.alternatives import By
 
 AlternativesOption = Annotated[
     int,

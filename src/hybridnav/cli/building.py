@@ -40,7 +40,7 @@ BUILD_OPTIONS = frozenset(
 
 def is_building_file(path: Path) -> bool:
     """Return whether a file describes a building; most maps do not need the modules for it."""
-    from hybridnav.io.building_kind import is_building  # noqa: PLC0415 - on demand
+    from hybridnav.io.building_files import is_building  # noqa: PLC0415 - on demand
 
     return is_building(path)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.costs import Costs
     from hybridnav.cli.keep import Source
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner.alternatives import By
     from hybridnav.planner.named import At
 
 _GRID_SEARCH = {

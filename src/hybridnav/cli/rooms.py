@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.grid.room_labels import Point
-    from hybridnav.io.room_measures import RoomMeasures
+    from hybridnav.grid.names import Point
+    from hybridnav.io.rooms_text import RoomMeasures
     from hybridnav.topology import Door, Rooms
 
 OutOption = Annotated[
@@ -149,7 +149,7 @@ def rooms(
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
-    from hybridnav.io.room_measures import measures_of  # noqa: PLC0415 - loads numpy
+    from hybridnav.io.rooms_text import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
 

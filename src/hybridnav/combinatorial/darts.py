@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from hybridnav.combinatorial._base_kernels import base_sigma, next_at_cell
-from hybridnav.combinatorial._kernels import CONTRACTED, Darts, compact_darts, contract, simplify
+from hybridnav.combinatorial._kernels import (
+    CONTRACTED,
+    Darts,
+    base_sigma,
+    compact_darts,
+    contract,
+    next_at_cell,
+    simplify,
+)
 
 __all__ = [
     "CONTRACTED",

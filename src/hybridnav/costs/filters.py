@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.costs.layer import CostLayer
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.messages import read_cells
+from hybridnav.grid.limits import read_cells
 from hybridnav.messages import number_of
 
 if TYPE_CHECKING:

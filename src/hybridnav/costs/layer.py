@@ -13,6 +13,7 @@ import numpy as np
 from hybridnav._copies import copies_alike, frozen
 from hybridnav.costs import masks
 from hybridnav.costs.checks import (
+    HIGHEST,
     MOST_FACTOR,
     UNIT_BITS,
     changed_cells,
@@ -21,11 +22,11 @@ from hybridnav.costs.checks import (
     checked_factors,
     checked_multiplier,
     checked_setting,
+    inflated_costs,
     joined_cells,
     rounded,
 )
-from hybridnav.costs.inflation import HIGHEST, inflated_costs
-from hybridnav.costs.sources import changed_source, joined_source
+from hybridnav.costs.masks import changed_source, joined_source
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid.checks import checked_cell, checked_type
 from hybridnav.grid.clearance import within_radius

@@ -11,9 +11,15 @@ import numpy as np
 
 from hybridnav._trig import atan2
 from hybridnav.errors import InvalidValueError
-from hybridnav.explore.doubts import doubtful_spots, narrow_spots
+from hybridnav.explore.doubts import (
+    cells_in_reach,
+    doubtful_spots,
+    narrow_spots,
+    rimmed,
+    walled,
+    widest_point,
+)
 from hybridnav.explore.goals import Goals
-from hybridnav.explore.plans import cells_in_reach, rimmed, walled, widest_point
 from hybridnav.grid import CellClass
 from hybridnav.mapping import LaserModel, Mapper, SimulatedLaser, SimulatedSonars, SonarModel
 from hybridnav.mapping.sensors import in_sight

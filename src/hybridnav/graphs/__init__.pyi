@@ -7,14 +7,14 @@ from .findings import (
     Example as Example,
     Finding as Finding,
 )
-from .judge import (
+from .space import (
     Excess as Excess,
     GraphReport as GraphReport,
     judge_route_graph as judge_route_graph,
 )
-from .lanes import keep_right as keep_right
-from .polylines import merge_bends as merge_bends
-from .route_graph import RouteGraph as RouteGraph
+from .facts import keep_right as keep_right
+from .metadata import merge_bends as merge_bends
+from .waypoint_graph import RouteGraph as RouteGraph
 from .route_messages import route_messages as route_messages
 from .waypoint_graph import WaypointGraph as WaypointGraph
 

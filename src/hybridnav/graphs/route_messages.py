@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs.route_graph import RouteGraph
+from hybridnav.graphs.waypoint_graph import RouteGraph
 from hybridnav.grid.checks import checked_type
 from hybridnav.messages import MOST_ID, header_message, path_message
 from hybridnav.poses import Motion

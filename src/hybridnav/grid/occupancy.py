@@ -12,12 +12,10 @@ from hybridnav._copies import copies_alike
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_radius, checked_thresholds
-from hybridnav.grid.classes import CellClass
 from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
-from hybridnav.grid.islands import DroppedIslands, without_islands
-from hybridnav.grid.limits import MAX_CELLS
-from hybridnav.grid.messages import grid_message, percentages, read_probability
+from hybridnav.grid.limits import MAX_CELLS, grid_message, percentages, read_probability
+from hybridnav.grid.runs import CellClass, DroppedIslands, without_islands
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

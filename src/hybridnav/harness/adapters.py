@@ -13,7 +13,7 @@ import numpy as np
 from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.graphs.placed import PlacedGraph
+from hybridnav.graphs.attach import PlacedGraph
 from hybridnav.grid import CellClass
 from hybridnav.grid.runs import unique_rows
 from hybridnav.planner import HybridPlanner

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import BoolArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.io.movingai import Scenario
+    from hybridnav.io.size import Scenario
 
 Cell = tuple[int, int]
 Kind = Literal["sampled", "across", "lattice", "scenario"]

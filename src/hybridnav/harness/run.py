@@ -46,7 +46,7 @@ from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io import load_graph
-from hybridnav.io.movingai import read_scenarios
+from hybridnav.io.size import read_scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -14,8 +14,8 @@ from hybridnav._files import printable
 from hybridnav.config.yaml_file import Limits, open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.grid.clearance import within_radius
+from hybridnav.io.cost_specs import load_keepout_mask
 from hybridnav.io.image import read_raster
-from hybridnav.io.masks import load_keepout_mask
 from hybridnav.planner.areas import parts_on
 from hybridnav.planner.blocked import Blocked
 

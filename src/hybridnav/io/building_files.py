@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._files import printable
+from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.config.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.io import graph_yaml, json_stream
+from hybridnav.io import graph_json, graph_yaml
 from hybridnav.io.lif_in import is_lif, read_lif
 from hybridnav.io.osm_in import read_osm
 from hybridnav.io.osm_xml import is_osm
 from hybridnav.io.rmf_editor import is_drawn, read_drawn
-from hybridnav.io.rmf_in import is_rmf, read_rmf
+from hybridnav.io.rmf_floors import is_rmf, read_rmf
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike
     from hybridnav.building import BuildingGraph
     from hybridnav.graphs import WaypointGraph
     from hybridnav.io.anchors import Anchor
+
 
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""
@@ -89,7 +91,7 @@ def read_graph_text(path: PathLike) -> str:
     suffix = Path(path).suffix.lower()
     kind, most = "YAML or text", graph_yaml.LIMITS.max_bytes
     if suffix in JSON:
-        kind, most = "JSON", json_stream.MOST_BYTES
+        kind, most = "JSON", graph_json.MOST_BYTES
     elif suffix in XML:
         kind, most = "XML", _MOST_XML
     return read_text(
@@ -127,3 +129,50 @@ def floors_of_text(text: str, suffix: str, where: str, name: str) -> BuildingGra
     if suffix in JSON and is_lif(text):
         return read_lif(text, where, name)
     return None
+
+
+# Whether a file describes a building: a module that a plan on one map loads quickly.
+
+_FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
+_LOOKED_AT = 2**16
+"""Bytes of a file that are searched for its floors."""
+
+
+def is_building(path: PathLike) -> bool:
+    """Return whether a file describes a building, by what it contains.
+
+    Parameters
+    ----------
+    path
+        A YAML file or a model.
+
+    Returns
+    -------
+    bool
+        False if there is no such file, or it cannot be read.
+
+    Examples
+    --------
+    >>> from hybridnav.io import is_building
+    >>> is_building("maps/office/office.yaml")
+    False
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    try:
+        if not file.is_file():
+            return False
+    except OSError:  # a name that is too long
+        return False
+    if suffix == MODEL_SUFFIX:
+        from hybridnav.io.models.buildings import is_building_model  # noqa: PLC0415 - on demand
+
+        return is_building_model(file)
+    if suffix not in {".yaml", ".yml"}:
+        return False
+    try:
+        with file.open("rb") as stream:
+            text = stream.read(_LOOKED_AT).decode("utf-8-sig", errors="replace")
+    except OSError:
+        return False
+    return _FLOORS.search(text) is not None

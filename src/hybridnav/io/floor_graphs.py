@@ -13,9 +13,8 @@ from hybridnav.building import Building, BuildingGraph, DoorLine, FloorArea, Flo
 from hybridnav.building.link_nodes import Stub, node_at, with_stubs
 from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import RouteGraph, WaypointGraph, build_route_graph
-from hybridnav.graphs.attach import Network
+from hybridnav.graphs.attach import Network, placed_points
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
-from hybridnav.graphs.placed import placed_points
 from hybridnav.grid.checks import checked_type
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap

@@ -19,10 +19,8 @@ from hybridnav.io.building_files import (
     read_open_rmf,
 )
 from hybridnav.io.graph_json import read_json_graph
-from hybridnav.io.graph_text import is_text_graph, read_text_graph
-from hybridnav.io.graph_xml import read_graphml
-from hybridnav.io.graph_yaml import read_yaml_graph
-from hybridnav.io.rmf_in import is_rmf
+from hybridnav.io.graph_yaml import is_text_graph, read_graphml, read_text_graph, read_yaml_graph
+from hybridnav.io.rmf_floors import is_rmf
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.io.movingai import load_movingai_map
 from hybridnav.io.ros import load_ros_map
+from hybridnav.io.size import load_movingai_map
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import IntArray, PathLike
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.room_labels import Point
+    from hybridnav.grid.names import Point
 
 
 def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:

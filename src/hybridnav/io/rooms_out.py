@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from hybridnav._typing import BoolArray, FloatArray, IntArray, PathLike
-    from hybridnav.grid.room_labels import Point
+    from hybridnav.grid.names import Point
 
 _MOST_BYTES = 20_000
 """Size of a file above which coarser outlines are tried: more than a person edits."""

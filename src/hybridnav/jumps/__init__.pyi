@@ -3,7 +3,7 @@ from .build import (
     build_jump_graph as build_jump_graph,
     contract_graph as contract_graph,
 )
-from .patch import JumpPatch as JumpPatch
+from .search import JumpPatch as JumpPatch
 from .search import JumpPath as JumpPath, JumpPaths as JumpPaths, JumpSearch as JumpSearch
 
 __all__: list[str]

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.jumps._join_kernels import limit_of, step_of
-from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS
+from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS, limit_of, step_of
 from hybridnav.jumps._table_kernels import corner_at, is_corner, number_of
 
 LEAVES = 64

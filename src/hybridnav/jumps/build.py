@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.jumps._join_kernels import arcs_of, components
-from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS, legs_that_follow
+from hybridnav.jumps._leg_kernels import (
+    COLUMN_BITS,
+    KIND_BITS,
+    arcs_of,
+    components,
+    legs_that_follow,
+)
 from hybridnav.jumps._table_kernels import look_ahead, number_cells
 from hybridnav.search.contraction import contract, renumbered
 

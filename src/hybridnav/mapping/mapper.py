@@ -11,11 +11,15 @@ from hybridnav._trig import cos, sin
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.grid.checks import checked_type
-from hybridnav.mapping._beam_kernels import add_hits, add_passes, beam_ends, probabilities
-from hybridnav.mapping._cone_kernels import add_cone
-from hybridnav.mapping.checks import checked_array, checked_count, checked_number
+from hybridnav.mapping._beam_kernels import add_cone, add_hits, add_passes, beam_ends, probabilities
 from hybridnav.mapping.models import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
-from hybridnav.mapping.scans import LaserScan, SonarScan
+from hybridnav.mapping.scans import (
+    LaserScan,
+    SonarScan,
+    checked_array,
+    checked_count,
+    checked_number,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from hybridnav._trig import log
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
-from hybridnav.mapping.checks import checked_number
+from hybridnav.mapping.scans import checked_number
 
 MOST_RANGE_CELLS = 2**14
 """Cells of a beam that are walked exactly in int64."""

@@ -13,9 +13,16 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, OccupancyGrid
 from hybridnav.grid.checks import checked_type
 from hybridnav.mapping._beam_kernels import ray_lengths
-from hybridnav.mapping.checks import MOST_READINGS, checked_array, checked_count, checked_number
 from hybridnav.mapping.models import MOST_RANGE_CELLS
-from hybridnav.mapping.scans import LaserScan, SonarScan, sonar_ring
+from hybridnav.mapping.scans import (
+    MOST_READINGS,
+    LaserScan,
+    SonarScan,
+    checked_array,
+    checked_count,
+    checked_number,
+    sonar_ring,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray

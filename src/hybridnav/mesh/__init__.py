@@ -1,11 +1,8 @@
 """Exact any-angle paths: the convex mesh of free space, its intervals, the graph of its corners."""
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
-from hybridnav.mesh.corner_graph import CornerGraph
-from hybridnav.mesh.cut import renew_mesh
-from hybridnav.mesh.detour import DetourSearch
-from hybridnav.mesh.hierarchy import CornerHierarchy
-from hybridnav.mesh.many import MeshPaths, shortest_paths
+from hybridnav.mesh.corner_graph import CornerGraph, CornerHierarchy
+from hybridnav.mesh.cut import DetourSearch, MeshPaths, renew_mesh, shortest_paths
 from hybridnav.mesh.search import MeshPath, MeshSearch
 from hybridnav.mesh.trace import SearchTrace, trace_search
 

@@ -15,10 +15,8 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh._corner_search_kernels import query_corners
-from hybridnav.mesh._hierarchy_search_kernels import query_hierarchy
-from hybridnav.mesh._query_kernels import query
-from hybridnav.mesh.corner_graph import add_landmarks, find_edges
-from hybridnav.mesh.hierarchy import CornerHierarchy, contract_corners
+from hybridnav.mesh._query_kernels import query, query_hierarchy
+from hybridnav.mesh.corner_graph import CornerHierarchy, add_landmarks, contract_corners, find_edges
 from hybridnav.search.moves import FAR
 from hybridnav.search.pool import Pool
 

@@ -8,9 +8,8 @@ exact comparison of two products, which tests hold against fractions.
 from hybridnav.metrics.anyangle import AnyAnglePath, VisibilityGraph
 from hybridnav.metrics.arcs import Chords, chords_of
 from hybridnav.metrics.cheapest import CheapestCost
-from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
+from hybridnav.metrics.judge import ScipyOptimum, Verdict, judge_path, segment_faults
 from hybridnav.metrics.judge_line import judge_line, line_cells
-from hybridnav.metrics.optimum import ScipyOptimum
 from hybridnav.metrics.segmentation import RoomAgreement, compare_rooms
 from hybridnav.metrics.statistics import (
     Buckets,

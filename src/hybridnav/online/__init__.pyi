@@ -1,6 +1,6 @@
-from .carrying import CarriedCosts as CarriedCosts, carry_costs as carry_costs
+from .shift import CarriedCosts as CarriedCosts, carry_costs as carry_costs
 from .figures import ReplayFigures as ReplayFigures
-from .flips import Flips as Flips
+from .shift import Flips as Flips
 from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
 from .regions import OnlineRegions as OnlineRegions, RegionsUpdate as RegionsUpdate
 from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay

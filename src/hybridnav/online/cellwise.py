@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid.runs import unique_rows
-from hybridnav.online import _move_kernels, _removal_kernels
+from hybridnav.online import _merge_kernels, _removal_kernels
 from hybridnav.online._cell_kernels import box_round
 from hybridnav.online._merge_kernels import merge_pairs
 from hybridnav.online._ring_kernels import box_groups
-from hybridnav.online.places import PLACE
-from hybridnav.online.state import State
+from hybridnav.online.state import PLACE, State
 from hybridnav.online.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.pyramid.window import contract_alone
@@ -99,7 +98,7 @@ class CellDraft:
         window = _Window(self, box.widened(1))
         first = self.next_place
         waiting, lost, altered = window.take_out(found)
-        joined, moved, boxes = _move_kernels.let_join(
+        joined, moved, boxes = _merge_kernels.let_join(
             window.planes,
             window.low,
             self.places.columns(),
@@ -108,7 +107,7 @@ class CellDraft:
             self.limit,
         )
         made = window.make_places(boxes) if len(boxes) else boxes[:, 0]
-        beyond = _move_kernels.merge_after(
+        beyond = _merge_kernels.merge_after(
             window.planes,
             window.low,
             self.places.columns(),

@@ -13,22 +13,22 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.areas import box_of_area, class_reach, class_rules
 from hybridnav.grid.checks import checked_cell, checked_type
+from hybridnav.online import _ring_kernels
 from hybridnav.online.cellwise import CellDraft
-from hybridnav.online.dense import pyramid_of, state_of
 from hybridnav.online.identities import settle
-from hybridnav.online.levels import with_levels
 from hybridnav.online.shift import check_sides, shift_of
-from hybridnav.online.tiles import Box
+from hybridnav.online.state import State, pyramid_of, state_of
+from hybridnav.online.tiles import NO_PLACE, Box
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import SURVIVES
-from hybridnav.pyramid.window import Criterion
+from hybridnav.pyramid.window import Criterion, contract_places
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import IntArray, LongArray
-    from hybridnav.online.state import State
+    from hybridnav._typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.online.tiles import Tiles
     from hybridnav.pyramid import Linkage
 
 
@@ -295,3 +295,67 @@ def _outside(inner: Box, outer: Box) -> list[Box]:
         Box(low, inner.high_col, high, outer.high_col),
     ]
     return [box for box in boxes if not box.is_empty]
+
+
+# The levels below places, made when they are read.
+
+
+def with_levels(state: State, box: Box, criterion: Criterion) -> State:
+    """Return a version with all levels below the places that changed since they were made last.
+
+    Each of these places is dissolved into its cells and contracted again, beside places that stay
+    as they are, until its surviving cell alone is left.
+
+    Parameters
+    ----------
+    state
+        The version; it stays as it is.
+    box
+        All cells, by the rows and columns of the tiles.
+    criterion
+        When two fields merge; its linkage is "radius".
+    """
+    if state.has_levels:
+        return state
+    stale = state.places.stale()
+    tiles, places = state.tiles.next_version(), state.places.next_version()
+    cells, rows = tiles.read(box), places.read(stale)
+    dissolved = _ring_kernels.index_in(cells["place"], stale)
+    gone = (dissolved > 0) | ((cells["class"] == 0) & (cells["end"] > 0))
+    ring = _ring_kernels.ring_round(gone) & (cells["place"] != NO_PLACE)
+    survivors = np.zeros(box.shape, np.bool_)
+    row, col = (rows["cell"] - np.array(box[:2])).T
+    survivors[row, col] = True
+    joins = _joins_of(tiles, box, ring, cells)
+    fields = contract_places(dissolved, survivors, (ring, joins), criterion)
+    fresh = cells["class"] * gone
+    _ring_kernels.enter(
+        tuple(cells[name] for name in ("class", "end", "parent", "edges", "place")),
+        (gone, fresh),
+        (fields.record.vertex_end, fields.record.vertex_parent, fields.record.edge_end),
+        fields.field_of,
+        cells["place"].ravel()[fields.survivors].astype(np.int64),
+    )
+    tiles.write(box, cells)
+    rows["is_stale"] = False
+    places.write(stale, rows)
+    tiles.close()
+    places.close()
+    ends = np.bincount(cells["end"].ravel(), minlength=SURVIVES + 1).astype(np.int64)
+    return State(tiles, places, ends, state.next_place)
+
+
+def _joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteArray:
+    """Return the level at which the two cells of each base edge in a ring join, flat."""
+    joins: ByteArray
+    joins, beyond = _ring_kernels.ring_joins(ring, cells["end"], cells["parent"], cells["place"])
+    beyond[:, 2:] += np.tile(np.array(box[:2]), 2)
+    for edge, reached, *cell, row, col in beyond.tolist():
+        level, first, second = reached, (cell[0], cell[1]), (row, col)
+        while first != second:
+            if tiles.end_at(first) > tiles.end_at(second):
+                first, second = second, first
+            level = max(level, tiles.end_at(first))
+            first = tiles.parent_of(first)
+        joins[edge] = level
+    return joins

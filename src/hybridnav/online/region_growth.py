@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.online import _region_kernels, _ring_kernels
+from hybridnav.online import _ring_kernels
 from hybridnav.online.tiles import Box
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def touched_between(before: State, after: State) -> Touched:
     for one, other in after.tiles.differing_tiles(before.tiles):
         if count + one.place.size > len(keys):
             keys = np.concatenate([keys[:count], np.empty(count + 8 * one.place.size, np.int64)])
-        count = _region_kernels.touched_cells(one[:2], other[:2], keys, count)
+        count = _ring_kernels.touched_cells(one[:2], other[:2], keys, count)
     keys, cells = np.unique(keys[:count], return_counts=True)
     return Touched((keys >> 32) - 1, (keys & 0xFFFFFFFF) - 1, cells)
 
@@ -66,7 +66,7 @@ def lengths_between(state: State, places: Sequence[int]) -> dict[tuple[int, int]
         place, of_class = state.tiles.planes(box)
         is_one = _ring_kernels.index_in(place, numbers[group_of == group])
         keys, cracks = np.unique(
-            _region_kernels.cracks_of(place, of_class, is_one), return_counts=True
+            _ring_kernels.cracks_of(place, of_class, is_one), return_counts=True
         )
         pairs = zip((keys >> 32).tolist(), (keys & 0xFFFFFFFF).tolist(), strict=True)
         found.update(zip(pairs, cracks.tolist(), strict=True))

@@ -11,11 +11,10 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.checks import checked_type
-from hybridnav.online.flips import Flips, Numbered, flips_between
 from hybridnav.online.pyramid import OnlinePyramid
 from hybridnav.online.regions import OnlineRegions
 from hybridnav.online.room_versions import OnlineRooms
-from hybridnav.online.shift import shift_of
+from hybridnav.online.shift import Flips, Numbered, flips_between, shift_of
 from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from hybridnav._typing import BoolArray, IntArray
-    from hybridnav.grid.room_labels import Point
+    from hybridnav.grid.names import Point
 
 _NUMBERED = re.compile(r"room-([1-9][0-9]{0,8})")
 """Names of rooms that nobody has named."""

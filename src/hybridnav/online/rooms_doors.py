@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.room_labels import Point
+    from hybridnav.grid.names import Point
 
 _BIAS = 1 << 20
 """Added to rows and columns so that none is negative."""

@@ -18,17 +18,22 @@ from hybridnav.costs.checks import UNIT_BITS
 from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _cost_kernels as kernels
 from hybridnav.overlay._gate_kernels import gates_of
-from hybridnav.overlay.changes import box_within, change_in, fields_around
-from hybridnav.overlay.factors import ONE, are_whole, numbers_of, units_of
-from hybridnav.overlay.growth import grow
-from hybridnav.overlay.layout import lay_out, slots_of
-from hybridnav.overlay.tables import (
+from hybridnav.overlay.changes import (
+    ONE,
     PathsTooLongError,
+    are_whole,
+    box_within,
+    change_in,
     compute_top,
+    fields_around,
     fill_cliques,
     fill_some,
     fill_tables,
+    numbers_of,
+    units_of,
 )
+from hybridnav.overlay.growth import grow
+from hybridnav.overlay.layout import lay_out, slots_of
 from hybridnav.search.moves import legal_moves
 from hybridnav.search.turns import Turns
 

@@ -11,8 +11,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length
 from hybridnav.homotopy import alternative_search
-from hybridnav.planner.by_doors import Chosen, admissible
-from hybridnav.planner.overlap import Track
+from hybridnav.planner.by_doors import Chosen, Track, admissible
 from hybridnav.planner.tour import tour_of
 from hybridnav.refine import LineOfSight
 from hybridnav.result import Path

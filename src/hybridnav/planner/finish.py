@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.outcome import Outcomes
+    from hybridnav.planner.follow import Outcomes
     from hybridnav.result import PlanResult
 
 Smooth = Literal["none", "line-of-sight", "arcs"]

@@ -15,7 +15,6 @@ from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
 from hybridnav.planner.follow import PlannerChange, change_of, followed
 from hybridnav.planner.queries import Queries
-from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
 from hybridnav.search.turns import Turns
 
@@ -360,3 +359,25 @@ class HybridPlanner:
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
         return self._queries.closed_for_all(closed)
+
+
+# Check of the robot's radius, which map and preset both state.
+
+
+def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
+    """Refuse a map of the default radius with a preset for another radius.
+
+    A radius that the caller chose for the map wins over the preset's, and results record it.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map has the default radius, not chosen by the caller, and the preset names another.
+    """
+    wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
+    if grid.radius_is_default and wanted_m != radius_m:
+        raise InvalidValueError(
+            f"preset {preset.name} is for a robot radius of {wanted_m} m, the map was made with "
+            f"the default of {radius_m} m: make it with robot_radius_m={wanted_m}, or with "
+            f"robot_radius_m={radius_m} if that is meant"
+        )

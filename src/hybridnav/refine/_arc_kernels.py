@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 from hybridnav._trig import atan2, cos, sin, tan
 from hybridnav.costs.integral import segment_cost
-from hybridnav.refine._legal_cost_kernels import legal_cost
+from hybridnav.refine._cost_line_kernels import legal_cost
 from hybridnav.refine._segment_kernels import is_legal
 
 _FREE = 1

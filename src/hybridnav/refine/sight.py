@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine._sight_kernels import apart, clear_segments, reaches, shared
+from hybridnav.refine._segment_kernels import apart, clear_segments, reaches, shared
 from hybridnav.refine._taut_kernels import marks_of
 
 if TYPE_CHECKING:

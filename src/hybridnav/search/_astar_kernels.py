@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._move_kernels import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
-from hybridnav.search._open_kernels import BUCKET_FULL, full_cost, is_no_gain, put
+from hybridnav.search._move_kernels import (
+    BUCKET_FULL,
+    COL_STEP,
+    DIAGONAL,
+    ROW_STEP,
+    STRAIGHT,
+    full_cost,
+    is_no_gain,
+    octile_cost,
+    put,
+)
 
 # A record: generation, cost modulo 2^19, direction of arrival; see `_open_kernels`. The width of a
 # bucket and two diagonals are below 2^18.

@@ -18,8 +18,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.search import _astar_kernels as _kernels
 from hybridnav.search import _weighted_kernels as _weighted
-from hybridnav.search._move_kernels import legal_moves, trace_cells
-from hybridnav.search._open_kernels import BUCKET_FULL
+from hybridnav.search._move_kernels import BUCKET_FULL, legal_moves, trace_cells
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:

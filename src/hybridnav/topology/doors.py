@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.room_labels import Point
+    from hybridnav.grid.names import Point
 
 LEAST_DOOR_M = 0.3
 """Passage below which a boundary counts as a gap, in metres: a scan's noise makes many. Gaps have

@@ -10,8 +10,7 @@ from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
-from hybridnav.grid.names import Segmentation
-from hybridnav.grid.room_labels import MAX_ROOMS
+from hybridnav.grid.names import MAX_ROOMS, Segmentation
 from hybridnav.topology import _segmentation_kernels
 from hybridnav.topology.cutting import Ground, fine_segments
 from hybridnav.topology.growing import Likely, Small, contract

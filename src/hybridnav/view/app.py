@@ -13,11 +13,9 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
-from hybridnav.view.building_opening import BuildingOpening
-from hybridnav.view.export import KINDS, exported, exported_building
 from hybridnav.view.floors import BuildingSession
-from hybridnav.view.opening import Opening, PreparingError
-from hybridnav.view.page import ASSETS, POLICY, asset, live_page
+from hybridnav.view.opening import BuildingOpening, Opening, PreparingError
+from hybridnav.view.page import ASSETS, KINDS, POLICY, asset, exported, exported_building, live_page
 from hybridnav.view.requests import (
     AlternativesQuery,
     At,

@@ -7,8 +7,7 @@ import socket
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.view.building_opening import BuildingOpening
-from hybridnav.view.opening import Opening
+from hybridnav.view.opening import BuildingOpening, Opening
 
 if TYPE_CHECKING:
     from collections.abc import Callable

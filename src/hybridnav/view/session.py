@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.grid import RoomLabels
-from hybridnav.view.edits import changed, rings_of
 from hybridnav.view.graph import in_metres, level_graph, map_facts, room_facts
 from hybridnav.view.planning import Planning
-from hybridnav.view.requests import checked_change
+from hybridnav.view.requests import changed, checked_change, rings_of
 from hybridnav.view.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from PIL import Image
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.viz import style
-from hybridnav.viz.colouring import colour_vertices
+from hybridnav.viz.places import colour_vertices
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,11 +16,10 @@ from hybridnav.building.floors import Known
 from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError, MapError, ModelError
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.container import buffers_of, parts_within, read_parts
 from hybridnav.io.models.model import model_of
 from hybridnav.io.models.parts import plain, values_of
-from hybridnav.io.models.structures import BUILDING, FLOOR
+from hybridnav.io.models.structures import BUILDING, FLOOR, refusal
 from hybridnav.io.size import check_max_cells
 
 if TYPE_CHECKING:

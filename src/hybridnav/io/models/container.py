@@ -7,7 +7,7 @@
     header     JSON, UTF-8: the parts, and the places of their arrays
     arrays     each at a multiple of 64 bytes, little-endian, in C order; deflated if marked
 
-Offsets count from the first multiple of 64 behind the header. `hybridnav.io.models.array_specs`
+Offsets count from the first multiple of 64 behind the header. `hybridnav.io.models.structures`
 describes the contents of parts and the valid values of arrays.
 """
 

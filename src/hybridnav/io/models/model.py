@@ -12,9 +12,18 @@ from hybridnav.config import Preset, PyramidSettings, load_preset
 from hybridnav.errors import ModelError
 from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts
-from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.container import read_parts
-from hybridnav.io.models.structures import BUILDING, GONE, GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
+from hybridnav.io.models.structures import (
+    BUILDING,
+    GONE,
+    GRID,
+    KEY,
+    KINDS,
+    PRESET,
+    PYRAMID,
+    ROOMS,
+    refusal,
+)
 from hybridnav.io.size import check_max_cells
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap

@@ -12,9 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from hybridnav.config import Preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import Frame, OccupancyGrid, RoomLabels
-from hybridnav.grid.islands import DroppedIslands
-from hybridnav.io.models.array_specs import refusal
-from hybridnav.io.models.structures import GRID, PRESET, PYRAMID, ROOMS
+from hybridnav.grid.runs import DroppedIslands
+from hybridnav.io.models.structures import GRID, PRESET, PYRAMID, ROOMS, refusal
 from hybridnav.io.size import check_size
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import (

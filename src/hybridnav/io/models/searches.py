@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict
 
 from hybridnav import jumps
 from hybridnav import mesh as meshes
-from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.parts import values_of
 from hybridnav.io.models.structures import (
     CORNER_EDGES,
@@ -17,6 +16,7 @@ from hybridnav.io.models.structures import (
     CORNER_HIERARCHY,
     JUMP_GRAPH,
     MESH,
+    refusal,
 )
 
 if TYPE_CHECKING:
