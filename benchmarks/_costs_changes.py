@@ -17,9 +17,9 @@ from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
-    from hybridnav.overlay import OverlayPath
+    from hybridnav.search.overlay import OverlayPath
 
     Box = tuple[int, int, int, int]
 

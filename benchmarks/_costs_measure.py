@@ -16,16 +16,16 @@ from benchmarks._queries_measure import read
 from benchmarks.worlds import office_world
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.overlay import OverlaySearch, prepare_overlay
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.overlay import OverlaySearch, prepare_overlay
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
-    from hybridnav.overlay import Overlay
+    from hybridnav.search.overlay import Overlay
 
     Cell = tuple[int, int]
 

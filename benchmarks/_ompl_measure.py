@@ -12,20 +12,20 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._queries_measure import MOVINGAI_MERGE_DISTANCE_M, ROS_MERGE_DISTANCE_M, read
-from hybridnav.config import load_preset
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment, map_digest
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.metrics import segment_faults
+from hybridnav.planner import load_preset
 from hybridnav.planner.ompl_plans import OmplPlanner
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.config import PlannerSettings
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.pairs import Pair
+    from hybridnav.planner import PlannerSettings
 
 Record = dict[str, Any]
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.config import load_preset
+from hybridnav.planner import load_preset
 from hybridnav.planner.ompl_plans import OmplPlanner
 from hybridnav.viz import plot_search
 

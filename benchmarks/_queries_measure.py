@@ -15,19 +15,19 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
-from hybridnav.config import load_preset
 from hybridnav.harness.adapters import _nbytes
+from hybridnav.harness.judges import judge_line, judge_path
 from hybridnav.harness.outcome import loss_of
 from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.io.size import read_scenarios
-from hybridnav.metrics import judge_line, judge_path
+from hybridnav.maps.files.movingai import read_scenarios
+from hybridnav.planner import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.tables import Row
 

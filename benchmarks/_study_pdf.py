@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from benchmarks._study_data import Data
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.yardstick import Optimum
     from hybridnav.viz.charts import MethodStyle

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from benchmarks._study_data import studies_of
 from benchmarks._study_page import circumstances, rules
 from benchmarks._study_tables import TITLES, tables_of
-from hybridnav._files import replace_file
+from hybridnav._base.files import replace_file
 from hybridnav.harness.columns import MEANINGS, rows_of_map
 from hybridnav.harness.output import report_of
 from hybridnav.harness.report import ReportData, render_report

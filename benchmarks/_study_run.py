@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from benchmarks.rivals import needed_package
-from hybridnav._files import replace_file
-from hybridnav.config import load_preset
+from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.planner import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from benchmarks._study_maps import StudyMap
-    from hybridnav.config import Preset
+    from hybridnav.planner import Preset
 
 RUN_FILE = "study-run.json"
 COSTS = ("clearance",)

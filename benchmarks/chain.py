@@ -26,7 +26,7 @@ from benchmarks.worlds import office_world, tiled
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._base.typing import BoolArray, LongArray
 
 OFFICE = Path(__file__).parents[1] / "maps" / "office" / "office.yaml"
 REAL_MAPS = (

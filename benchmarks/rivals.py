@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines.regions import CUT_CORNERS, CostClaim, MethodResult
+from hybridnav._base.moves import STEPS, legal_moves, moves_along
 from hybridnav.errors import InvalidValueError, UnsuitableMapError
-from hybridnav.grid import CellClass
-from hybridnav.search.moves import STEPS, legal_moves, moves_along
+from hybridnav.harness.baselines.regions import CUT_CORNERS, CostClaim, MethodResult
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
 
 Cell = tuple[int, int]
 

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.rivals import Rival, needed_package, refuse_corner_cutting
-from hybridnav.baselines.regions import AnyAngleResult, MethodResult
-from hybridnav.config import OmplSettings
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.refine.ompl import Query, Setup, Worker, require_ompl
+from hybridnav.harness.baselines.regions import AnyAngleResult, MethodResult
+from hybridnav.refine.ompl import OmplSettings, Query, Setup, Worker, require_ompl
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 

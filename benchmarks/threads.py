@@ -26,7 +26,7 @@ from benchmarks.chain import OFFICE, RADIUS_M
 from hybridnav.harness.pairs import sample_pairs
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
 
 ROUNDS = 5
 

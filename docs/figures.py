@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.mesh import build_mesh, trace_search
+from hybridnav.ext.fleet import plot_building
+from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
-    plot_building,
     plot_costs,
     plot_level,
     plot_levels,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED, World
-from hybridnav.grid import Frame
+from hybridnav.maps import Frame
 
 
 def figure1_world() -> World:

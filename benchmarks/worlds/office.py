@@ -17,10 +17,10 @@ from benchmarks.worlds.scan import (
     wobble,
 )
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED, World
-from hybridnav.grid.frame import Frame
+from hybridnav.maps.frame import Frame
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray
+    from hybridnav._base.typing import ByteArray
 
 _FRAME = Frame(resolution_m=0.05, origin_m=(-3.0, -2.0))
 _SHAPE = (580, 960)

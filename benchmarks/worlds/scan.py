@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray
-    from hybridnav.grid import Frame
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray
+    from hybridnav.maps import Frame
 
 Point = tuple[float, float]
 Rect = tuple[float, float, float, float]

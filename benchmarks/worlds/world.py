@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from hybridnav._copies import copies_alike
-from hybridnav._files import replace_file
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid import OccupancyGrid
-from hybridnav.grid.limits import MAX_CELLS
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.limits import MAX_CELLS
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, PathLike
-    from hybridnav.grid import Frame
+    from hybridnav._base.typing import ByteArray, PathLike
+    from hybridnav.maps import Frame
 
 FREE = np.uint8(254)
 UNEXPLORED = np.uint8(205)

@@ -8,9 +8,9 @@ import pytest
 import hybridnav as hn
 from benchmarks.rivals_any_angle import count_corners
 from benchmarks.worlds import figure1_world
-from hybridnav.baselines.regions import MethodResult
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.baselines.regions import MethodResult
 from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import write_outputs

@@ -12,11 +12,17 @@ from hypothesis import strategies as st
 from benchmarks._study_run import RIVALS
 from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, Tcod
 from benchmarks.rivals_any_angle import ExtremityPathfinder, OmplWhole
-from hybridnav.costs import CostLayer
 from hybridnav.errors import InvalidValueError, OmplError, UnsuitableMapError
-from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.harness.judges import (
+    CheapestCost,
+    ScipyOptimum,
+    VisibilityGraph,
+    judge_line,
+    judge_path,
+)
 from hybridnav.harness.methods import baseline_spec, named_spec, prepare
-from hybridnav.metrics import CheapestCost, ScipyOptimum, VisibilityGraph, judge_line, judge_path
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 
 
 @dataclass(frozen=True)

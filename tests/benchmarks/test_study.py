@@ -31,9 +31,9 @@ from benchmarks._study_run import (
 )
 from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
 from benchmarks._study_tables import tables_of
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES
+from hybridnav.planner import load_preset
 from tests.benchmarks.recomputed import REFERENCE, Recomputed
 from tests.harness.small_runs import run_here
 

@@ -15,7 +15,7 @@ from benchmarks.worlds.__main__ import main
 from benchmarks.worlds.office import DOORS, ROOMS
 from benchmarks.worlds.scan import window
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 
 MAPS = Path(__file__).parents[2] / "maps"
 RADIUS_M = 0.25

@@ -8,7 +8,7 @@ import pytest
 
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.io import load_map
+from hybridnav.maps.files import load_map
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map

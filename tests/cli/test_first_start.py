@@ -14,7 +14,7 @@ import pytest
 
 from hybridnav.cli import compiling
 from hybridnav.cli.compiling import notice_of_compiling
-from hybridnav.config import load_preset
+from hybridnav.planner import load_preset
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
+from hybridnav._base.poses import Motion
 from hybridnav.harness import (
     RunSettings,
     compare_runs,
@@ -21,7 +21,7 @@ from hybridnav.harness import (
 )
 from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.records import RECORDS_FILE, decode_path, read_records
-from hybridnav.poses import Motion
+from hybridnav.maps.costs import cost_along
 from tests.harness import faulty_costs as faulty
 from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
 from tests.layers import layer_of

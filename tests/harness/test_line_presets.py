@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.planner import load_preset
 from tests.cli.test_commands import FIGURE
 from tests.harness.small_runs import ROOMS, ROOT, run_here, write_map
 

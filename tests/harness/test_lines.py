@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from benchmarks._study_data import part_figures
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.contradictions import contradiction
+from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.outcome import query_key
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.yardstick import Yardstick
-from hybridnav.io import load_map
-from hybridnav.metrics import VisibilityGraph
+from hybridnav.maps.files import load_map
+from hybridnav.planner import load_preset
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
 

@@ -16,7 +16,7 @@ from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
 CLASS = """
-from hybridnav.baselines.grid import GridAstar
+from hybridnav.harness.baselines.grid import GridAstar
 
 class Mine(GridAstar):
     def __init__(self, grid, *, name="HPA* of mine", weight=1):

@@ -9,9 +9,9 @@ from html import unescape
 
 import pytest
 
-from hybridnav.baselines.grid import GridAstar
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.columns import (
     EFFICIENCY_COLUMNS,
     figures,

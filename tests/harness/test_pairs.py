@@ -10,7 +10,6 @@ from hypothesis.extra import numpy as arrays
 
 from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, OccupancyGrid
 from hybridnav.harness.pairs import (
     STRATA,
     Pair,
@@ -20,7 +19,8 @@ from hybridnav.harness.pairs import (
     scenario_pairs,
 )
 from hybridnav.harness.records import decode_path, encode_path
-from hybridnav.io.size import Scenario
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.files.movingai import Scenario
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TWO_PARTS = occupancy_grid(drawn("....#..", "....#..", "....#.."))

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.planner.blocked import Blocked, as_blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import components, move_graph

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.metrics import segment_faults
 from hybridnav.planner.blocked import Blocked
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, recounted

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from tests.interrupts import Struck, lines_of
 from tests.layers import layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph

@@ -12,11 +12,10 @@ import shapely
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.grid import RoomLabels
-from hybridnav.planner.itinerary import Guide
+from hybridnav.maps import RoomLabels
+from hybridnav.planner import Path, load_preset
+from hybridnav.planner.guide.itinerary import Guide
 from hybridnav.planner.named import points_of_waypoints
-from hybridnav.result import Path
 from hybridnav.viz import plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
 

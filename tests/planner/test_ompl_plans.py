@@ -18,8 +18,8 @@ import hybridnav as hn
 from benchmarks._ompl_checks import CORNERS, Walls
 from benchmarks._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
-from hybridnav.config import load_preset
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
+from hybridnav.planner import load_preset
 from hybridnav.planner.cell_planner import CellQuery
 from tests.strategies import drawn, occupancy_grid
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.judges import judge_path
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.metrics import judge_path
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
 from tests.certificates import ROUNDING
 from tests.strategies import examples, scenes
 

@@ -15,7 +15,7 @@ from shapely import Polygon
 from shapely import box as area
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
+from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.planner.test_costs import optimum_m, random_layer, scene, seeds, topology_of

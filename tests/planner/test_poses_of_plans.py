@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.messages import pose_of
+from hybridnav._base.messages import pose_of
+from hybridnav.planner import load_preset
 from tests.plans import TWO_ROOMS, grid_of, map_of, points_in, scene_map
 from tests.strategies import Scene, examples, scenes
 

@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.planner.mesh_plans import OverMesh
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, drawn, examples, occupancy_grid

@@ -21,12 +21,12 @@ from numba.core.registry import CPUDispatcher
 from shapely import box
 
 import hybridnav as hn
-from hybridnav.baselines.hpa import HpaStar
-from hybridnav.baselines.simple_graph import SimpleGraphPyramid
-from hybridnav.baselines.thrun import ThrunMap
-from hybridnav.online import OnlinePyramid, OnlineRegions, OnlineRooms
+from hybridnav._base.pool import Pool
+from hybridnav.ext.live import OnlinePyramid, OnlineRegions, OnlineRooms
+from hybridnav.harness.baselines.hpa import HpaStar
+from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid
+from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.pool import Pool
 from tests.strategies import Scene, examples, scenes
 
 FIGURE1 = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
@@ -266,7 +266,7 @@ def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
         "import pickle, sys\n"
         f"result = pickle.load(open({str(tmp_path / 'result')!r}, 'rb'))\n"
         "print(result.cost, *result.route.places)\n"
-        "assert 'hybridnav.planner' not in sys.modules and 'numba' not in sys.modules\n"
+        "assert 'hybridnav.planner.planner' not in sys.modules and 'numba' not in sys.modules\n"
     )
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert result.route is not None

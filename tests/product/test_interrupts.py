@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.baselines.grid import WeightedAstar
-from hybridnav.baselines.hpa import HpaStar
+from hybridnav.harness.baselines.grid import WeightedAstar
+from hybridnav.harness.baselines.hpa import HpaStar
 from tests.interrupts import Struck, lines_of, timer
 from tests.product.test_threads import OVER_CELLS, grid_with_rooms, told
 from tests.strategies import examples, occupancy_grid
@@ -168,14 +168,16 @@ def test_kernels_that_return_several_values_to_python_are_guarded() -> None:
     trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in package.rglob("*.py")}
     called = set()
     for path, tree in trees.items():
-        for node in ast.walk(tree) if not path.stem.endswith("kernels") else ():
-            if isinstance(node, ast.ImportFrom) and str(node.module).endswith("kernels"):
+        modules = set()
+        for node in ast.walk(tree) if path.parent.name != "kernels" else ():
+            if isinstance(node, ast.ImportFrom) and ".kernels" in str(node.module):
                 called |= {alias.name for alias in node.names}
-            if isinstance(node, ast.Attribute) and ast.unparse(node.value).endswith("kernels"):
+                modules |= {alias.asname or alias.name for alias in node.names}
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) in modules:
                 called.add(node.attr)
     found = {}
     for path, tree in trees.items():
-        for node in tree.body if path.stem.endswith("_kernels") else ():
+        for node in tree.body if path.parent.name == "kernels" else ():
             if not isinstance(node, ast.FunctionDef) or node.name not in called:
                 continue
             returns = [part for part in ast.walk(node) if isinstance(part, ast.Return)]

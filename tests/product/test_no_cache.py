@@ -45,9 +45,9 @@ KERNELS = """
 import importlib, pathlib, hybridnav
 root = pathlib.Path(hybridnav.__file__).parent
 assert root.is_relative_to({folder!r})
-for path in sorted(root.rglob("_*kernels.py")):
+for path in sorted(root.rglob("kernels/[!_]*.py")):
     importlib.import_module(".".join(("hybridnav", *path.relative_to(root).with_suffix("").parts)))
-from hybridnav.refine._curve_kernels import _wrapped
+from hybridnav.refine.kernels.curves import _wrapped
 print(round(float(_wrapped(7.0)), 6))
 """
 

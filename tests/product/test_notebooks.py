@@ -12,7 +12,7 @@ import pytest
 from nbclient import NotebookClient
 
 from benchmarks.worlds import World, office_world, write_world
-from hybridnav.grid import Frame
+from hybridnav.maps import Frame
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))

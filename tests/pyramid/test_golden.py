@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from benchmarks.worlds import figure1_world, office_world, tiled
-from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
 
 GOLDEN = {

@@ -18,8 +18,8 @@ import pytest
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.config import load_preset
-from hybridnav.metrics import segment_faults
+from hybridnav.harness.judges import segment_faults
+from hybridnav.planner import load_preset
 from tests.refine.troubled_query import TroubledQuery
 
 if TYPE_CHECKING:

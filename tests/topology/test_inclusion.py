@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from benchmarks.worlds import figure1_world
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import Component, Obstacle

@@ -11,7 +11,7 @@ from hybridnav.cli.errors import UsageError
 from hybridnav.cli.request import Wanted
 
 if TYPE_CHECKING:
-    from hybridnav.config import Preset
+    from hybridnav.planner import Preset
     from hybridnav.planner.alternatives import By
 
 AlternativesOption = Annotated[

@@ -9,20 +9,11 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX, printable
-from hybridnav.cli.building import (
-    BUILD_OPTIONS,
-    BuildingSource,
-    build_building,
-    check_options,
-    is_building_file,
-    refused_options,
-)
+from hybridnav._base.extension import extension
+from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav.cli.common import answer, check_writable, progress_bar, stage, timings
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import (
-    MapOrBuildingArgument,
-)
+from hybridnav.cli.options import MapOrBuildingArgument
 from hybridnav.cli.reading import (
     MapOptions,
     check_room_to_be,
@@ -77,9 +68,10 @@ def build(
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
     check_writable(out, "--out")
-    if is_building_file(map_file):
-        check_options(refused_options(ctx, BUILD_OPTIONS))
-        build_building(BuildingSource.of(ctx.params), out, compress=compress)
+    fleet = extension("formats", "building")
+    if fleet.is_building_file(map_file):
+        fleet.check_options(fleet.refused_options(ctx, fleet.BUILD_OPTIONS))
+        fleet.build_building(fleet.BuildingSource.of(ctx.params), out, compress=compress)
         return
     settings = [reading.settings(map_file, preset=name) for name in preset or (None,)]
     seconds: dict[str, float] = {}

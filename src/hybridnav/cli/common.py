@@ -11,8 +11,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import check_replaceable, printable, without_controls
-from hybridnav._progress import no_progress
+from hybridnav._base.files import check_replaceable, printable, without_controls
+from hybridnav._base.progress import no_progress
 from hybridnav.cli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from hybridnav._progress import Progress
+    from hybridnav._base.progress import Progress
 
 _SMOOTH = ("none", "line-of-sight", "arcs")
 _PICTURES = (".pdf", ".png", ".svg")
@@ -133,7 +133,7 @@ def check_writable(path: Path, option: str) -> None:
 
 def extent_line(grid: hn.OccupancyGrid) -> str:
     """Return the summary's line on the extent of a map."""
-    from hybridnav.grid.occupancy import extent  # noqa: PLC0415 - loads numpy
+    from hybridnav.maps.occupancy import extent  # noqa: PLC0415 - loads numpy
 
     return f"extent     {extent(grid)}"
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
-from hybridnav.cli.building import is_building_file
+from hybridnav._base.extension import extension
+from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, complain, progress_bar
 from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
 from hybridnav.cli.reading import read_settings
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
@@ -252,7 +252,7 @@ def evaluate(
 def _check_maps(files: list[Path]) -> None:
     """Refuse buildings, whose routes over floors are no pairs of cells of one map."""
     for file in files:
-        if is_building_file(file):
+        if extension("formats", "building").is_building_file(file):
             raise UsageError(
                 f"{printable(file)} is a building, and methods are measured on maps: give the "
                 "maps of its floors, or compare the routes of a graph over all of them by "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hybridnav._files import printable
+from hybridnav._base.files import printable
 from hybridnav.cli.common import complain
 from hybridnav.cli.reading import is_model_file, load_model
 from hybridnav.errors import ModelError
@@ -68,7 +68,7 @@ class Source:
         key = self._key(rooms_file, needs_rooms=needs_rooms)
         if key is not None:
             # Loads numba, which help and wrong usage can do without.
-            from hybridnav.io.models import kept  # noqa: PLC0415
+            from hybridnav.planner.saved import kept  # noqa: PLC0415
 
             folder = self._folder()
             model = kept.find(key, folder)
@@ -84,7 +84,7 @@ class Source:
         """Keep the prepared structures of a planner, or report the failure in one line."""
         if key is None:
             return
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
         try:
             path = kept.keep(planner, key, self._folder())
@@ -94,14 +94,14 @@ class Source:
         complain(f"kept a model of {path.stat().st_size / 1e6:.1f} MB in {printable(path)}")
 
     def _folder(self) -> Path:
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
         return kept.cache_folder() if self.folder is None else self.folder
 
     def _key(self, rooms_file: Path | None, *, needs_rooms: bool) -> str | None:
         if not (self.keeps or self.folder is not None) or is_model_file(self.map_file):
             return None
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
         names = ("free_threshold", "occupied_threshold", "least_island_m2")
         how = {name: getattr(self.reading, name) for name in names} | {"needs_rooms": needs_rooms}

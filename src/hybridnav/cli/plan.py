@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hybridnav._base.extension import extension
 from hybridnav.cli.alternatives import (
     AlternativesOption,
     ByOption,
@@ -19,12 +20,6 @@ from hybridnav.cli.alternatives import (
     wanted_of,
 )
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
-from hybridnav.cli.building import (
-    PLAN_OPTIONS,
-    is_building_file,
-    plan_in_building,
-    refused_options,
-)
 from hybridnav.cli.common import check_new, check_output, check_picture
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
@@ -39,8 +34,8 @@ from hybridnav.cli.options import (
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import Request
 from hybridnav.errors import brief
-from hybridnav.grid.names import read_point
-from hybridnav.sentences import check_language, languages
+from hybridnav.maps.names import read_point
+from hybridnav.planner.guide import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
@@ -224,9 +219,8 @@ def _check_files(plot: Path | None, poses: Path | None, bag: Path | None) -> Non
     check_output(poses, "--poses", _POSES)
     if bag is not None:
         check_new(bag, "--bag")
-        from hybridnav.io.bag_files import check_rosbags  # noqa: PLC0415 - on demand
 
-        check_rosbags("--bag")
+        extension("formats", "bag").check_rosbags("--bag")
 
 
 def _check_fits(request: Request) -> None:
@@ -242,11 +236,13 @@ def _check_fits(request: Request) -> None:
 
 def _planned_in_building(ctx: typer.Context, at: At, *, no_stairs: bool) -> bool:
     """Plan over floors if the map is a building, and return whether it is one."""
-    if not is_building_file(ctx.params["map_file"]):
+    fleet = extension("formats", "building")
+    if not fleet.is_building_file(ctx.params["map_file"]):
         if no_stairs:
             raise UsageError("--no-stairs is for a building, and this is one map: leave it out")
         return False
-    if not plan_in_building(ctx.params, at, refused_options(ctx, PLAN_OPTIONS)):
+    refused = fleet.refused_options(ctx, fleet.PLAN_OPTIONS)
+    if not fleet.plan_in_building(ctx.params, at, refused):
         raise typer.Exit(EXIT_NOT_SOLVED)
     return True
 

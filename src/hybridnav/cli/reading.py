@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX, printable
+from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav.cli.common import complain, stage
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
@@ -23,13 +23,13 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
+from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav.cli.blocked import Closing
-    from hybridnav.config import Preset
+    from hybridnav.planner import Preset
 
 _SMOOTH = ("none", "line-of-sight", "arcs")
 
@@ -129,7 +129,7 @@ def read_preset(source: str) -> Preset:
     try:
         return hn.load_preset(source)
     except hn.PresetNotFoundError as error:
-        from hybridnav.config.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
+        from hybridnav.planner.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
 
         if is_preset_name(source):
             raise UsageError(str(error)) from None
@@ -151,7 +151,7 @@ def read_settings(
     An error in a preset file is the file's; one in an override is the caller's.
     """
     if map_file is not None and is_model_file(map_file):
-        from hybridnav.io.models import open_model  # noqa: PLC0415
+        from hybridnav.planner.saved import open_model  # noqa: PLC0415
 
         load_numba()
         given = None if preset is None else read_preset(preset)

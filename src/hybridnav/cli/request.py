@@ -251,7 +251,7 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     """Return alternatives with the rooms and doors that they pass, and whether they are all."""
-    from hybridnav.result import COST_METRICS  # noqa: PLC0415 - loads numpy
+    from hybridnav.planner import COST_METRICS  # noqa: PLC0415 - loads numpy
 
     routes = []
     by_costs = bool(found) and found[0].result.metric in COST_METRICS

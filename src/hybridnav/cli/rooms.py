@@ -10,27 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
+from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, check_output, check_picture, islands_line, stage, timings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
-from hybridnav.cli.options import (
-    JsonOption,
-    MapArgument,
-    PlotOption,
-    RoomsOption,
-)
+from hybridnav.cli.options import JsonOption, MapArgument, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
-from hybridnav.grid import CellClass
-from hybridnav.grid.names import Segmentation, read_point
+from hybridnav.maps import CellClass
+from hybridnav.maps.names import Segmentation, read_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.grid.names import Point
-    from hybridnav.io.rooms_text import RoomMeasures
-    from hybridnav.topology import Door, Rooms
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.maps.room_labels import Point
+    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.topology.rooms.files.text import RoomMeasures
 
 OutOption = Annotated[
     Path | None,
@@ -123,7 +118,7 @@ def rooms(
         answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))
         raise typer.Exit(EXIT_SOLVED if found["room"] is not None else EXIT_NOT_SOLVED)
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.topology.room_level import room_areas_m2  # noqa: PLC0415
+    from hybridnav.topology.rooms.level import room_areas_m2  # noqa: PLC0415
 
     areas_m2 = room_areas_m2(labels, grid)
     if out is not None:
@@ -149,7 +144,7 @@ def rooms(
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
-    from hybridnav.io.rooms_text import measures_of  # noqa: PLC0415 - loads numpy
+    from hybridnav.topology.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
 

@@ -7,13 +7,10 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
+from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, check_picture, extent_line, islands_line, timings
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import (
-    MapArgument,
-    PlotOption,
-)
+from hybridnav.cli.options import MapArgument, PlotOption
 from hybridnav.cli.reading import MapOptions, grow_topology, load_model, with_map
 
 LevelOption = Annotated[
@@ -133,7 +130,7 @@ def _describe_level(level: hn.Level) -> str:
     """Return one line on a level; a simple graph would lose its parallel arcs: second doors."""
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
 
-    from hybridnav.grid.runs import unique_rows  # noqa: PLC0415
+    from hybridnav.maps.islands import unique_rows  # noqa: PLC0415
 
     free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
     largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2

@@ -1,33 +1,25 @@
-"""Presets, graphs of others, and methods on a grid of their own, as methods of the harness."""
+"""Presets, and methods on a grid of their own, as methods of the harness."""
 
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
-from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.graphs.attach import PlacedGraph
-from hybridnav.grid import CellClass
-from hybridnav.grid.runs import unique_rows
-from hybridnav.planner import HybridPlanner
-from hybridnav.refine import Sight
-from hybridnav.result import PlanStatus
+from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
+from hybridnav.maps import CellClass
+from hybridnav.planner import HybridPlanner, PlanStatus
 
 if TYPE_CHECKING:
-    from hybridnav._typing import IntArray
-    from hybridnav.baselines import Method
-    from hybridnav.config import Preset
-    from hybridnav.costs import CostLayer
-    from hybridnav.graphs import WaypointGraph
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.result import Metric, PlanResult
+    from hybridnav._base.typing import IntArray
+    from hybridnav.harness.baselines import Method
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric, PlanResult, Preset
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -138,89 +130,9 @@ def _nbytes(thing: Any, seen: set[int]) -> int:
     if isinstance(thing, dict):
         return sum(_nbytes(item, seen) for item in thing.values())
     module = type(thing).__module__
-    if not module.startswith("hybridnav.") or module.startswith("hybridnav.grid"):
+    if not module.startswith("hybridnav.") or module.startswith("hybridnav.maps"):
         return 0
     return _nbytes(getattr(thing, "__dict__", {}), seen)
-
-
-class GraphMethod:
-    """Routes on a graph of nodes and straight edges; see `baselines.Method`.
-
-    The policy: a route runs straight from the start to the nearest node in sight of it, over the
-    edges that are shortest in metres to the nearest node in sight of the goal, and straight to the
-    goal. Among the 100 nearest nodes one is in sight if the robot can drive there straight. As in
-    Nav2 the robot leaves out the first edge if it has passed its first node, and the last one
-    likewise, if the next node is in sight. Ends that see each other need no graph. Stated costs are
-    not used: they may be in any unit. Without a node in sight of an end the method gives up; where
-    edges do not lead from one node to the other it answers that there is no path.
-
-    Parameters
-    ----------
-    grid
-        The map.
-    graph
-        The graph, taken as it is: an edge through a wall becomes part of paths, which the harness
-        reports.
-    clear_edges_only
-        Whether edges that the robot cannot follow are left out instead.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map allows corner cutting.
-    """
-
-    region_of = None
-
-    def __init__(
-        self, grid: OccupancyGrid, graph: WaypointGraph, *, clear_edges_only: bool = False
-    ) -> None:
-        if grid.corner_cutting:
-            raise InvalidValueError(
-                f"graph {graph.name}: its edges do not pass between two blocked cells that meet at "
-                "a corner: leave corner cutting out"
-            )
-        free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
-        sight = Sight(free)
-        placed = PlacedGraph.of(graph, grid, free)
-        edges = placed.edges
-        if clear_edges_only:
-            edges = edges[placed.clear_edges(sight)]
-        self.name = graph.name
-        self.n_nodes = graph.n_nodes
-        self.n_edges = len(unique_rows(np.sort(edges, axis=1)).rows)
-        self._frame, self._resolution_m = grid.frame, grid.resolution_m
-        self._network = placed.network(sight, edges)
-        self._free = free
-        arrays = sum(array.nbytes for array in self._network.graph)
-        self.memory_bytes = array_bytes(self._network) + arrays + free.nbytes
-
-    def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        """Plan between two free cells."""
-        began = time.perf_counter()
-        ends = np.array([start, goal], dtype=np.float64) + 0.5
-        pair = self._network.join(ends[:1], ends[1:])
-        (line,), expanded = pair.nearest_lines()
-        seconds = {"coarse": time.perf_counter() - began}
-        counted = int(expanded[0])
-        if line is not None:
-            points = self._frame.points_of_grid(line)
-            length_m = float(np.hypot(*np.diff(line, axis=0).T).sum()) * self._resolution_m
-            found = AnyAngleResult(points, length_m)
-            return MethodResult(
-                None,
-                any_angle=found,
-                plan_steps=len(line) - 1,
-                expanded_nodes=counted,
-                seconds=seconds,
-            )
-        unseen = [
-            name
-            for name, (offsets, _, _) in (("start", pair.from_start), ("goal", pair.from_goal))
-            if not offsets[-1]
-        ]
-        reason = f"no node in sight of the {unseen[0]}" if unseen else ""
-        return MethodResult(None, gave_up=reason, expanded_nodes=counted, seconds=seconds)
 
 
 _MOST_RADIUS_M = 1e3

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.costs import cost_along
-from hybridnav.grid import CellClass
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.contradictions import ANY_ANGLE_SLACK, ARC_SLACK, SLACK, Fault
-from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.metrics import (
+from hybridnav.harness.judges import (
     CheapestCost,
     ScipyOptimum,
     VisibilityGraph,
@@ -23,21 +21,23 @@ from hybridnav.metrics import (
     judge_path,
     line_cells,
 )
+from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.maps import CellClass
+from hybridnav.maps.costs import cost_along
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from hybridnav._typing import LongArray
-    from hybridnav.baselines import AnyAngleResult, MethodResult
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import LongArray
+    from hybridnav.harness.baselines import AnyAngleResult, MethodResult
     from hybridnav.harness.contradictions import Kind
+    from hybridnav.harness.judges import Chords
     from hybridnav.harness.methods import Prepared
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
-    from hybridnav.metrics import Chords
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
 
 Cell = tuple[int, int]
 

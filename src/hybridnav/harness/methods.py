@@ -11,21 +11,20 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.config import Preset, load_preset
+from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.adapters import GraphMethod, HybridMethod, OnOwnGrid
+from hybridnav.harness.adapters import HybridMethod, OnOwnGrid
 from hybridnav.harness.names import baseline_name, class_of, source_hash
-from hybridnav.io import load_graph
+from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav.baselines import Method, MethodResult
-    from hybridnav.costs import CostLayer
-    from hybridnav.graphs import WaypointGraph
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.baselines import Method, MethodResult
     from hybridnav.harness.names import NamedMethod
-    from hybridnav.result import Metric
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
@@ -35,14 +34,14 @@ LINE_OF_SIGHT = "line-of-sight"
 `octile+line-of-sight`."""
 
 BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
-    "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),
-    "grid-dijkstra": ("hybridnav.baselines.grid:GridDijkstra", {}),
-    "weighted-astar": ("hybridnav.baselines.grid:WeightedAstar", {}),
-    "hpa-star": ("hybridnav.baselines.hpa:HpaStar", {}),
-    "hpa-star-raw": ("hybridnav.baselines.hpa:HpaStar", {"smooth": False}),
-    "hpa-star-lines": ("hybridnav.baselines.hpa:HpaStar", {"line_cells": 1000}),
-    "simple-graph": ("hybridnav.baselines.simple_graph:SimpleGraphPyramid", {}),
-    "thrun": ("hybridnav.baselines.thrun:ThrunMap", {}),
+    "grid-astar": ("hybridnav.harness.baselines.grid:GridAstar", {}),
+    "grid-dijkstra": ("hybridnav.harness.baselines.grid:GridDijkstra", {}),
+    "weighted-astar": ("hybridnav.harness.baselines.grid:WeightedAstar", {}),
+    "hpa-star": ("hybridnav.harness.baselines.hpa:HpaStar", {}),
+    "hpa-star-raw": ("hybridnav.harness.baselines.hpa:HpaStar", {"smooth": False}),
+    "hpa-star-lines": ("hybridnav.harness.baselines.hpa:HpaStar", {"line_cells": 1000}),
+    "simple-graph": ("hybridnav.harness.baselines.simple_graph:SimpleGraphPyramid", {}),
+    "thrun": ("hybridnav.harness.baselines.thrun:ThrunMap", {}),
 }
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a
 `TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
@@ -61,8 +60,8 @@ class MethodSpec:
     """The preset's sections; None for a baseline."""
     pyramid: dict[str, Any] = field(default_factory=dict)
     """merge_distance_m, linkage, seed: of the places that it plans on."""
-    graph: WaypointGraph | None = None
-    """The graph whose routes it follows, if that is all that it does."""
+    graph: Any = None
+    """The `WaypointGraph` whose routes it follows, if that is all that it does; None for others."""
     clear_edges_only: bool = False
     """Whether edges of the graph that the robot cannot follow are left out."""
     factory: str = ""
@@ -223,12 +222,13 @@ def named_spec(
     else:
         if method.settings:
             raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
-        spec = graph_spec(load_graph(method.source), clear_edges_only=clear_edges_only)
+        spec = graph_spec(method.source, clear_edges_only=clear_edges_only)
     return replace(spec, name=method.name or spec.name, grid=method.grid)
 
 
-def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> MethodSpec:
-    """Return the method that follows a graph; see `GraphMethod`."""
+def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:
+    """Return the method that follows a graph, or that of a file; see `ext.graphs.GraphMethod`."""
+    graph = extension("methods", "graph").checked_graph(given)
     name = f"graph {graph.name}" + (" (clear edges)" if clear_edges_only else "")
     return MethodSpec(name, None, graph=graph, clear_edges_only=clear_edges_only)
 
@@ -284,7 +284,9 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         method = HybridMethod(topology, preset, costs)
     elif spec.graph is not None:
         costs = None
-        method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
+        method = extension("methods", "graph").GraphMethod(
+            grid, spec.graph, clear_edges_only=spec.clear_edges_only
+        )
     else:
         path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
         made_of = class_of(path)

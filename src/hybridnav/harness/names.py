@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import ModuleType
 
-    from hybridnav._typing import PathLike
+    from hybridnav._base.typing import PathLike
 
 ALIASES = {
     "a-star": "grid-astar",

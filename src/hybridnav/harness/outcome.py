@@ -19,13 +19,13 @@ from hybridnav.harness.contradictions import (
     is_any_angle,
     octile_optimum_m,
 )
+from hybridnav.harness.judges import thrun_count
 from hybridnav.harness.records import path_steps
-from hybridnav.metrics import thrun_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.harness.records import Record
     from hybridnav.harness.yardstick import Optimum, Yardstick
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._files import replace_file, without_controls
+from hybridnav._base.files import replace_file, without_controls
 from hybridnav.harness.analysis import Study, load_study, pairs_in_common
 from hybridnav.harness.cases import cases_of, counter_examples
 from hybridnav.harness.columns import (
@@ -19,6 +19,7 @@ from hybridnav.harness.columns import (
     rows_of_map,
     rows_of_study,
 )
+from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
 from hybridnav.harness.report import MapSection, ReportData, render_report
@@ -33,13 +34,12 @@ from hybridnav.harness.tables import (
     with_values,
 )
 from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
-from hybridnav.metrics import distance_buckets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.cases import CaseKey
     from hybridnav.harness.tables import Row
     from hybridnav.harness.yardstick import Optimum, Yardstick

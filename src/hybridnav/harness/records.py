@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 
 import hybridnav
+from hybridnav._base.moves import STEPS
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.limits import MAX_CELLS
-from hybridnav.search.moves import STEPS
+from hybridnav.maps.limits import MAX_CELLS
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
+    from hybridnav._base.typing import LongArray
 
 try:
     import fcntl
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import TracebackType
 
-    from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.methods import MethodSpec
     from hybridnav.harness.pairs import Pair
+    from hybridnav.maps import OccupancyGrid
 
 Record = dict[str, Any]
 

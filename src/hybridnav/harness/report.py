@@ -13,7 +13,7 @@ from jinja2 import Environment, StrictUndefined
 if TYPE_CHECKING:
     from jinja2 import Template
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.tables import Table
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")

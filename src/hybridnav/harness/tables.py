@@ -9,9 +9,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.config import OmplSettings, Preset
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.yardstick import OPTIMA
+from hybridnav.planner import Preset
+from hybridnav.refine.ompl import OmplSettings
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence

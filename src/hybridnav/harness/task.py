@@ -11,9 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav.costs import CostLayer
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
-from hybridnav.grid import CellClass
 from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
@@ -21,12 +19,14 @@ from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.records import encode_path, environment, map_digest, pair_id, preparation_id
 from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
-from hybridnav.io import example_map
+from hybridnav.maps import CellClass
+from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.files import example_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from hybridnav.baselines import AnyAngleResult, MethodResult
+    from hybridnav.harness.baselines import AnyAngleResult, MethodResult
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.harness.scenes import MapSpec, Scene

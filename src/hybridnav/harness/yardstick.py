@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, get_args
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid import CellClass
-from hybridnav.mesh import MeshSearch, build_mesh
+from hybridnav.maps import CellClass
+from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, overload
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args, overload
 
+from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.checks import checked_whole
-from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S, check_limits
-from hybridnav.planner.by_classes import ClassEffort, ClassTours
+from hybridnav.maps.checks import checked_whole
 from hybridnav.planner.by_doors import Chosen, DoorTours, RouteLimits
 from hybridnav.planner.tour import Tour, plan_tour
 
@@ -20,11 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav.homotopy.classes import Word
+    from hybridnav.planner import Path, PlanResult
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
-    from hybridnav.result import Path, PlanResult
 
 
 # Options of alternatives: their defaults, their ranges, and where each changes something.
@@ -33,7 +31,7 @@ By = Literal["doors", "homotopy"]
 """Difference between two paths: the doors that they pass, or the sides of obstacles."""
 MOST = 20
 """Most alternatives of one query."""
-_MAX_OVERLAP, _MAX_STRETCH, _LEAST_HOLE_M2 = 0.8, 2.0, 1.0
+_MAX_OVERLAP, _MAX_STRETCH = 0.8, 2.0
 _BY_DOORS = ("max_overlap", "max_stretch", "inside_rooms")
 _BY_CLASSES = ("least_hole_m2", "most_states", "time_limit_s")
 _T = TypeVar("_T")
@@ -81,24 +79,6 @@ def limits_of(count: int, max_overlap: float | None, max_stretch: float | None) 
     )
 
 
-def effort_of(
-    least_hole_m2: float | None, most_states: int | None, time_limit_s: float | None
-) -> ClassEffort:
-    """Return what a search for classes takes if it is in range; None stands for the default."""
-    effort = ClassEffort(
-        _or(least_hole_m2, _LEAST_HOLE_M2),
-        _or(most_states, MOST_STATES),
-        _or(time_limit_s, TIME_LIMIT_S),
-    )
-    check_limits(effort.most_states, effort.time_limit_s)
-    if not (isinstance(effort.least_hole_m2, Real) and 0 <= effort.least_hole_m2 < math.inf):
-        raise InvalidValueError(
-            "least hole must be a finite number of square metres >= 0, "
-            f"got {effort.least_hole_m2!r:.80}"
-        )
-    return effort
-
-
 def _or(given: _T | None, default: _T) -> _T:
     """Return what was given, or the default for None."""
     return default if given is None else given
@@ -126,7 +106,7 @@ class Alternative:
     overlap: float = 0.0
     """Share of its length, or of its cost with a planner by costs, in common with one before it,
     the greatest one; 0 for the first."""
-    word: Word | None = None
+    word: tuple[int, ...] | None = None
     """Reduced word of its homotopy class, by homotopy; None by doors."""
 
     @property
@@ -309,10 +289,13 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
             'costs: take by="doors" without inside_rooms, or a planner without costs'
         )
     limits = limits_of(count, max_overlap, max_stretch)
-    effort = effort_of(least_hole_m2, most_states, time_limit_s)
     closed = planner.closed(blocked)
     waypoints = [start, goal]
-    classes = ClassTours(planner, waypoints, closed, effort) if needs_classes else None
+    classes: Classes | None = None
+    if needs_classes:
+        homotopy = extension("methods", "homotopy")
+        effort = homotopy.effort_of(least_hole_m2, most_states, time_limit_s)
+        classes = homotopy.ClassTours(planner, waypoints, closed, effort)
     first = plan_tour(planner, waypoints, at=at, blocked=closed)
     if not first.solved:
         return unplanned(first.status)
@@ -324,7 +307,22 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     return _by_doors(search, classes, first, limits, by_costs=planner.costs is not None)
 
 
-def _by_homotopy(classes: ClassTours, first: Tour, limits: RouteLimits) -> Alternatives:
+class Classes(Protocol):
+    """The search for tours of other homotopy classes than a first one."""
+
+    stopped: str
+    """Description of the limit at which the search stopped, empty if it did not."""
+
+    def find(self, first: Tour, count: int) -> list[tuple[Tour, tuple[int, ...]]]:
+        """Return tours of other classes with their words, the shortest first."""
+        ...
+
+    def inside(self, search: DoorTours, chosen: list[Chosen], limits: RouteLimits) -> list[Chosen]:
+        """Return what was chosen by doors, and tours by other sides of obstacles inside rooms."""
+        ...
+
+
+def _by_homotopy(classes: Classes, first: Tour, limits: RouteLimits) -> Alternatives:
     """Return the alternatives by sides of obstacles."""
     tours = classes.find(first, limits.count)
     found = tuple(Alternative(tour, word=word) for tour, word in tours)
@@ -336,7 +334,7 @@ def _by_homotopy(classes: ClassTours, first: Tour, limits: RouteLimits) -> Alter
 
 def _by_doors(
     search: DoorTours | None,
-    classes: ClassTours | None,
+    classes: Classes | None,
     first: Tour,
     limits: RouteLimits,
     *,
@@ -368,7 +366,7 @@ def _by_doors(
     return Alternatives(found, complete=not stopped, note=note)
 
 
-def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:
+def _stopped(search: DoorTours | None, classes: Classes | None) -> str:
     """Describe which search stopped before it had looked at everything."""
     if classes is not None and classes.stopped:
         return classes.stopped

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.ops import substring
 
-from hybridnav.costs import cost_along
+from hybridnav.maps.costs import cost_along
 from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.tour import tour_of
 from hybridnav.route import RouteFinder, door_graph
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import BoolArray, LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.legs import Leg
+    from hybridnav._base.typing import BoolArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner.guide.legs import Leg
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
     from hybridnav.route import DoorGraph, DoorRoute
-    from hybridnav.topology import Door
+    from hybridnav.topology.rooms import Door
 
 
 # How much of a path another one shares.

@@ -9,20 +9,20 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridnav import route as routes
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.moves import octile_distance_in_cells
+from hybridnav._base.progress import no_progress
+from hybridnav.planner import PlanStats
 from hybridnav.planner.cell_planner import CellPlan
-from hybridnav.result import PlanStats, Route
-from hybridnav.search.moves import octile_distance_in_cells
+from hybridnav.route import Route
 
 if TYPE_CHECKING:
-    from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, IntArray
-    from hybridnav.config import PlannerSettings
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, IntArray
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner, Refiner
-    from hybridnav.result import Metric
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.topology import TopologicalMap
 

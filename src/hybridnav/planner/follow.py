@@ -8,27 +8,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import OccupancyGrid
-from hybridnav.grid.areas import class_reach, class_rules
-from hybridnav.grid.checks import checked_type
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.areas import class_reach, class_rules
+from hybridnav.maps.checks import checked_type
+from hybridnav.planner import PlanResult, PlanStatus
 from hybridnav.planner.cell_planner import Carried, Following
 from hybridnav.planner.select import cell_planner
-from hybridnav.result import PlanResult, PlanStatus
 from hybridnav.route.route_finder import RouteFinder, RouteOfCells
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from typing import NoReturn
 
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.config import Preset
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid.areas import Box
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.maps.areas import Box
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric, Path, Preset
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner
     from hybridnav.planner.costs import PlannerCosts
     from hybridnav.planner.ompl_plans import OmplPlan
     from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.result import Metric, Path
 
 
 _ON_CELLS = "none", "mesh", "jumps"

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.mesh import (
+from hybridnav.maps.lines import cells_of_line, polyline_length, polyline_lengths
+from hybridnav.planner import PlanStats
+from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
+from hybridnav.refine import LineOfSight
+from hybridnav.search.mesh import (
     DetourSearch,
     MeshPath,
     MeshSearch,
@@ -23,20 +26,16 @@ from hybridnav.mesh import (
     renew_mesh,
     shortest_paths,
 )
-from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
-from hybridnav.refine import LineOfSight
-from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, IntArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner
-    from hybridnav.result import Metric
 
 Position = tuple[float, float]
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
-from hybridnav.config import Preset, load_preset
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
+from hybridnav._base.turns import Turns
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.areas import box_of_area
+from hybridnav.maps.areas import box_of_area
+from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
 from hybridnav.planner.follow import PlannerChange, change_of, followed
 from hybridnav.planner.queries import Queries
 from hybridnav.planner.select import cell_planner
-from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._progress import Progress
-    from hybridnav._typing import PathLike
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.areas import Box
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import PathLike
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.areas import Box
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanBatch, PlanResult
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.drafts import PlanDraft
     from hybridnav.planner.finish import Smooth
-    from hybridnav.planner.itinerary import Guide
+    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
 
 

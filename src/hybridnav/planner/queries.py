@@ -9,32 +9,31 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from hybridnav._copies import copies_alike, frozen
-from hybridnav.grid import CellClass
+from hybridnav._base.copies import copies_alike, frozen
+from hybridnav.maps import CellClass
+from hybridnav.planner import PlanBatch, PlanStatus
 from hybridnav.planner.cell_planner import CellQueries, CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
 from hybridnav.planner.endpoints import cells_of_endpoints, check_at, read_end
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.follow import Outcomes, is_stale
-from hybridnav.result import PlanBatch, PlanStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.config import Preset
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanResult, Preset
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner, CellPlans
-    from hybridnav.planner.itinerary import Guide
+    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanResult
     from hybridnav.topology import TopologicalMap
 
 
@@ -84,7 +83,7 @@ class Queries:
         if is_stale(self._topology) or self._topology.pyramid.rooms is None:
             return None
         # Loads modules that plans without rooms do not need.
-        from hybridnav.planner.itinerary import Guide  # noqa: PLC0415
+        from hybridnav.planner.guide.itinerary import Guide  # noqa: PLC0415
 
         return Guide(self._topology.rooms)
 

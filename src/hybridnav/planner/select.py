@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from hybridnav._base.moves import STEPS, legal_moves
 from hybridnav.errors import InvalidValueError, PresetError
 from hybridnav.refine import GridRefiner
-from hybridnav.search.moves import STEPS, legal_moves
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, ByteArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlannerSettings
     from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.refine import Refiner
     from hybridnav.route import Corridor
@@ -63,13 +63,13 @@ def cell_planner(
         _taken(type(None), prepared, coarse)
         return OverOverlay(topology, refiner, settings)
     if coarse == "mesh":
-        from hybridnav.mesh import MeshSearch  # noqa: PLC0415
         from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
+        from hybridnav.search.mesh import MeshSearch  # noqa: PLC0415
 
         return OverMesh(grid, refiner, settings, _taken(MeshSearch, prepared, coarse))
     if coarse == "jumps":
-        from hybridnav.jumps import JumpSearch  # noqa: PLC0415
-        from hybridnav.planner.overlay_plans import OverJumps  # noqa: PLC0415
+        from hybridnav.planner.jump_plans import OverJumps  # noqa: PLC0415
+        from hybridnav.search.octile import JumpSearch  # noqa: PLC0415
 
         return OverJumps(grid, refiner, settings, _taken(JumpSearch, prepared, coarse))
     from hybridnav.planner.cell_plans import MaxDistance, WholeMap  # noqa: PLC0415

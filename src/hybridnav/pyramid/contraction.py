@@ -7,18 +7,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.combinatorial import CombinatorialMap
-from hybridnav.combinatorial import darts as dart_kernels
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _join_kernels, _kernels
-from hybridnav.pyramid._hull_kernels import hulls_of_points
-from hybridnav.pyramid._kernels import Hulls
+from hybridnav.pyramid import CombinatorialMap
+from hybridnav.pyramid import darts as dart_kernels
+from hybridnav.pyramid.kernels import base as _base_kernels
+from hybridnav.pyramid.kernels import decimation as _kernels
+from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels import hulls as _hull_kernels
+from hybridnav.pyramid.kernels import joins as _join_kernels
+from hybridnav.pyramid.kernels.decimation import Hulls
+from hybridnav.pyramid.kernels.hulls import hulls_of_points
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
 from hybridnav.pyramid.scratch import Scratch
 from hybridnav.pyramid.start import N_CLASSES
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, IntArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray
     from hybridnav.pyramid.start import Start
     from hybridnav.pyramid.steering import Steering
 

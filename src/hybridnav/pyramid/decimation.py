@@ -13,18 +13,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.pyramid import _kernels, _steering_kernels
-from hybridnav.pyramid._kernels import ATTRIBUTE_MAX
 from hybridnav.pyramid.contraction import NO_LIMIT, Decimation
+from hybridnav.pyramid.kernels import decimation as _kernels
+from hybridnav.pyramid.kernels import steering as _steering_kernels
+from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX
 from hybridnav.pyramid.start import kinds_of, start_at_base, start_at_level
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.combinatorial import CombinatorialMap
-    from hybridnav.combinatorial.darts import Darts
-    from hybridnav.pyramid._kernels import Vertices
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.pyramid import CombinatorialMap
+    from hybridnav.pyramid.darts import Darts
+    from hybridnav.pyramid.kernels.decimation import Vertices
     from hybridnav.pyramid.level import Level
     from hybridnav.pyramid.record import BuildStats, Linkage, Record
     from hybridnav.pyramid.start import Start

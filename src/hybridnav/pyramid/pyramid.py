@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav._base.typing import IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Linkage, Record
     from hybridnav.pyramid.steering import Resists

@@ -6,19 +6,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.combinatorial.darts import Darts
-from hybridnav.pyramid import _base_kernels, _field_kernels
-from hybridnav.pyramid._kernels import Vertices
+from hybridnav.pyramid.darts import Darts
+from hybridnav.pyramid.kernels import base as _base_kernels
+from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels.decimation import Vertices
 from hybridnav.pyramid.record import SURVIVES, Record
 
 if TYPE_CHECKING:
-    from hybridnav._typing import AnyArray, ByteArray, LongArray
+    from hybridnav._base.typing import AnyArray, ByteArray, LongArray
 
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import ByteArray, IntArray
+    from hybridnav._base.typing import ByteArray, IntArray
     from hybridnav.pyramid.level import Level
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]

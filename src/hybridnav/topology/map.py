@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.topology import inclusion
+from hybridnav.maps import CellClass
+from hybridnav.topology import local
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import networkx as nx
 
-    from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.topology.inclusion import Enclosed, Inclusion
-    from hybridnav.topology.room_level import Rooms
+    from hybridnav.topology.rooms.level import Rooms
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class TopologicalMap:
         InvalidValueError
             When the pyramid was built without rooms.
         """
-        from hybridnav.topology.room_level import Rooms  # noqa: PLC0415 - most maps have none
+        from hybridnav.topology.rooms.level import Rooms  # noqa: PLC0415 - most maps have none
 
         return Rooms(self.pyramid)
 
@@ -152,9 +152,9 @@ class TopologicalMap:
         ((19, 27), True)
         """
         self._check_places([place])
-        return inclusion.local_grid(self.level, place)
+        return local.local_grid(self.level, place)
 
-    def local_pose(self, place: int) -> inclusion.Pose:
+    def local_pose(self, place: int) -> local.Pose:
         """Return the pose of the frame of a place in the map frame, `(x, y, yaw)` in metres and
         radians.
 
@@ -169,9 +169,9 @@ class TopologicalMap:
             When there is no such place.
         """
         self._check_places([place])
-        return inclusion.local_pose(self.level, place)
+        return local.local_pose(self.level, place)
 
-    def transform(self, arc: int) -> inclusion.Pose:
+    def transform(self, arc: int) -> local.Pose:
         """Return the pose of the frame of an arc's second place in the frame of the first.
 
         `(x, y, yaw)` in metres and radians: a point p of the second frame is R(yaw) p + (x, y) in
@@ -195,7 +195,7 @@ class TopologicalMap:
         (0.8, -0.4, 0.0)
         """
         _check_index("arc", arc, self.n_arcs)
-        return inclusion.transform_of(self.level, arc)
+        return local.transform_of(self.level, arc)
 
     @cached_property
     def inclusion(self) -> Inclusion:

@@ -12,10 +12,10 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
-from hybridnav.grid.runs import unique_rows
+from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
-    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.pyramid import Level
 
 

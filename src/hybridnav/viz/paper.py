@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import ByteArray
+    from hybridnav._base.typing import ByteArray
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.viz import style
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid import Level
     from hybridnav.viz.canvas import Canvas
     from hybridnav.viz.style import Sizes

@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.result import COST_METRICS
+from hybridnav.maps import CellClass
+from hybridnav.planner import COST_METRICS
 from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanResult
     from hybridnav.planner.blocked import Closable
-    from hybridnav.result import PlanResult, Route
+    from hybridnav.route import Route
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.grid.runs import unique_rows
+from hybridnav.maps import CellClass
+from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid.simple import report_of
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
@@ -22,8 +22,8 @@ from hybridnav.viz.layout import finish
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import Level
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes

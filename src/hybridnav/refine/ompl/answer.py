@@ -10,13 +10,13 @@ from ompl import base, util
 
 from hybridnav.refine.ompl import chain
 from hybridnav.refine.ompl.attempts import Attempts
-from hybridnav.refine.ompl.search_area import IMPROVING, Problem, search_area_of, solve
+from hybridnav.refine.ompl.problem import IMPROVING, Problem, search_area_of, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.messages import Query, Reply
-    from hybridnav.refine.ompl.search_area import Base, SearchArea
+    from hybridnav.refine.ompl.client import Query, Reply
+    from hybridnav.refine.ompl.problem import Base, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 

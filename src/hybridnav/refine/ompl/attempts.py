@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base, geometric
 
-from hybridnav.config.ompl import ROADMAPS
-from hybridnav.refine.ompl.messages import Reply, Search
+from hybridnav.refine.ompl.client import Reply, Search
+from hybridnav.refine.ompl.settings import ROADMAPS
 from hybridnav.refine.ompl.spaces import StateSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.config import OmplSettings
-    from hybridnav.refine.ompl.messages import Query
-    from hybridnav.refine.ompl.search_area import Base, Clearance, SearchArea
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.refine.ompl import OmplSettings
+    from hybridnav.refine.ompl.client import Query
+    from hybridnav.refine.ompl.problem import Base, Clearance, SearchArea
 
 
 _KEPT = 0.03

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._trig import atan2, cos, sin
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.refine.ompl.attempts import Simplifier
-from hybridnav.refine.ompl.search_area import IMPROVING, Problem, bounds_of, solve
-from hybridnav.search.moves import path_length_in_cells
+from hybridnav.refine.ompl.problem import IMPROVING, Problem, bounds_of, solve
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.refine.ompl.attempts import Attempts
-    from hybridnav.refine.ompl.messages import Query
-    from hybridnav.refine.ompl.search_area import Box, SearchArea
+    from hybridnav.refine.ompl.client import Query
+    from hybridnav.refine.ompl.problem import Box, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 
