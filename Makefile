@@ -75,7 +75,7 @@ $(READY): requirements.lock pyproject.toml
 	touch $(READY)
 
 maps: setup
-	$(BIN)/python -m hybridnav.grid.worlds maps
+	$(BIN)/python -m benchmarks.worlds maps
 
 # Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
 lock:

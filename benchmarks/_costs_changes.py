@@ -11,15 +11,15 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._costs_measure import RADIUS_M, bench_of, clocked
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
-    from hybridnav.overlay import OverlayPath
+    from hybridnav.search.overlay import OverlayPath
 
     Box = tuple[int, int, int, int]
 

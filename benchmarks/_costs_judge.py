@@ -8,13 +8,13 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from hybridnav._base.moves import COL_STEP, ROW_STEP, legal_moves
+from hybridnav.harness.judges import CheapestCost
 from hybridnav.harness.outcome import nanmean
-from hybridnav.metrics import CheapestCost
-from hybridnav.search.moves import COL_STEP, ROW_STEP, legal_moves
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell
-    from hybridnav._typing import LongArray
+    from hybridnav._base.typing import LongArray
     from hybridnav.harness.tables import Row
 
 EPSILON = 0.01

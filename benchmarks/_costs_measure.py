@@ -13,19 +13,19 @@ import numpy as np
 import hybridnav as hn
 from benchmarks._costs_judge import EPSILON, by_dijkstra, judged
 from benchmarks._queries_measure import read
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.overlay import OverlaySearch, prepare_overlay
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.overlay import OverlaySearch, prepare_overlay
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
-    from hybridnav.overlay import Overlay
+    from hybridnav.search.overlay import Overlay
 
     Cell = tuple[int, int]
 

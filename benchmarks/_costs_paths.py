@@ -8,13 +8,13 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._costs_measure import clocked
-from hybridnav.costs import cost_along
-from hybridnav.grid.clearance import clearance_cells
 from hybridnav.harness.outcome import nanmean, nanquantile
+from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.costs import cost_along
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.tables import Row
 
 _PAIRS = 25

@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
+from hybridnav.planner import load_preset
 
 CORNERS = ((0.9, 0.3), (0.9, -0.3), (-0.9, -0.3), (-0.9, 0.3))
 """A robot of 0.6 x 1.8 m."""
@@ -59,7 +59,7 @@ def footprint_runs(runs: int, *, seed: int = 0) -> dict[str, dict[str, Any]]:
         radius = ", turning_radius_m: 0.8" if space in _CURVED else ""
         settings = f"{{space: {space}, footprint: '{corners}', budget_s: 2{radius}}}"
         planner = hn.HybridPlanner(
-            topology, preset=load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+            topology, preset=load_preset("ompl", overrides=[f"planner.ompl={settings}"])
         )
         solved = faults = by_grid = 0
         seconds = []
@@ -141,7 +141,9 @@ def soak(plans: int, *, seed: int = 0) -> dict[str, float]:
     """Plans in one process; how much memory planner and worker gain after the first hundredth."""
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    preset = load_preset("ompl-bitstar", overrides=["planner.ompl.budget_s=0.25"])
+    preset = load_preset(
+        "ompl", overrides=["planner.ompl.planner=BITstar", "planner.ompl.budget_s=0.25"]
+    )
     planner = hn.HybridPlanner(topology, preset=preset)
     worker: Any = planner._ompl._worker  # type: ignore[union-attr]  # noqa: SLF001
     free = np.argwhere(grid.classes == hn.CellClass.FREE)

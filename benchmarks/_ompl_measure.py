@@ -12,20 +12,20 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._queries_measure import MOVINGAI_MERGE_DISTANCE_M, ROS_MERGE_DISTANCE_M, read
-from hybridnav.config import load_preset
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment, map_digest
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.metrics import segment_faults
+from hybridnav.planner import load_preset
 from hybridnav.planner.ompl_plans import OmplPlanner
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.config import PlannerSettings
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.pairs import Pair
+    from hybridnav.planner import PlannerSettings
 
 Record = dict[str, Any]
 
@@ -66,7 +66,7 @@ class Method:
         """Section `planner` of its preset."""
         confine = "mask" if self.scope == "whole map" else self.scope
         ompl = f"planner: {self.planner}, confine: {confine}, budget_s: {self.budget_s}"
-        return load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={{{ompl}}}"]).planner
+        return load_preset("ompl", overrides=[f"planner.ompl={{{ompl}}}"]).planner
 
     @cached_property
     def digest(self) -> str:
@@ -116,7 +116,7 @@ class Bench:
             merge_distance_m=MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M,
         )
         topology = hn.TopologicalMap(pyramid)
-        self._coarse = hn.HybridPlanner(topology, preset="portals")
+        self._coarse = hn.HybridPlanner(topology, preset="shortest")
         optimum = AnyAngleOptimum(self.grid)
         self.problems: list[Problem] = []
         for pair in sample_pairs(self.grid, pairs, seed=seed):
@@ -130,9 +130,9 @@ class Bench:
 
     def planner(self, method: Method) -> OmplPlanner:
         """The planner of a method; its process runs until it is dropped."""
-        cells: Any = self._coarse._cells  # noqa: SLF001 - the planner's own fields, built once
         whole = method.scope == "whole map"
-        return OmplPlanner(self.grid, method.settings, None if whole else cells.search.field_of)
+        field_of = None if whole else self._coarse.topology.level.field_of
+        return OmplPlanner(self.grid, method.settings, field_of)
 
     def records(self, method: Method, there: set[str]) -> Iterator[Record]:
         """Records of a method that are not there yet."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
+from hybridnav.planner import load_preset
 from hybridnav.planner.ompl_plans import OmplPlanner
 from hybridnav.viz import plot_search
 
@@ -29,9 +29,8 @@ def draw(out: Path) -> list[Path]:
     """A picture for each planner: the whole map's run, and the corridor's in both ways."""
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    coarse = hn.HybridPlanner(topology, preset="portals")
-    cells: Any = coarse._cells  # noqa: SLF001 - the planner's own fields, built once
-    field_of = cells.search.field_of
+    coarse = hn.HybridPlanner(topology, preset="shortest")
+    field_of = topology.level.field_of
     path = coarse.plan(*ENDS).raise_for_status().path
     assert path is not None  # noqa: S101 - solved
     passed = np.unique(field_of[path.cells[:, 0], path.cells[:, 1]])
@@ -42,7 +41,7 @@ def draw(out: Path) -> list[Path]:
         figure = Figure(figsize=(9, 17), layout="constrained")
         for ax, (scope, confine) in zip(figure.subplots(3, 1), SCOPES, strict=True):
             settings = f"planner.ompl={{planner: {planner}, confine: {confine}}}"
-            preset = load_preset("ompl-rrtconnect", overrides=[settings])
+            preset = load_preset("ompl", overrides=[settings])
             is_whole = scope == "whole map"
             plan = OmplPlanner(grid, preset.planner, None if is_whole else field_of).plan(
                 path.cells, (poses[0], poses[1]), None, tells_search=True

@@ -14,20 +14,20 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import figure1_world, office_world
-from hybridnav.harness.hybrid_method import _nbytes
+from benchmarks.worlds import figure1_world, office_world
+from hybridnav.harness.adapters import _nbytes
+from hybridnav.harness.judges import judge_line, judge_path
 from hybridnav.harness.outcome import loss_of
 from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.io.movingai import read_scenarios
-from hybridnav.metrics import judge_line, judge_path
+from hybridnav.maps.files.movingai import read_scenarios
+from hybridnav.planner import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.tables import Row
 
@@ -50,7 +50,7 @@ Presets = dict[str, hn.Preset]
 
 def presets_of(names: Iterable[str]) -> Presets:
     """Presets by what they were called: a name, and overrides behind colons, such as
-    `portals:planner.smooth=line-of-sight`; that of grid A* comes first."""
+    `octile:planner.smooth=line-of-sight`; that of grid A* comes first."""
     found = {}
     for text in dict.fromkeys((YARDSTICK, *names)):
         name, *overrides = text.split(":")

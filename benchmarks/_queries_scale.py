@@ -22,18 +22,18 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks._queries_measure import SLACK, YARDSTICK, read
-from hybridnav.harness.hybrid_method import _nbytes
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.tables import to_markdown
-from hybridnav.mesh import MeshSearch, build_mesh
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
+from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.harness.tables import Row
 
     Cell = tuple[int, int]

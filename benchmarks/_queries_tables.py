@@ -13,7 +13,7 @@ from hybridnav.harness.tables import text_of, to_markdown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.tables import Row
 
 LEAST_MS = 1.0

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from hybridnav.topology.judging import Forest
+from hybridnav.topology.rooms.judging import Forest
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
 
 _BINS = 48
 _NONE = 255

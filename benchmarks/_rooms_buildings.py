@@ -11,13 +11,13 @@ from PIL import Image
 
 import hybridnav as hn
 from benchmarks._rooms_truth import FLOORS, Floor
-from hybridnav.topology import _segmentation_kernels
-from hybridnav.topology.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
+from hybridnav.topology.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
+from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 SITES = {
     **dict.fromkeys(FLOORS, "GDC"),

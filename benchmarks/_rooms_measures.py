@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 import hybridnav as hn
 from benchmarks._rooms_buildings import SITES, Building
 from benchmarks.train_rooms import Training
-from hybridnav.grid.names import Segmentation
-from hybridnav.metrics import compare_rooms
-from hybridnav.topology.segmentation import judged_rooms
+from hybridnav.harness.judges import compare_rooms
+from hybridnav.maps.names import Segmentation
+from hybridnav.topology.rooms.find import judged_rooms
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray, IntArray
+    from hybridnav._base.typing import FloatArray, IntArray
 
 NEAR_M = 1.0
 """How far a found door may lie from a true one."""

@@ -15,7 +15,7 @@ import hybridnav as hn
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 FLOORS = ("2", "3", "3ne")
 RADIUS_M = 0.25

@@ -6,7 +6,7 @@ import hashlib
 import zipfile
 from typing import TYPE_CHECKING
 
-from hybridnav._files import replace_file
+from hybridnav._base.files import replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

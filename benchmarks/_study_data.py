@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks._study_run import read_note
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.columns import EFFICIENCY_COLUMNS, YARDSTICKS, loss_columns
+from hybridnav.harness.columns import (
+    CONSISTENCY_COLUMNS,
+    EFFICIENCY_COLUMNS,
+    consistency_row,
+    figures,
+    loss_columns,
+)
 from hybridnav.harness.contradictions import ANSWERED, TOO_SLOW
-from hybridnav.harness.kinds import CONSISTENCY_COLUMNS, consistency_row
-from hybridnav.harness.method_table import rows_of_methods
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.rows import figures
+from hybridnav.harness.tables import rows_of_methods
+from hybridnav.harness.yardstick import YARDSTICKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.records import Record
-    from hybridnav.harness.times import Circumstances
+    from hybridnav.harness.timing import Circumstances
 
 LEAST_SOLVED = 0.99
 """Share of the pairs that a method solves which is compared over the pairs in common."""

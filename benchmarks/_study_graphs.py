@@ -20,16 +20,16 @@ from benchmarks._swagger_like import (
     swagger_like,
 )
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.graphs import WaypointGraph, build_route_graph
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.ext.graphs import WaypointGraph, build_route_graph
+from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.baselines import MethodResult
-    from hybridnav.baselines.protocol import Cell
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.harness.baselines import MethodResult
+    from hybridnav.harness.baselines.regions import Cell
+    from hybridnav.maps import OccupancyGrid
 
 NODES = 2000
 """Nodes that our own graphs aim at: as many as graphs of SWAGGER have, 366 to 5,101 on ten ROS

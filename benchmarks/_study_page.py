@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from benchmarks._study_maps import KINDS
 from benchmarks._study_quotes import quoted
 from benchmarks._study_tables import TITLES, best_of, tables_of
-from hybridnav.harness.kinds import DEFINITION
-from hybridnav.harness.tables import to_markdown
+from hybridnav.harness.columns import DEFINITION
+from hybridnav.harness.tables import markdown_of, text_of, to_markdown
 
 if TYPE_CHECKING:
     from benchmarks._study_data import Data
@@ -96,9 +96,7 @@ def _section(table: StudyTable, level: str = "###") -> str:
     if table.part:
         heading = f"{TITLES[table.part]}: {table.title[0].lower()}{table.title[1:]}"
     note = f"{table.note}\n\n" if table.note else ""
-    body = to_markdown(
-        [dict(zip(table.columns, row, strict=True)) for row in table.rows], table.columns
-    )
+    body = markdown_of(table.columns, [[text_of(cell) for cell in row] for row in table.rows])
     return f"{level} {heading}\n\n{note}{body}\n"
 
 
@@ -252,7 +250,7 @@ _FINDINGS = tuple(
         (
             "Speed-up over A\\*, median of the ratios, and ratio of the mean times: `octile` "
             "{octile_speed} and {octile_means}, `shortest` {shortest_speed} and {shortest_means}, "
-            "`portals` {portals_speed} and {portals_means}, HPA\\* {hpa_speed} and {hpa_means}."
+            "HPA\\* {hpa_speed} and {hpa_means}."
         ),
         (
             "By cost, over the least cost of paths of cells: `robot`, which is not bound to cells, "

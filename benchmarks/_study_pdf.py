@@ -12,7 +12,7 @@ from benchmarks._study_page import CHARTS, about, circumstances, in_short, rules
 from benchmarks._study_sheets import Sheets
 from benchmarks._study_tables import TITLES, tables_of
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.kinds import DEFINITION
+from hybridnav.harness.columns import DEFINITION
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.viz import method_styles, plot_losses, plot_speed, save_figure
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from benchmarks._study_data import Data
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.yardstick import Optimum
     from hybridnav.viz.charts import MethodStyle

@@ -68,16 +68,14 @@ _FIGURES = {
     "thrun_any": ("lengths", "thrun", "any-angle loss mean %"),
     "octile_speed": ("lengths", "octile", "speed-up"),
     "shortest_speed": ("lengths", "shortest", "speed-up"),
-    "portals_speed": ("lengths", "portals", "speed-up"),
     "paper_speed": ("lengths", "paper", "speed-up"),
     "hpa_speed": ("lengths", "hpa-star", "speed-up"),
     "octile_means": ("lengths", "octile", "speed-up of means"),
     "shortest_means": ("lengths", "shortest", "speed-up of means"),
-    "portals_means": ("lengths", "portals", "speed-up of means"),
     "paper_means": ("lengths", "paper", "speed-up of means"),
     "hpa_means": ("lengths", "hpa-star", "speed-up of means"),
     "hpa_preparation": ("lengths", "hpa-star", "preparation s"),
-    "portals_preparation": ("lengths", "portals", "preparation s"),
+    "octile_preparation": ("lengths", "octile", "preparation s"),
     "shortest_preparation": ("lengths", "shortest", "preparation s"),
     "robot_cost": ("costs", "robot", "weighted loss mean %"),
     "shortest_cost": ("costs", "shortest", "weighted loss mean %"),
@@ -142,13 +140,13 @@ QUOTES = (
     Quote("docs/peers.md", "implementation loses {hpa_octile} % in the mean"),
     Quote(
         "docs/peers.md",
-        "it prepares in {hpa_preparation} s in the mean, `portals` in {portals_preparation} s",
+        "it prepares in {hpa_preparation} s in the mean, `octile` in {octile_preparation} s",
     ),
     Quote("docs/peers.md", "smoothed ones are {hpa_any} % above them in the mean"),
     Quote(
         "docs/peers.md",
         "his regions lose {thrun_octile} % in the mean against the octile optimum, `paper` "
-        "{paper_octile} %, `portals` nothing ({thrun_any}, {paper_any} and {grid_any} %",
+        "{paper_octile} %, `octile` nothing ({thrun_any}, {paper_any} and {grid_any} %",
     ),
     Quote(
         "docs/peers.md",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from benchmarks._study_data import studies_of
 from benchmarks._study_page import circumstances, rules
 from benchmarks._study_tables import TITLES, tables_of
-from hybridnav._files import replace_file
-from hybridnav.harness.columns import MEANINGS
-from hybridnav.harness.report import ReportData, Table, render_report
-from hybridnav.harness.rows import rows_of_map
-from hybridnav.harness.sections import report_of
+from hybridnav._base.files import replace_file
+from hybridnav.harness.columns import MEANINGS, rows_of_map
+from hybridnav.harness.output import report_of
+from hybridnav.harness.report import ReportData, render_report
+from hybridnav.harness.tables import Table
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,25 +12,26 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import replace_file
-from hybridnav.config import load_preset
+from benchmarks.rivals import needed_package
+from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError
-from hybridnav.harness.methods import BASELINES, REFERENCE, RIVALS, baseline_spec, preset_spec
+from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.planner import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from benchmarks._study_maps import StudyMap
-    from hybridnav.config import Preset
+    from hybridnav.planner import Preset
 
 RUN_FILE = "study-run.json"
 COSTS = ("clearance",)
 """Nav2's inflation with the defaults of its bringup."""
 
-BESIDE_OMPL = "portals"
+BESIDE_OMPL = "octile"
 """Preset whose paths of cells, shortened by line of sight, stand beside those of OMPL."""
 
 GRAPHS = (
@@ -39,6 +40,40 @@ GRAPHS = (
 )
 """Graphs of waypoints, made for each map, by their names in tables. Their module is imported where
 they are made: it needs scikit-image."""
+
+RIVALS = (
+    *(
+        NamedMethod("class", f"benchmarks.rivals:{made_of}", name)
+        for name, made_of in {
+            "nano-astar": "NanoAstar",
+            "networkx": "Networkx",
+            "pyastar2d": "Pyastar2d",
+            "pyroutingkit": "RoutingKit",
+            "tcod": "Tcod",
+        }.items()
+    ),
+    NamedMethod("class", "benchmarks.rivals_any_angle:ExtremityPathfinder", "extremitypathfinder"),
+    NamedMethod("class", "benchmarks.rivals_any_angle:OmplWhole", "ompl-whole"),
+    NamedMethod(
+        "class",
+        "benchmarks.rivals_any_angle:OmplWhole",
+        "ompl-whole-prmstar",
+        {"planner": "PRMstar"},
+    ),
+)
+"""Planners of others, by their names in tables."""
+
+SAMPLING = tuple(
+    NamedMethod("preset", "ompl", f"ompl-{name}", {"planner.ompl.planner": planner})
+    for name, planner in {
+        "rrtconnect": "RRTConnect",
+        "rrtstar": "RRTstar",
+        "informed-rrtstar": "InformedRRTstar",
+        "bitstar": "BITstar",
+        "prmstar": "PRMstar",
+    }.items()
+)
+"""The preset `ompl` with one planner each, by their names in tables."""
 
 _LATE_S = 120.0
 """Silence beyond the limit that loading kernels and judging may add."""
@@ -63,11 +98,10 @@ class Plan:
 
 
 _ONLY_WHOLE = (
-    "grid-dijkstra", "hpa-star-raw", "hpa-star-lines", "exact-overlay", "ompl-prmstar",
-    "ompl-rrtstar",
+    "grid-dijkstra", "hpa-star-raw", "hpa-star-lines", "ompl-prmstar", "ompl-rrtstar",
 )  # fmt: skip
 """Methods of the whole study alone: another setting of a method that a quarter has, or a slow
-yardstick (exact-overlay takes a third of the time of all preparations)."""
+yardstick."""
 
 PLANS = {
     "quarter": Plan("quarter", 16, ompl_pairs=4, repeat=3, limit_s=60.0, without=_ONLY_WHOLE),
@@ -88,31 +122,31 @@ class Part:
     methods: tuple[NamedMethod, ...] = ()
 
 
-def rivals() -> tuple[list[str], dict[str, str]]:
+def rivals() -> tuple[list[NamedMethod], dict[str, str]]:
     """Return the planners of others that can be asked, and why others cannot."""
     there, missing = [], {}
-    for name in RIVALS:
+    for rival in RIVALS:
         try:
-            baseline_spec(name)
+            needed_package(class_of(rival.source).package)
         except HybridNavError as error:
-            missing[name] = str(error)
+            missing[rival.name] = str(error)
         else:
-            there.append(name)
+            there.append(rival)
     return there, missing
 
 
 def parts_of(plan: Plan) -> list[Part]:
     """Return the parts of the study, with all methods that are there."""
     others, _ = rivals()
-    samplers = [name for name in others if "ompl" in name]
-    known = [*BASELINES, *(name for name in others if name not in samplers)]
-    known = [name for name in known if name not in plan.without]
-    names = [n for n in hn.preset_names() if n not in {REFERENCE, *plan.without}]
-    own = [name for name in names if not name.startswith("ompl-")]
+    samplers = [one for one in others if "ompl" in one.name]
+    others = [one for one in others if one not in samplers]
+    known = [name for name in BASELINES if name not in plan.without]
+    own = [n for n in hn.preset_names() if n not in {REFERENCE, "ompl", *plan.without}]
     by_costs = [name for name in own if load_preset(name).planner.refusal_of_costs() is None]
-    knowing = [name for name in known if _takes_costs(name)]
+    knowing = [name for name in known if _takes_costs(BASELINES[name][0])]
+    others_knowing = [one for one in others if _takes_costs(one.source)]
     line = load_preset(BESIDE_OMPL, overrides=["planner.smooth=line-of-sight"])
-    sampling = [name for name in names if name.startswith("ompl-") and _is_measured(name)]
+    sampling = [one for one in SAMPLING if one.name not in plan.without and _is_measured("ompl")]
     return [
         Part(
             "lengths",
@@ -120,7 +154,7 @@ def parts_of(plan: Plan) -> list[Part]:
             tuple(known),
             plan.pairs,
             plan.repeat,
-            methods=GRAPHS,
+            methods=(*others, *GRAPHS),
         ),
         Part(
             "costs",
@@ -129,8 +163,16 @@ def parts_of(plan: Plan) -> list[Part]:
             plan.pairs,
             plan.repeat,
             COSTS,
+            tuple(others_knowing),
         ),
-        Part("ompl", (*sampling, line, "shortest"), tuple(samplers), plan.ompl_pairs, 0),
+        Part(
+            "ompl",
+            (line, "shortest"),
+            (),
+            plan.ompl_pairs,
+            0,
+            methods=(*samplers, *sampling),
+        ),
     ]
 
 
@@ -143,8 +185,8 @@ def _is_measured(name: str) -> bool:
     return True
 
 
-def _takes_costs(name: str) -> bool:
-    made_of: Any = class_of((BASELINES | RIVALS)[name][0])
+def _takes_costs(path: str) -> bool:
+    made_of: Any = class_of(path)
     return "costs" in inspect.signature(made_of).parameters
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from benchmarks._study_run import GRAPHS
-from hybridnav.harness.columns import OPTIMA, YARDSTICKS, loss_columns, shown
-from hybridnav.harness.kinds import CONSISTENCY_COLUMNS
-from hybridnav.harness.tables import text_of
+from hybridnav.harness.columns import CONSISTENCY_COLUMNS, loss_columns
+from hybridnav.harness.tables import shown, text_of
+from hybridnav.harness.yardstick import OPTIMA, YARDSTICKS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from benchmarks._study_data import Data
 
@@ -74,7 +74,7 @@ def tables_of(data: Data) -> list[StudyTable]:
 
 
 def _of_part(name: str, part: Data) -> list[StudyTable]:
-    def table(kind: str, rows: Sequence[Data], columns: Sequence[str], title: str) -> StudyTable:
+    def table(kind: str, rows: Sequence[Data], columns: Iterable[str], title: str) -> StudyTable:
         return _table(name, kind, title, rows, columns)
 
     rows = part["methods"]
@@ -111,7 +111,7 @@ def _graphs(part: Data) -> list[Data]:
 
 
 def _table(
-    part: str, kind: str, title: str, rows: Sequence[Data], columns: Sequence[str]
+    part: str, kind: str, title: str, rows: Sequence[Data], columns: Iterable[str]
 ) -> StudyTable:
     """Return a table without columns that are empty."""
     kept = ["method", *(c for c in columns if any(_has(row, c) for row in rows))]

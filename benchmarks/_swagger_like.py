@@ -26,7 +26,7 @@ from hybridnav.refine import Sight
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._base.typing import BoolArray, LongArray
 
 Cell = tuple[int, int]
 

@@ -34,7 +34,7 @@ from scipy import ndimage
 import hybridnav as hn
 
 if TYPE_CHECKING:
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner.alternatives import By
 
 ROOT = Path(__file__).parents[1]
 MAPS = {

@@ -28,7 +28,7 @@ import hybridnav as hn
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
 
 LIFTS = ("south", "east", "west")
 SLACK_US = 200.0

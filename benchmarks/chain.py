@@ -22,11 +22,11 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._base.typing import BoolArray, LongArray
 
 OFFICE = Path(__file__).parents[1] / "maps" / "office" / "office.yaml"
 REAL_MAPS = (

@@ -32,8 +32,8 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from hybridnav.mesh import build_mesh
 from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.search.mesh import build_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable

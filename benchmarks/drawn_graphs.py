@@ -22,14 +22,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import hybridnav as hn
+from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness import AnyAngleOptimum
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.judges import judge_line
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.tables import to_markdown
-from hybridnav.metrics import judge_line
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.tables import Row
 

@@ -19,12 +19,12 @@ import numpy as np
 from scipy.spatial import KDTree
 
 import hybridnav as hn
-from hybridnav.explore import explore, laser_all_round
+from hybridnav.ext.live.explore import explore, laser_all_round
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav.explore import By
+    from hybridnav.ext.live.explore import By
 
 _WALL, _DEPTH, _LEAST_ROOM, _BIG_ROOM = 2, 4, 10, 24
 

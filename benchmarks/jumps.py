@@ -20,10 +20,10 @@ import numpy as np
 
 from benchmarks._queries_measure import read
 from benchmarks.queries import maps_of
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.jumps import JumpPath, JumpSearch, build_jump_graph, contract_graph
 from hybridnav.search.grid_search import CellPath, GridSearch
-from hybridnav.search.moves import path_length_in_cells
+from hybridnav.search.octile import JumpPath, JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable

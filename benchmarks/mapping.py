@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.mapping import LaserModel, Mapper
+from hybridnav.ext.live.mapping import LaserModel, Mapper
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
-from hybridnav.mesh import MeshSearch, build_mesh
+from hybridnav.maps import CellClass
+from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from hybridnav._typing import BoolArray
+    from hybridnav._base.typing import BoolArray
 
 Cell = tuple[int, int]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.refine import MotionCheck
 
 if TYPE_CHECKING:

@@ -27,13 +27,13 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.costs import files_of
-from hybridnav.graphs.checked_components import components_of
-from hybridnav.grid.lines import walks_clear
+from hybridnav.ext.graphs.checked_components import components_of
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.tables import to_markdown
-from hybridnav.metrics import segment_faults
+from hybridnav.maps.lines import walks_clear
 
 if TYPE_CHECKING:
-    from hybridnav.graphs import Excess
+    from hybridnav.ext.graphs import Excess
     from hybridnav.harness.tables import Row
 
 _RADIUS_M = 0.25

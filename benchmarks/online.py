@@ -23,8 +23,8 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.chain import OFFICE, RADIUS_M
-from hybridnav.mapping import Mapper
-from hybridnav.online import OnlinePyramid
+from hybridnav.ext.live import OnlinePyramid
+from hybridnav.ext.live.mapping import Mapper
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.mapping import Mapper
-from hybridnav.online import OnlineRooms, ReplayFigures, grids_of_scans, replay
+from hybridnav.ext.live import OnlineRooms, ReplayFigures, grids_of_scans, replay
+from hybridnav.ext.live.mapping import Mapper
 
 LOGS = {
     "Intel": "radish_logs/intel-corrected.log.gz",

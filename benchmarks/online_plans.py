@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.jumps import build_jump_graph, contract_graph
-from hybridnav.mesh import build_mesh
+from hybridnav.search.mesh import build_mesh
+from hybridnav.search.octile import build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

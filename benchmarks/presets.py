@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
-from hybridnav.grid.clearance import clearance_cells
 from hybridnav.harness.tables import to_markdown
+from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.costs import cost_along
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.tables import Row
 
 OFFICE = Path(__file__).parents[1] / "maps" / "office" / "office.yaml"

@@ -40,7 +40,7 @@ def measure(rows: int, cols: int) -> dict[str, object]:
     The floor is one pass over memory: the classes read, the record of seven bytes a cell written.
     """
     import hybridnav as hn  # noqa: PLC0415 - in the child only
-    from hybridnav.grid.worlds import office_world, tiled  # noqa: PLC0415
+    from benchmarks.worlds import office_world, tiled  # noqa: PLC0415
 
     grid = tiled(office_world(), rows=rows, cols=cols).grid(robot_radius_m=0)
     vertices = int((grid.classes != hn.CellClass.OCCUPIED).sum())

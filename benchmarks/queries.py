@@ -7,7 +7,7 @@
 All ROS maps of kind `map` in FOLDER/maps.tsv (robot radius 0.25 m, merge distance 4 m) and all
 MovingAI maps (a point robot, merge distance 40 cells), or those whose path in FOLDER a glob of
 `--maps` matches. `--presets` takes names, separated by commas, with overrides behind colons, as in
-`portals:planner.smooth=line-of-sight`; by default all presets without OMPL. Everything runs in one
+`octile:planner.smooth=line-of-sight`; by default all presets without OMPL. Everything runs in one
 process: on each map all planners share one topological map, and every pair is put to every planner
 before the next pair, in another order each time. Tables are printed; FILE.csv gets a row for each
 map and preset as soon as the map is measured, and a run that was stopped goes on: maps that it has
@@ -129,7 +129,7 @@ def main() -> int:
         return 0
     if not names:
         parser.error("no map: the table needs --data or HYBRIDNAV_DATA, and --maps that match")
-    all_presets = ",".join(name for name in hn.preset_names() if not name.startswith("ompl-"))
+    all_presets = ",".join(name for name in hn.preset_names() if name != "ompl")
     presets = presets_of((given.presets or all_presets).split(","))
     files = {name: Path(given.data) / name for name in names}
     try:

@@ -20,7 +20,7 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.chain import OFFICE, RADIUS_M
-from hybridnav.search.moves import legal_moves, moves_along
+from hybridnav._base.moves import legal_moves, moves_along
 
 MAPS = (
     "nav2/maps/depot.yaml",

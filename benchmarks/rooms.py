@@ -17,12 +17,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import networkx as nx
 import numpy as np
 
 import hybridnav as hn
 from benchmarks._rooms_measures import measures_table
 from benchmarks._rooms_truth import FLOORS, Floor
-from hybridnav.route import MaxDistanceSearch, RoomSearch
+from hybridnav.route import MaxDistanceSearch
 
 NEAR_M = 1.0
 """How far a passage may lie from a true door."""
@@ -33,7 +34,7 @@ def routes_table(floors: list[Floor]) -> bool:
     print("\n## Routes between every ordered pair of rooms, true rooms\n")
     print(
         "The grid is the preset `grid-astar`, A* on the whole map, between the rooms' points "
-        "and between the endpoints that plans from anywhere to anywhere chose. Plans of `portals` "
+        "and between the endpoints that plans from anywhere to anywhere chose. Plans of `octile` "
         "must be solved exactly when it is, and the levels of places and rooms must agree; "
         "connected free cells, labelled by scipy, say the same of any two rooms.\n"
     )
@@ -77,10 +78,10 @@ class AllPairs:
 
 def _all_pairs(floor: Floor, topology: hn.TopologicalMap) -> AllPairs:
     """Plan between all pairs of rooms, by their points and from anywhere to anywhere."""
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     on_grid = hn.HybridPlanner(topology, preset="grid-astar")
     names = floor.rooms.names
-    places, rooms = MaxDistanceSearch(topology), RoomSearch(topology.rooms)
+    places, part_of = MaxDistanceSearch(topology), room_parts(topology.rooms)
     cells = {n: floor.grid.frame.cell_of(*topology.rooms.point_of(n)) for n in names}
     parts = {
         label: set(np.unique(floor.components[floor.rooms.label_of == label]).tolist()) - {0}
@@ -96,13 +97,26 @@ def _all_pairs(floor: Floor, topology: hn.TopologicalMap) -> AllPairs:
         joined = floor.components[cells[a]] == floor.components[cells[b]]
         found.by_component += (joined, bool(parts[i] & parts[j])) != (best.solved, somewhere.solved)
         found.by_point += not (best.solved == plan.solved == (on_places is not None))
-        on_rooms = rooms.search(a, b) is not None
+        on_rooms = bool(part_of[a] & part_of[b])
         found.by_set += not (somewhere.solved == any_plan.solved == on_rooms)
         found.solved += best.solved
         found.solved_anywhere += somewhere.solved
         if best.solved and plan.solved and best.cost > 0:
             found.longest = max(found.longest, plan.cost / best.cost - 1)
     return found
+
+
+def room_parts(rooms: hn.Rooms) -> dict[str, set[int]]:
+    """The connected parts of the free room level that each room touches."""
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(np.flatnonzero(rooms.is_free).tolist())
+    inside = rooms.level.arcs[rooms.is_free[rooms.level.arcs].all(axis=1)]
+    graph.add_edges_from(inside.tolist())
+    parts = list(nx.connected_components(graph))
+    return {
+        name: {k for k, part in enumerate(parts) if part & set(rooms.vertices_of(name).tolist())}
+        for name in rooms.names
+    }
 
 
 def passed_table(floors: list[Floor]) -> None:

@@ -39,7 +39,7 @@ from benchmarks._study_pdf import charts_of, write_charts, write_pdf
 from benchmarks._study_quotes import QUOTES, quoted, update
 from benchmarks._study_report import write_report
 from benchmarks._study_run import PLANS, RUN_FILE, parts_of, run
-from hybridnav._files import replace_file
+from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError
 from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE
 

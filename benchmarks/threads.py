@@ -26,7 +26,7 @@ from benchmarks.chain import OFFICE, RADIUS_M
 from hybridnav.harness.pairs import sample_pairs
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
 
 ROUNDS = 5
 
@@ -83,7 +83,7 @@ def main() -> None:
     print("| preset | queries/s, one thread | two threads | ratio |")
     print("|---|---|---|---|")
     for preset in hn.preset_names():
-        if preset.startswith("ompl-"):
+        if preset == "ompl":
             continue
         planner = hn.HybridPlanner(topology, preset=preset)
         per_second(planner, endpoints, 2, options.seconds, many=options.many)

@@ -2,8 +2,8 @@
 
     python -m benchmarks.train_rooms --data FOLDER
 
-The table `src/hybridnav/topology/room_judge.npz` is made from all buildings; the figures of the
-documentation are of forests that never saw the building's site (`without`).
+The table `src/hybridnav/topology/rooms/room_judge.npz` is made from all buildings; the figures of
+the documentation are of forests that never saw the building's site (`without`).
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks._rooms_boost import Boosting, Examples, averaged, boost
 from benchmarks._rooms_buildings import SITES, Building
-from hybridnav.topology import judging
-from hybridnav.topology.cutting import Ground, fine_segments
-from hybridnav.topology.growing import Likely, Small, contract
-from hybridnav.topology.judging import EVIDENCE, Forest, JudgedSegments
-from hybridnav.topology.merging import least_cells
-from hybridnav.topology.segmentation import LEAST_LIKELY, SPECK_M2, outside_of
+from hybridnav.topology.rooms import judging
+from hybridnav.topology.rooms.cutting import Ground, fine_segments
+from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, outside_of
+from hybridnav.topology.rooms.growing import Likely, Small, contract
+from hybridnav.topology.rooms.judging import EVIDENCE, Forest, JudgedSegments
+from hybridnav.topology.rooms.merging import least_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
 
 VIEWS = ((0.0, 1.0), (17.0, 1.15), (0.0, 0.85))
 """Each building is seen turned by these degrees and scaled by these factors."""

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world, tiled
+from benchmarks.worlds import office_world, tiled
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def main() -> None:
             n_rows, n_cols = map(int, text.split("x"))
             rows.append(measure(driver, n_rows, n_cols, given.seconds))
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-    print(to_markdown(rows, list(rows[0])))
+    print(to_markdown(rows))
 
 
 if __name__ == "__main__":

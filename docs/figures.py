@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.mesh import build_mesh, trace_search
+from hybridnav.ext.fleet import plot_building
+from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
-    plot_building,
     plot_costs,
     plot_level,
     plot_levels,
@@ -28,7 +28,7 @@ OFFICE = ROOT / "maps" / "office" / "office.yaml"
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
 LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
-"""A tenth of the free cells, as portals have it."""
+"""A tenth of the free cells."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 ROBOT = ("shortest", "robot")

@@ -10,8 +10,8 @@ from rclpy.time import Time
 from tf2_ros import Buffer, TransformException, TransformListener
 
 import hybridnav as hn
-from hybridnav.graphs import route_messages
-from hybridnav.messages import fill_message, pose_of, transform_of
+from hybridnav._base.messages import fill_message, pose_of, transform_of
+from hybridnav.ext.graphs import route_messages
 
 USUAL = {"model": "floor.hnm", "preset": "shortest", "nodes": 300, "base": "base_link"}
 FAILURES = {TransformException: "TF_ERROR", nx.NetworkXException: "NO_VALID_ROUTE"}

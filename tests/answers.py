@@ -20,11 +20,11 @@ from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
 
 import hybridnav as hn
 from benchmarks.explore import narrow_world, widest_point
-from hybridnav.explore import explore
-from hybridnav.graphs import build_route_graph
-from hybridnav.mapping import Mapper, SimulatedLaser, SimulatedSonars
+from hybridnav.ext.graphs import build_route_graph
+from hybridnav.ext.live.explore import explore
+from hybridnav.ext.live.mapping import Mapper, SimulatedLaser, SimulatedSonars
 
-PRESETS = [name for name in hn.preset_names() if not name.startswith("ompl-")]
+PRESETS = [name for name in hn.preset_names() if name != "ompl"]
 """OMPL is a library of others, which takes its sines where it finds them."""
 
 

@@ -11,8 +11,6 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.portal_memory import remember_portals
-
 # Time is for benchmarks: a first call that imports or compiles is no failure. `make test` tries the
 # same examples each time, so that it says something about the change; `make test-full` asks for
 # more of them and hunts with new ones.
@@ -67,14 +65,6 @@ def data() -> Path:
     if not folder:
         pytest.skip("HYBRIDNAV_DATA is not set")
     return Path(folder)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _shared_portals() -> Iterator[None]:
-    """Prepare the portals of a large map once for all tests of a process."""
-    with pytest.MonkeyPatch.context() as patch:
-        remember_portals(patch.setattr)
-        yield
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from hybridnav.metrics import judge_path
+from hybridnav.harness.judges import judge_path
 from tests.floors import random_floor
 
 if TYPE_CHECKING:

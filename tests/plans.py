@@ -11,7 +11,7 @@ from hypothesis import settings
 import hybridnav as hn
 from tests.strategies import Scene, drawn, examples
 
-PRESETS = ("paper", "grid-astar", "octile", "portals")
+PRESETS = ("paper", "grid-astar", "octile")
 PLAIN = settings(max_examples=examples(25), deadline=None, derandomize=True)
 TWO_ROOMS = drawn(
     ".......#.......",

@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
+from hybridnav.maps import CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:

@@ -1,12 +1,3 @@
-from .building import (
-    Building as Building,
-    BuildingPlan as BuildingPlan,
-    Floor as Floor,
-    Link as Link,
-    LinkEnd as LinkEnd,
-)
-from .config import Preset as Preset, load_preset as load_preset, preset_names as preset_names
-from .costs import CostLayer as CostLayer
 from .errors import (
     CacheWarning as CacheWarning,
     HybridNavError as HybridNavError,
@@ -23,15 +14,20 @@ from .errors import (
     RoomsNotFoundError as RoomsNotFoundError,
     UnsuitableMapError as UnsuitableMapError,
 )
-from .grid import (
-    CellClass as CellClass,
-    DroppedIslands as DroppedIslands,
-    Frame as Frame,
-    OccupancyGrid as OccupancyGrid,
-    RoomLabels as RoomLabels,
-    drop_islands as drop_islands,
+from .ext.fleet import (
+    Building as Building,
+    BuildingPlan as BuildingPlan,
+    Floor as Floor,
+    Link as Link,
+    LinkEnd as LinkEnd,
 )
-from .graphs import (
+from .ext.fleet.files import (
+    building_graph as building_graph,
+    floor_graph as floor_graph,
+    load_building as load_building,
+    load_building_graph as load_building_graph,
+)
+from .ext.graphs import (
     GraphCheck as GraphCheck,
     RouteGraph as RouteGraph,
     WaypointGraph as WaypointGraph,
@@ -41,34 +37,36 @@ from .graphs import (
     keep_right as keep_right,
     merge_bends as merge_bends,
 )
-from .io import (
+from .ext.graphs.files import (
     Anchor as Anchor,
-    BagLog as BagLog,
-    CarmenLog as CarmenLog,
-    Model as Model,
-    building_graph as building_graph,
-    example_map as example_map,
     export_lif as export_lif,
     export_nav2 as export_nav2,
     export_osm as export_osm,
-    export_path as export_path,
-    export_places as export_places,
     export_rmf as export_rmf,
-    export_rooms as export_rooms,
-    floor_graph as floor_graph,
-    load as load,
-    load_bag_map as load_bag_map,
-    load_blocked as load_blocked,
-    load_building as load_building,
-    load_building_graph as load_building_graph,
     load_graph as load_graph,
-    load_keepout_mask as load_keepout_mask,
-    load_map as load_map,
-    load_rooms as load_rooms,
-    load_speed_mask as load_speed_mask,
-    save as save,
+)
+from .ext.live.files import (
+    BagLog as BagLog,
+    CarmenLog as CarmenLog,
+    load_bag_map as load_bag_map,
     save_bag as save_bag,
-    save_rooms as save_rooms,
+)
+from .maps import (
+    CellClass as CellClass,
+    DroppedIslands as DroppedIslands,
+    Frame as Frame,
+    OccupancyGrid as OccupancyGrid,
+    RoomLabels as RoomLabels,
+    drop_islands as drop_islands,
+)
+from .maps.costs import (
+    CostLayer as CostLayer,
+    load_keepout_mask as load_keepout_mask,
+    load_speed_mask as load_speed_mask,
+)
+from .maps.files import (
+    example_map as example_map,
+    load_map as load_map,
     write_movingai_map as write_movingai_map,
     write_ros_map as write_ros_map,
 )
@@ -77,24 +75,28 @@ from .planner import (
     Alternatives as Alternatives,
     Blocked as Blocked,
     HybridPlanner as HybridPlanner,
-    Tour as Tour,
-    plan_alternatives as plan_alternatives,
-    plan_tour as plan_tour,
-)
-from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc
-from .result import (
     Path as Path,
     PlanBatch as PlanBatch,
     PlanResult as PlanResult,
     PlanStatus as PlanStatus,
-    Route as Route,
+    Preset as Preset,
+    Tour as Tour,
+    export_path as export_path,
+    export_places as export_places,
+    export_rooms as export_rooms,
+    load_blocked as load_blocked,
+    load_preset as load_preset,
+    plan_alternatives as plan_alternatives,
+    plan_tour as plan_tour,
+    preset_names as preset_names,
 )
-from .topology import (
-    Door as Door,
-    Rooms as Rooms,
-    TopologicalMap as TopologicalMap,
-    find_rooms as find_rooms,
-)
+from .planner.saved import Model as Model, load as load, save as save
+from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc
+from .topology import TopologicalMap as TopologicalMap
+from .topology.rooms import Door as Door, Rooms as Rooms, find_rooms as find_rooms
+from .topology.rooms.files import load_rooms as load_rooms, save_rooms as save_rooms
+
+from .route import Route as Route
 
 __version__: str
 __all__: list[str]

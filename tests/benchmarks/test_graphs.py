@@ -23,15 +23,15 @@ from benchmarks._swagger_like import (
     skeleton_of,
     swagger_like,
 )
+from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.graph_method import GraphMethod
-from hybridnav.harness.kinds import consistency_row
-from hybridnav.harness.method_table import rows_of_methods
+from hybridnav.harness.columns import consistency_row
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.metrics import segment_faults
+from hybridnav.harness.tables import rows_of_methods
+from tests.benchmarks.test_rival_faults import LIES, nothing, short
 from tests.harness.small_runs import ROOMS, ROOT, run_here, write_map
-from tests.harness.test_rival_faults import LIES, nothing, short
 from tests.strategies import class_grids, examples, occupancy_grid
 
 N_PAIRS = 12

@@ -17,12 +17,23 @@ from benchmarks._study_data import collect
 from benchmarks._study_maps import StudyMap
 from benchmarks._study_page import page
 from benchmarks._study_pdf import MOST_PAGES, charts_of, sheets_of
-from benchmarks._study_run import GRAPHS, PLANS, Part, Plan, parts_of, read_note, rivals, run
+from benchmarks._study_run import (
+    GRAPHS,
+    PLANS,
+    RIVALS,
+    SAMPLING,
+    Part,
+    Plan,
+    parts_of,
+    read_note,
+    rivals,
+    run,
+)
 from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
 from benchmarks._study_tables import tables_of
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import BASELINES, RIVALS
+from hybridnav.harness.methods import BASELINES
+from hybridnav.planner import load_preset
 from tests.benchmarks.recomputed import REFERENCE, Recomputed
 from tests.harness.small_runs import run_here
 
@@ -31,10 +42,15 @@ NAMES = ("office/office", "figure1/figure1")
 PLAN = Plan("small", pairs=6, ompl_pairs=3, repeat=3, limit_s=300.0)
 PARTS = (
     Part(
-        "lengths", ("octile", "paper", "shortest"), ("hpa-star", "networkx"), 6, 3, methods=GRAPHS
+        "lengths",
+        ("octile", "paper", "shortest"),
+        ("hpa-star",),
+        6,
+        3,
+        methods=(*(one for one in RIVALS if one.name == "networkx"), *GRAPHS),
     ),
     Part("costs", ("robot", "shortest"), (), 6, 3, ("clearance",)),
-    Part("ompl", (load_preset("portals", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
+    Part("ompl", (load_preset("octile", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
 )
 KINDS = dict.fromkeys(NAMES, "ROS")
 FIGURES = ("lengths", "costs", "ompl")
@@ -353,19 +369,22 @@ def test_a_folder_holds_one_study(folder):
 @pytest.mark.parametrize("name", PLANS)
 def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
     lengths, costs, ompl = parts_of(PLANS[name])
-    asked = {*lengths.baselines, *ompl.baselines, *lengths.presets, *ompl.presets, *costs.presets}
+    asked = {*lengths.baselines, *lengths.presets, *ompl.presets, *costs.presets}
     there, missing = rivals()
-    known = {*BASELINES, *there, *hn.preset_names()} - {REFERENCE}
+    asked |= {method.name for method in (*lengths.methods, *ompl.methods)}
+    asked -= {method.name for method in GRAPHS}
+    known = {*BASELINES, *hn.preset_names(), *(one.name for one in (*there, *SAMPLING))}
+    known -= {REFERENCE, "ompl"}
     assert known - asked == set(PLANS[name].without)
-    assert missing.keys() == RIVALS.keys() - set(there)
-    assert {"octile", "paper", "portals", "shortest"} <= set(lengths.presets)
-    assert {"hpa-star", "thrun", "weighted-astar", "networkx"} <= set(lengths.baselines)
+    assert [one.name for one in RIVALS if one.name not in missing] == [one.name for one in there]
+    assert {"octile", "paper", "shortest"} <= set(lengths.presets)
+    assert {"hpa-star", "thrun", "weighted-astar"} <= set(lengths.baselines)
     assert REFERENCE in lengths.baselines
-    assert {method.name for method in lengths.methods} == {"route graph", "swagger-like"}
-    assert {"robot", "portals", "shortest"} <= set(costs.presets)
+    assert {"route graph", "swagger-like", "networkx"} <= {one.name for one in lengths.methods}
+    assert {"robot", "shortest"} <= set(costs.presets)
     assert costs.costs == ("clearance",)
-    names = [preset for preset in ompl.presets if isinstance(preset, str)]
-    assert {"ompl-rrtconnect", "ompl-bitstar", "shortest"} <= set(names)
+    assert "shortest" in ompl.presets
+    assert {"ompl-rrtconnect", "ompl-bitstar"} <= {method.name for method in ompl.methods}
 
 
 def test_a_quarter_asks_a_quarter_of_the_pairs():

@@ -122,7 +122,7 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
     done = cli("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--compare")
     assert "bound      0.00 m, the path is optimal" in done.out
     assert "arcs       0\n" in done.out
-    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "portals")
+    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "octile")
     assert "loss 0.00 %" in cli(*query, "--compare").out
 
 
@@ -312,8 +312,8 @@ ENDS = ("--start", "1,1", "--goal", "2,2")
         (["plan", FIGURE, "--start", "[m],1", "--goal", "2,2"], ["'[m],1'"]),
         (["plan", FIGURE, "--start", "nan,1", "--goal", "2,2"], ["finite", "'nan,1'"]),
         (["plan", FIGURE, "--start", "1,-inf", "--goal", "2,2"], ["finite", "'1,-inf'"]),
-        (["plan", FIGURE, *ENDS, "--preset", "best"], ["'best'", "octile, ompl-bitstar"]),
-        (["plan", FIGURE, *ENDS, "--preset", ""], ["''", "octile, ompl-bitstar"]),
+        (["plan", FIGURE, *ENDS, "--preset", "best"], ["'best'", "octile, ompl, paper"]),
+        (["plan", FIGURE, *ENDS, "--preset", ""], ["''", "octile, ompl, paper"]),
         (["plan", FIGURE, *ENDS, "--preset", "a\nb"], ["'a\\nb'"]),
         (["plan", FIGURE, *ENDS, "--set", "pyramid.speed=3"], ["pyramid.speed", "seed"]),
         (["plan", FIGURE, *ENDS, "--set", "pyramid.seed"], ["'pyramid.seed'"]),
@@ -330,7 +330,7 @@ ENDS = ("--start", "1,1", "--goal", "2,2")
         (["show", FIGURE, "--level", "-99"], ["--level", "-99"]),
         (["show", FIGURE, "--level", "top"], ["--level"]),
         (["preset", "list", "all"], ["all", "hybridnav preset list --help"]),
-        (["preset", "check", "best"], ["'best'", "octile, ompl-bitstar"]),
+        (["preset", "check", "best"], ["'best'", "octile, ompl, paper"]),
         (["preset", "show"], ["NAME|FILE"]),
     ],
 )
@@ -380,7 +380,7 @@ def test_a_map_that_does_not_fit_into_memory(cli, rooms, monkeypatch):
     def exhaust(*_arguments, **_options):
         raise MemoryError
 
-    monkeypatch.setattr("hybridnav.io.maps.load_map", exhaust)
+    monkeypatch.setattr("hybridnav.planner.saved.model.load_map", exhaust)
     assert cli("show", rooms).refuses(3, "out of memory")
 
 
@@ -401,7 +401,7 @@ def test_ctrl_c_ends_without_a_word(cli, rooms, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hybridnav.io.maps.load_map", interrupt)
+    monkeypatch.setattr("hybridnav.planner.saved.model.load_map", interrupt)
     done = cli("show", rooms)
     assert (done.code, done.out, done.err) == (130, "", "")
 

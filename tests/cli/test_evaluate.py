@@ -8,7 +8,7 @@ import pytest
 
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.io import load_map
+from hybridnav.maps.files import load_map
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map
@@ -101,8 +101,8 @@ def test_queries_in_which_a_method_raises_are_counted(cli, rooms, tmp_path):
 def test_corner_cutting_is_a_counter_example(cli, tmp_path):
     path = write_map(tmp_path, ["...###", "...###", "###...", "###..."])
     query = ("evaluate", path, "--corner-cutting", "--pairs", 5, "-o", tmp_path / "run")
-    assert cli(*query).refuses(2, "such as portals")
-    done = cli(*query, "--preset", "portals")
+    assert cli(*query).refuses(2, "such as octile")
+    done = cli(*query, "--preset", "octile")
     assert done.code == 1
     assert "counter-examples" in done.err
 

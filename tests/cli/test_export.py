@@ -87,7 +87,7 @@ def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
     given = ("export", FIGURE, "-o", tmp_path / "g.geojson", *SMALL)
     assert "ids  " not in cli(*given).out
-    monkeypatch.setattr("hybridnav.messages.MOST_ID", 20)
+    monkeypatch.setattr("hybridnav._base.messages.MOST_ID", 20)
     (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("ids  ")]
     features = json.loads((tmp_path / "g.geojson").read_text())["features"]
     most = max(each["properties"]["id"] for each in features)

@@ -14,7 +14,7 @@ import pytest
 
 from hybridnav.cli import compiling
 from hybridnav.cli.compiling import notice_of_compiling
-from hybridnav.config import load_preset
+from hybridnav.planner import load_preset
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
@@ -90,9 +90,9 @@ def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
     ("preset", "processors", "start", "jobs"),
     [
         ("shortest", 2, "cold", ["mesh"]),
-        ("ompl-rrtconnect", 2, "cold", ["mesh"]),
+        ("ompl", 2, "cold", ["mesh"]),
         ("octile", 2, "cold", ["jumps"]),
-        ("portals", 2, "cold", []),
+        ("robot", 2, "cold", []),
         ("shortest", 1, "cold", []),
         ("shortest", 2, "warm", []),
     ],

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from tests.io.bag_writer import KINDS
-from tests.io.drive import driven
+from tests.ext.live.files.bag_writer import KINDS
+from tests.ext.live.files.drive import driven
 
 if TYPE_CHECKING:
     from pathlib import Path

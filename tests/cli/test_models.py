@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world
+from benchmarks.worlds import figure1_world
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("--start", "0.55,0.55", "--goal", "2.55,2.85")
@@ -235,7 +235,7 @@ def test_what_was_not_used_for_longest_makes_room(kept, tmp_path, monkeypatch):
     left = tmp_path / "kept" / ".hybridnav.1.1"
     left.touch()
     os.utime(left, (0, 0))
-    monkeypatch.setattr("hybridnav.io.models.kept.MOST_BYTES", first.stat().st_size + 1)
+    monkeypatch.setattr("hybridnav.planner.saved.kept.MOST_BYTES", first.stat().st_size + 1)
     kept("--seed", "1")
     (second,) = (tmp_path / "kept").iterdir()
     assert second != first

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
-from hybridnav.baselines.grid import GridAstar
-from hybridnav.costs import cost_along
+from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
+from hybridnav.harness.baselines.grid import GridAstar
+from hybridnav.maps.costs import cost_along
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.baselines import AnyAngleResult, MethodResult
-from hybridnav.baselines.grid import GridAstar
-from hybridnav.config import Preset
-from hybridnav.grid import CellClass
-from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.adapters import HybridMethod
+from hybridnav.harness.baselines import AnyAngleResult, MethodResult
+from hybridnav.harness.baselines.grid import GridAstar
+from hybridnav.maps import CellClass
+from hybridnav.planner import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch
@@ -24,7 +24,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
 
     Cell = tuple[int, int]
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.baselines.grid import GridAstar
-from hybridnav.config import Preset
-from hybridnav.grid import CellClass
+from hybridnav.harness.adapters import HybridMethod
+from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.consistency import Consistency
-from hybridnav.harness.hybrid_method import HybridMethod
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
 from hybridnav.harness.pairs import Pair, sample_pairs
+from hybridnav.maps import CellClass
+from hybridnav.planner import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
+from hybridnav._base.poses import Motion
 from hybridnav.harness import (
     RunSettings,
     compare_runs,
@@ -19,10 +19,9 @@ from hybridnav.harness import (
     to_frame,
     write_outputs,
 )
-from hybridnav.harness.paths import decode_path
-from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.harness.rows import rows_of_study
-from hybridnav.poses import Motion
+from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.records import RECORDS_FILE, decode_path, read_records
+from hybridnav.maps.costs import cost_along
 from tests.harness import faulty_costs as faulty
 from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
 from tests.layers import layer_of
@@ -41,7 +40,7 @@ FAULTS = {
     faulty.ArcsBoundedByNothing: "nan m is no lower bound on paths of cells",
 }
 SOUND = (faulty.Cheapest, faulty.HonestlyDear, faulty.WithArcs, faulty.ByLength)
-PRESETS = ("shortest", "octile", "portals", "paper")
+PRESETS = ("shortest", "octile", "paper")
 COSTS = ("clearance:inflation_radius_m=3,scaling=0.5,multiplier=6",)
 N_PAIRS = 30
 
@@ -150,7 +149,7 @@ def test_losses_gaps_and_metrics_are_about_costs(study: Any) -> None:
     best = outcome_of(study, "grid-astar")
     assert (best.losses == 0).all()
     assert (best.gaps == 0).all()
-    for label in ("shortest", "octile", "portals", "paper"):
+    for label in ("shortest", "octile", "paper"):
         outcome = outcome_of(study, label)
         assert outcome.losses == pytest.approx(outcome.costs_m / best.costs_m - 1, abs=1e-9)
         # A bound on lengths is one on costs, because no factor is below 1.

@@ -11,15 +11,12 @@ from html import unescape
 import pytest
 
 import hybridnav as hn
-from hybridnav.harness.analysis import load_study
+from hybridnav.harness.analysis import load_study, to_frame
 from hybridnav.harness.cases import command_of
-from hybridnav.harness.columns import MEANINGS
+from hybridnav.harness.columns import MEANINGS, consistency_row, rows_of_study
 from hybridnav.harness.contradictions import KINDS
-from hybridnav.harness.frames import to_frame
-from hybridnav.harness.kinds import consistency_row
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.rows import rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, importable, label_of, name_of, write_map

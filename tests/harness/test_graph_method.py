@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness import RunSettings, evaluate, load_study
-from hybridnav.harness.graph_method import GraphMethod
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
-from hybridnav.metrics import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.harness.small_runs import ROOMS, run_here, write_map
 from tests.strategies import class_grids, examples, occupancy_grid

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from hybridnav.baselines import MethodResult
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.baselines import MethodResult
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate

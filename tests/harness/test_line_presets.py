@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.planner import load_preset
 from tests.cli.test_commands import FIGURE
 from tests.harness.small_runs import ROOMS, ROOT, run_here, write_map
 
@@ -44,10 +44,10 @@ def outcome_of(study, label):
 )
 def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):
     settings = settings if settings.startswith("{") else f"{{{settings}}}"
-    arguments = ["--preset", "ompl-rrtconnect", "--set", f"planner.ompl={settings}"]
+    arguments = ["--preset", "ompl", "--set", f"planner.ompl={settings}"]
     done = cli("evaluate", FIGURE, *arguments, "-o", tmp_path / "run")
     assert done.refuses(2, words)
-    assert "preset ompl-rrtconnect" in done.err
+    assert "preset ompl" in done.err
     assert not (tmp_path / "run").exists()
 
 
@@ -113,7 +113,11 @@ def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
     mark = uuid.uuid4().hex
     monkeypatch.setenv(MARK, mark)
     out = tmp_path / "run"
-    arguments = ["evaluate", FIGURE, "--preset", "ompl-rrtconnect", "--preset", "ompl-rrtstar"]
+    methods = tmp_path / "methods.yaml"
+    settings = "{planner.ompl.planner: RRTstar, planner.ompl.budget_s: 0.3}"
+    star = f"{{name: star, preset: ompl, settings: {settings}}}"
+    methods.write_text(f"methods: [{star}]")
+    arguments = ["evaluate", FIGURE, "--preset", "ompl", "--methods", methods]
     arguments += ["--set", "planner.ompl.budget_s=0.3", "--pairs", 5, "--workers", 2, "-o", out]
     done = cli(*arguments)
     assert (done.code, done.err) == (0, "")
@@ -139,10 +143,10 @@ def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
 def test_what_ompl_does_not_find_is_not_its_own(tmp_path):
     pytest.importorskip("ompl")
     hopeless = "{confine: mask, iterations: 1, budget_s: 10, simplify: false}"
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={hopeless}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl={hopeless}"])
     map_file = ROOT / "maps" / "office" / "office.yaml"
     evaluate(RunSettings(maps=(str(map_file),), presets=(preset,), pairs=8), tmp_path)
-    outcome = outcome_of(write_outputs(tmp_path), "ompl-rrtconnect")
+    outcome = outcome_of(write_outputs(tmp_path), "ompl")
     by_grid = [r for r in outcome.records if r.get("by_grid")]
     assert outcome.by_grid == len(by_grid) > 0
     assert np.isfinite(outcome.losses).sum() == 8 - len(by_grid)
@@ -153,9 +157,7 @@ def test_what_ompl_does_not_find_is_not_its_own(tmp_path):
 def test_a_planner_that_is_closed_answers_again():
     pytest.importorskip("ompl")
     grid = hn.load_map(FIGURE, robot_radius_m=0)
-    planner = hn.HybridPlanner(
-        hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
-    )
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl")
     start, goal = grid.frame.points_of([[2, 2], [4, 9]])
     planner.close()
     planner.close()

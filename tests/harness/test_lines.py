@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from benchmarks._study_data import part_figures
-from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.contradictions import contradiction
+from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.outcome import query_key
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.yardstick import Yardstick
-from hybridnav.io import load_map
-from hybridnav.metrics import VisibilityGraph
+from hybridnav.maps.files import load_map
+from hybridnav.planner import load_preset
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
 
@@ -39,7 +39,7 @@ FAULTS = {
     faulty.LineOverHomelessCells: "the path leaves the regions",
 }
 SOUND = (faulty.SoundLine, faulty.OwnGridOrNothing)
-PRESETS = ("paper", "portals")
+PRESETS = ("paper", "octile")
 METRICS: tuple[Yardstick, ...] = ("both", "any-angle", "octile")
 N_PAIRS = 40
 
@@ -254,7 +254,7 @@ def test_each_metric_has_rows_and_charts_of_its_own(folder, rows):
     assert metrics == sorted(metrics, reverse=True)
     assert rows["paper"]["metric"] == rows["grid-astar"]["metric"] == "octile"
     assert rows["paper"]["by the grid"] == ""
-    for name in ("portals+line-of-sight", label_of(faulty.SoundLine)):
+    for name in ("octile+line-of-sight", label_of(faulty.SoundLine)):
         assert rows[name]["metric"] == "any-angle"
         assert rows[name]["octile loss mean %"] == ""
     report = (folder / "report.html").read_text()
@@ -303,8 +303,8 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
     settings = RunSettings(
         maps=(str(folder.parent / "rooms.map"),), pairs=N_PAIRS, merge_distance_m=4.0
     )
-    smooth = load_preset("portals", overrides=["planner.smooth=line-of-sight"])
-    evaluate(replace(settings, presets=("portals",)), tmp_path / "cells")
+    smooth = load_preset("octile", overrides=["planner.smooth=line-of-sight"])
+    evaluate(replace(settings, presets=("octile",)), tmp_path / "cells")
     evaluate(replace(settings, presets=(smooth,)), tmp_path / "lines")
     # What is no loss by definition is no line in a chart of another metric.
     write_outputs(tmp_path / "lines")
@@ -312,7 +312,7 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
     assert "Loss, rooms, any-angle paths" in report
     assert "octile paths" not in report
     (row,) = compare_runs(tmp_path / "cells", tmp_path / "lines")
-    assert row["method"] == "portals+line-of-sight against portals"
+    assert row["method"] == "octile+line-of-sight against octile"
     cells, lines = (
         next(o for o in write_outputs(tmp_path / run).outcomes if o.label != "grid-astar")
         for run in ("cells", "lines")

@@ -7,16 +7,16 @@ from dataclasses import replace
 import pytest
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.rows import rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
 CLASS = """
-from hybridnav.baselines.grid import GridAstar
+from hybridnav.harness.baselines.grid import GridAstar
 
 class Mine(GridAstar):
     def __init__(self, grid, *, name="HPA* of mine", weight=1):
@@ -60,7 +60,6 @@ def settings(tmp_path, monkeypatch):
         ("weighted A*", "weighted-astar"),
         ("WA*", "weighted-astar"),
         ("Thrun", "thrun"),
-        ("exact overlay", "exact-overlay"),
         *((name, name) for name in BASELINES),
     ],
 )
@@ -164,7 +163,7 @@ def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
         "- {name: 'HPA* (20)', baseline: 'HPA*', settings: {cluster_cells: 20}}\n"
         "- {name: heavy, class: 'mine:Mine', settings: {weight: 2}}\n"
         "- {class: 'mine:Mine', settings: {weight: 1}}\n"
-        "- {name: 'near', preset: portals, settings: {planner.epsilon: 0.1}}\n"
+        "- {name: 'near', preset: shortest, settings: {planner.epsilon: 0.1}}\n"
     )
     run = replace(settings, baselines=(), methods=read_methods(file))
     evaluate(run, tmp_path / "run")

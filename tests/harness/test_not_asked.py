@@ -9,18 +9,21 @@ from html import unescape
 
 import pytest
 
-from hybridnav.baselines.grid import GridAstar
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.harness.ahead import ahead_of_presets
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.columns import EFFICIENCY_COLUMNS, loss_columns
-from hybridnav.harness.method_table import rows_of_methods
+from hybridnav.harness.baselines.grid import GridAstar
+from hybridnav.harness.columns import (
+    EFFICIENCY_COLUMNS,
+    figures,
+    loss_columns,
+    rows_of_map,
+    rows_of_study,
+)
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.rows import figures, rows_of_map, rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import Row
+from hybridnav.harness.tables import Row, ahead_of_presets, rows_of_methods
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
 N_PAIRS = 8
@@ -52,7 +55,7 @@ def folder(tmp_path_factory):
         baselines=(f"{__name__}:Narrow",),
         methods=(
             NamedMethod("baseline", "HPA*", "HPA* (20)", {"cluster_cells": 20}),
-            NamedMethod("preset", "portals", "near", {"planner.epsilon": 0.1}),
+            NamedMethod("preset", "octile", "near", {"planner.corridor": "neighbours"}),
         ),
         pairs=N_PAIRS,
         repeat=2,
@@ -108,9 +111,9 @@ def test_the_table_of_methods_has_the_reason(folder, study):
     }
     assert rows["HPA* (20)"]["kind"] == "baseline hpa-star"
     assert rows["HPA* (20)"]["settings"] == "cluster_cells 20"
-    assert rows["near"]["kind"] == "preset portals"
+    assert rows["near"]["kind"] == "preset octile"
     assert (rows["octile"]["kind"], rows["grid-astar"]["kind"]) == ("preset", "baseline")
-    assert "epsilon 0.1" in str(rows["near"]["settings"])
+    assert "corridor neighbours" in str(rows["near"]["settings"])
     assert str(rows["octile"]["version"]).startswith("hybridnav ")
     for text in ((folder / file).read_text() for file in ("report.html", "summary.md")):
         assert LIMIT in text

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, OccupancyGrid
-from hybridnav.grid.worlds import office_world
 from hybridnav.harness.pairs import (
     STRATA,
     Pair,
@@ -19,8 +18,9 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.paths import decode_path, encode_path
-from hybridnav.io.movingai import Scenario
+from hybridnav.harness.records import decode_path, encode_path
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.files.movingai import Scenario
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TWO_PARTS = occupancy_grid(drawn("....#..", "....#..", "....#.."))

@@ -15,16 +15,16 @@ import pytest
 from PIL import Image
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.harness.figures import paths_uri
 from hybridnav.harness.report import (
     CounterExample,
     MapSection,
     ReportData,
-    Table,
     WorstCase,
     render_report,
 )
+from hybridnav.harness.tables import Table
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 NAMES = ["grid A*", "weighted A*", "HPA*", "Thrun's map", "exact overlay", "corridor", "portal"]

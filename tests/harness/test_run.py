@@ -23,7 +23,7 @@ from hybridnav.harness.output import write_outputs
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.io import load_map
+from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, importable, name_of, run_here, write_map
 

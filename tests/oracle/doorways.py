@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     import hybridnav as hn
-    from hybridnav.sentences import Instruction
+    from hybridnav.planner.guide import Instruction
 
     FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from scipy.sparse import csgraph
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
 
     Bools = NDArray[np.bool_]
     Cells = NDArray[np.int64]

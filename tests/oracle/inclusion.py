@@ -13,7 +13,7 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from tests.oracle.pyramid import EAST, EIGHT, NORTH, SOUTH, WEST, AnyArray, Cell
 from tests.strategies import Scene, class_grids
 

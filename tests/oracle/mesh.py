@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from hybridnav.mesh import MeshSearch
-from hybridnav.mesh.corner_graph import find_edges
+from hybridnav.search.mesh import MeshSearch
+from hybridnav.search.mesh.corner_graph import find_edges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav.mesh import ConvexMesh
+    from hybridnav.search.mesh import ConvexMesh
 
 KINDS = "intervals", "landmarks", "hierarchy"
 """What a search of a mesh may search."""
@@ -25,7 +25,9 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
     if kind == "intervals":
         return search
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridnav.mesh.hierarchy._MOST_LOOKED", 0 if kind == "landmarks" else 10**6)
+        patch.setattr(
+            "hybridnav.search.mesh.corner_graph._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
+        )
         search.prepare()
     return search
 

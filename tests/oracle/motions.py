@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
 
 
 class ShapelyRobot:

@@ -20,7 +20,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 from scipy.spatial import distance
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 
 AnyArray = NDArray[Any]
 Cell = tuple[int, int]

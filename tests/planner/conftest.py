@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from tests.plans import PRESETS, map_of
 
 

@@ -17,15 +17,11 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
-from hybridnav.homotopy import (
-    AlternativeSearch,
-    _class_kernels,
-    _tree_kernels,
-    alternative_search,
-    search,
-)
-from hybridnav.metrics import judge_path
+from hybridnav.ext.classes import AlternativeSearch, alternative_search, search
+from hybridnav.ext.classes.kernels import classes as _class_kernels
+from hybridnav.ext.classes.kernels import trees as _tree_kernels
+from hybridnav.harness.judges import judge_path
+from hybridnav.maps import CellClass
 from hybridnav.route import RouteFinder
 from tests.oracle.rays import Rays
 from tests.planner.test_named_plans import map_file  # noqa: F401 - the fixture
@@ -63,7 +59,7 @@ def rows_crossed(alternatives):
     ]
 
 
-@pytest.mark.parametrize("preset", ["grid-astar", "shortest", "portals", "paper"])
+@pytest.mark.parametrize("preset", ["grid-astar", "shortest", "octile", "paper"])
 def test_the_second_route_takes_the_other_door(preset):
     found = by_homotopy(planner_of(TWO_DOORS, preset), (1.5, 1.5), (12.5, 2.5), 3)
     assert rows_crossed(found) == [{2}, {6}]
@@ -118,7 +114,7 @@ def test_a_search_stops_in_time_with_a_shortest_path(monkeypatch):
     whole = by_homotopy(planner, *ends, 20)
     assert whole.complete
     looks = iter(range(10**6))
-    monkeypatch.setattr("hybridnav.homotopy.search.perf_counter", lambda: float(next(looks)))
+    monkeypatch.setattr("hybridnav.ext.classes.search.perf_counter", lambda: float(next(looks)))
     late = by_homotopy(planner, *ends, 20, time_limit_s=2.5, most_states=1 << 22)
     assert late.complete is False
     assert late.note == "the search stopped after 2.5 s (time_limit_s): there may be more"
@@ -129,7 +125,7 @@ def test_a_search_stops_in_time_with_a_shortest_path(monkeypatch):
 
 def test_no_time_limit_counts_the_compilation_of_kernels(monkeypatch):
     """Each kernel has met the types of its arguments before the clock is looked at."""
-    clocks = ("hybridnav.planner.by_classes", "hybridnav.homotopy.search")
+    clocks = ("hybridnav.ext.classes.alternatives", "hybridnav.ext.classes.search")
     names = {
         _class_kernels: ("begin", "find_classes", "path_to"),
         _tree_kernels: ("word_at",),
@@ -324,7 +320,7 @@ def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
         AlternativeSearch(topology)
     walks = RouteFinder(topology)
     free = np.argwhere(CORNERS == CellClass.FREE)
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     pinched = 0
     for start in free:
         for goal in free:
@@ -350,7 +346,7 @@ def test_walks_know_their_arcs_on_maps_of_one_column():
 
 def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
     pytest.importorskip("ompl")
-    planner = planner_of(TWO_DOORS, "ompl-rrtconnect")
+    planner = planner_of(TWO_DOORS, "ompl")
     with pytest.raises(hn.InvalidValueError, match="without OMPL"):
         by_homotopy(planner, (1.5, 1.5), (12.5, 2.5), 2)
     query: tuple[Any, ...] = (
@@ -364,7 +360,7 @@ def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
         "homotopy",
     )
     query += ("--alternatives", "2")
-    assert cli(*query, "--preset", "ompl-rrtconnect").refuses(2, "without OMPL")
+    assert cli(*query, "--preset", "ompl").refuses(2, "without OMPL")
 
 
 def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
@@ -453,7 +449,7 @@ def test_the_command_line_states_that_the_search_stopped(cli, two_doors_file, mo
         "time_limit_s": (1e-9, "1e-09 s"),
     }
     whole = hn.plan_alternatives
-    monkeypatch.setattr("hybridnav.homotopy.search._SLICE", 8)
+    monkeypatch.setattr("hybridnav.ext.classes.search._SLICE", 8)
     for name, (limit, shown) in limits.items():
         monkeypatch.setattr(hn, "plan_alternatives", partial(whole, **cast("Any", {name: limit})))
         told = f"routes     the search stopped after {shown} ({name}): there may be more\n"

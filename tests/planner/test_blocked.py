@@ -16,8 +16,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.planner.blocked import Blocked, as_blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import components, move_graph

@@ -36,7 +36,7 @@ HOUSE = drawn(
     "###############",
 )
 NAMES = ("kitchen", "lab", "hall")
-presets = pytest.mark.parametrize("preset", ["shortest", "portals", "paper", "grid-astar"])
+presets = pytest.mark.parametrize("preset", ["shortest", "octile", "paper", "grid-astar"])
 
 
 def house() -> hn.TopologicalMap:
@@ -51,7 +51,7 @@ def house() -> hn.TopologicalMap:
 @pytest.fixture(scope="module")
 def planners() -> dict[str, hn.HybridPlanner]:
     topology = house()
-    names = ["shortest", "portals", "paper", "grid-astar"]
+    names = ["shortest", "octile", "paper", "grid-astar"]
     return {name: hn.HybridPlanner(topology, preset=name) for name in names}
 
 
@@ -59,7 +59,7 @@ def planners() -> dict[str, hn.HybridPlanner]:
 def office() -> hn.HybridPlanner:
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     pyramid = hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))
-    return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="portals")
+    return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="octile")
 
 
 def crossings(topology: hn.TopologicalMap, door: hn.Door) -> set[frozenset[int]]:
@@ -242,7 +242,7 @@ def test_many_answers_are_those_of_one_whatever_is_closed(
 
 
 def test_alternatives_go_by_no_door_that_is_shut(planners: dict[str, hn.HybridPlanner]) -> None:
-    planner = planners["portals"]
+    planner = planners["octile"]
     topology = planner.topology
     cols = topology.grid.shape[1]
     start, goal = topology.grid.frame.points_of([(9, 2), (9, 12)])
@@ -277,7 +277,7 @@ def test_alternatives_keep_off_closed_cells_and_begin_with_the_optimum(
     if len(free) < 2:
         return
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     start, goal = grid.frame.points_of(rng.choice(free, 2, replace=False))
     low = rng.integers(0, grid.shape)
     cells = np.argwhere(np.ones(rng.integers(1, 4, 2))) + low
@@ -326,7 +326,7 @@ def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
     if not doors:
         return
     rng = np.random.default_rng(seed)
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     for door in rng.choice(np.array(doors, dtype=object), min(3, len(doors)), replace=False):
         shut = crossings(topology, door)
         endpoints = grid.frame.points_of(rng.choice(free, 2))

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.metrics import segment_faults
 from hybridnav.planner.blocked import Blocked
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, recounted
@@ -93,7 +93,7 @@ def check_blocked(
 def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
     topology = scene_map(scene, corner_cutting=corner_cutting)
     grid, rng = topology.grid, np.random.default_rng(scene.seed)
-    exact = hn.load_preset("portals", overrides=[EXACT])
+    exact = hn.load_preset("octile", overrides=["planner.coarse=overlay"])
     # Where corners may be cut the arcs of the places do not lead everywhere that paths do.
     chosen: list[Any] = [*PRESETS[1 if corner_cutting else 0 :], exact]
     planners = [hn.HybridPlanner(topology, preset=preset) for preset in chosen]
@@ -127,7 +127,7 @@ def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting:
 def test_any_angle_paths_keep_off_what_is_closed(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
     topology = scene_map(scene, corner_cutting=corner_cutting)
     grid, rng = topology.grid, np.random.default_rng(scene.seed)
-    planners = [hn.HybridPlanner(topology, preset=preset) for preset in ("portals", "grid-astar")]
+    planners = [hn.HybridPlanner(topology, preset=preset) for preset in ("octile", "grid-astar")]
     for start, goal in points_in(grid, rng, 4):
         blocked = random_blocked(topology, rng)
         rebuilt = closed_grid(grid, blocked.cells_of(topology))

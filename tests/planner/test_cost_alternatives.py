@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
+from hybridnav.maps.costs import cost_along
 from hybridnav.route import DoorGraph, door_graph
 from tests.door_alternatives import Planned, check_alternatives, two_points
 from tests.floors import random_floor

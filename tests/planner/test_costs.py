@@ -12,8 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
-from hybridnav.metrics import segment_faults
+from hybridnav.harness.judges import segment_faults
+from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.search.test_weighted import weighted

@@ -18,19 +18,17 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav import viz
-from hybridnav.costs import cost_along
 from hybridnav.harness import RunSettings, evaluate, load_study
+from hybridnav.maps.costs import cost_along
 from tests.floors import random_floor
 from tests.harness.small_runs import run_here
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.search.test_weighted import weighted
 
-HONOUR = {"grid-astar": True, "paper": False, "portals": False, "robot": False}
+HONOUR = {"grid-astar": True, "paper": False, "robot": False}
 """Presets that plan by costs, and whether their paths of cells are the cheapest."""
-REFUSE = {"shortest", "octile"} | {
-    f"ompl-{name}" for name in ("bitstar", "informed-rrtstar", "prmstar", "rrtconnect", "rrtstar")
-}
+REFUSE = {"shortest", "octile", "ompl"}
 COMMANDS = {"plan", "build", "evaluate", "view"}
 """Commands that make a planner."""
 NO_PLANNER = {"show", "rooms", "compare", "preset", "map", "replay", "explore", "export", "check"}

@@ -12,8 +12,8 @@ import pytest
 import hybridnav as hn
 from benchmarks._ompl_checks import CORNERS, Walls
 from benchmarks._ompl_checks import rooms as rooms_with_doors
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
+from hybridnav.planner import load_preset
 from tests.refine.test_differential import assert_turns_and_drives
 
 pytest.importorskip("ompl")
@@ -26,7 +26,7 @@ def planner_of(topology: hn.TopologicalMap, *settings: str) -> hn.HybridPlanner:
     given = ["space=differential", f"footprint={ROBOT}", "budget_s=2", *settings]
     # The doors of the corridor's own fields may leave no room to turn before them.
     overrides = ["planner.corridor=neighbours", *(f"planner.ompl.{text}" for text in given)]
-    return hn.HybridPlanner(topology, preset=load_preset("ompl-rrtconnect", overrides=overrides))
+    return hn.HybridPlanner(topology, preset=load_preset("ompl", overrides=overrides))
 
 
 def topology_of(occupied: Any) -> hn.TopologicalMap:

@@ -12,18 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.homotopy.search import AlternativeSearch
-from tests.door_alternatives import (
-    Planned,
-    check_alternatives,
-    doors_by_cells,
-    line_of,
-    two_points,
-)
+from hybridnav.ext.classes.search import AlternativeSearch
+from tests.door_alternatives import Planned, check_alternatives, doors_by_cells, line_of, two_points
 from tests.floors import random_floor
 from tests.strategies import examples, occupancy_grid
 
-PRESETS = ["shortest", "portals", "octile", "grid-astar", "paper"]
+PRESETS = ["shortest", "octile", "grid-astar", "paper"]
 
 
 def planner_of(floor, preset="grid-astar"):
@@ -180,7 +174,7 @@ def test_all_searches_inside_rooms_share_one_time_limit(monkeypatch):
         return paths(self, *ends, time_limit_s=time_limit_s, **limits)
 
     looks = itertools.count(0.0, 4.0)
-    monkeypatch.setattr("hybridnav.planner.by_classes.perf_counter", lambda: next(looks))
+    monkeypatch.setattr("hybridnav.ext.classes.alternatives.perf_counter", lambda: next(looks))
     monkeypatch.setattr(AlternativeSearch, "paths", noted)
     planner = hn.HybridPlanner(topology)
     found = hn.plan_alternatives(
@@ -281,7 +275,7 @@ def test_ompl_plans_by_other_doors_too():
     pytest.importorskip("ompl")
     rng = np.random.default_rng(5)
     floor = random_floor(rng)
-    planner = planner_of(floor, "ompl-rrtconnect")
+    planner = planner_of(floor, "ompl")
     ends = planner.topology.grid.frame.points_of([(1, 1), (13, 13)])
     found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_stretch=3.0)
     plain = planner.plan(*ends)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from tests.oracle.grid import length_of_points
 from tests.plans import (
     PLAIN,

@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.grid.worlds import figure1_world, office_world
+from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.pairs import sample_pairs
 from tests.oracle.grid import assert_legal, recounted
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -168,3 +168,19 @@ def test_costs_equal_those_of_the_whole_grid_on_a_real_map(data: Path, name: str
 @pytest.mark.parametrize("name", MAPS)
 def test_costs_equal_those_of_the_whole_grid_on_real_maps(data: Path, name: str) -> None:
     assert_equal_on(data / name, 1000)
+
+
+def test_a_preset_file_that_names_portals_plans_the_shortest_path_of_cells(
+    cli: Any, tmp_path: Path
+) -> None:
+    old = tmp_path / "old.yaml"
+    old.write_text("planner: {coarse: portals, refine: none, epsilon: 0.05}\n")
+    query = ("plan", "maps/figure1/figure1.yaml", "--start", "0.5,0.5", "--goal", "2.0,2.5")
+    expected = cli(*query, "--preset", "grid-astar", "--json").answer
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        done = cli(*query, "--preset", old, "--json")
+    assert done.answer["length_m"] == pytest.approx(expected["length_m"])
+    assert done.answer["gap"] == 0
+    told = "portals are gone, coarse: jumps plans instead, as in preset octile: write that"
+    assert done.err == f"hybridnav: warning: {told}\n"

@@ -17,9 +17,9 @@ import shapely
 import hybridnav as hn
 from benchmarks._ompl_checks import CORNERS, Walls
 from benchmarks._ompl_checks import rooms as rooms_with_doors
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from benchmarks.worlds import office_world
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
+from hybridnav.planner import load_preset
 from hybridnav.planner.cell_planner import CellQuery
 from tests.strategies import drawn, occupancy_grid
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 pytest.importorskip("ompl")
 
-PRESETS = [name for name in hn.preset_names() if name.startswith("ompl-")]
+PLANNERS = ["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar", "PRMstar"]
 ENDS = (1.0, 13.2), (40.6, 19.4)
 ROBOT = str([list(corner) for corner in CORNERS])
 
@@ -61,10 +61,11 @@ def planner_of(office: hn.TopologicalMap) -> Iterator[Any]:
     made.clear()
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_every_preset_solves_the_office_near_the_optimum(planner_of: Any, name: str) -> None:
-    result = planner_of(name).plan(*ENDS)
-    grid = planner_of(name).topology.grid
+@pytest.mark.parametrize("name", PLANNERS)
+def test_every_planner_solves_the_office_near_the_optimum(planner_of: Any, name: str) -> None:
+    planner = planner_of("ompl", f"planner={name}")
+    result = planner.plan(*ENDS)
+    grid = planner.topology.grid
     start, goal = (grid.frame.cell_of(*end) for end in ENDS)
     centres = grid.frame.points_of(np.array([start, goal]))
     exact = VisibilityGraph(grid).shortest(start, goal).length_m
@@ -78,7 +79,7 @@ def test_every_preset_solves_the_office_near_the_optimum(planner_of: Any, name: 
     assert result.cost == pytest.approx(np.hypot(*steps.T).sum(), rel=1e-9)
     assert exact - slack <= result.cost <= 1.02 * exact + slack
     # Between the points themselves nothing is shorter than the shortest path of a disc.
-    shortest = hn.HybridPlanner(planner_of(name).topology).plan(*ENDS)
+    shortest = hn.HybridPlanner(planner.topology).plan(*ENDS)
     assert result.lower_bound == pytest.approx(shortest.cost, rel=1e-9)
     assert result.route is not None
 
@@ -91,7 +92,7 @@ def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> No
     grid = field_of_pillars()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     settings = f"{{planner: {planner}, confine: {confine}, simplify: false}}"
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(topology, preset=preset)
     inner: Any = made._ompl
     endpoints = grid.frame.points_of(np.array([(3, 3), (56, 76)]))
@@ -128,7 +129,7 @@ def field_of_pillars() -> hn.OccupancyGrid:
 
 
 def test_where_time_is_short_the_grid_path_takes_over_and_says_so(planner_of: Any) -> None:
-    made = planner_of("ompl-rrtconnect", "planner=BITstar", "budget_s=0.02", "confine=mask")
+    made = planner_of("ompl", "planner=BITstar", "budget_s=0.02", "confine=mask")
     result = made.plan(*ENDS)
     assert result.status is hn.PlanStatus.SOLVED
     assert result.refinement.by_grid
@@ -140,18 +141,18 @@ def test_where_time_is_short_the_grid_path_takes_over_and_says_so(planner_of: An
 def test_equal_seeds_give_equal_paths_when_iterations_are_counted(planner_of: Any) -> None:
     for planner in ("RRTConnect", "BITstar"):
         settings = (f"planner={planner}", "iterations=2000", "budget_s=60")
-        made = planner_of("ompl-rrtconnect", *settings)
+        made = planner_of("ompl", *settings)
         first, second = (made.plan(*ENDS).path.points for _ in range(2))
-        other = planner_of("ompl-rrtconnect", *settings, "seed=7").plan(*ENDS).path.points
+        other = planner_of("ompl", *settings, "seed=7").plan(*ENDS).path.points
         np.testing.assert_array_equal(first, second)
         assert first.shape != other.shape or not np.array_equal(first, other)
 
 
-def test_whole_map_places_and_fields_of_portals_are_corridors_too(
+def test_the_whole_map_and_the_places_are_corridors_too(
     office: hn.TopologicalMap,
 ) -> None:
-    for coarse in ("none", "max-distance", "portals"):
-        preset = load_preset("ompl-rrtconnect", overrides=[f"planner.coarse={coarse}"])
+    for coarse in ("none", "max-distance", "jumps", "overlay"):
+        preset = load_preset("ompl", overrides=[f"planner.coarse={coarse}"])
         result = hn.HybridPlanner(office, preset=preset).plan(*ENDS)
         assert result.solved
         assert segment_faults(office.grid, result.path.points) == ()  # type: ignore[union-attr]
@@ -159,7 +160,7 @@ def test_whole_map_places_and_fields_of_portals_are_corridors_too(
 
 
 def test_near_and_equal_ends(planner_of: Any) -> None:
-    made = planner_of("ompl-rrtconnect")
+    made = planner_of("ompl")
     same = made.plan(ENDS[0], ENDS[0])
     assert (same.status, same.cost, same.gap) == (hn.PlanStatus.SOLVED, 0.0, 0.0)
     near = made.plan(ENDS[0], (1.01, 13.21))
@@ -167,7 +168,7 @@ def test_near_and_equal_ends(planner_of: Any) -> None:
 
 
 def test_closed_cells_are_gone_round(planner_of: Any) -> None:
-    made = planner_of("ompl-rrtconnect")
+    made = planner_of("ompl")
     free = made.plan(*ENDS)
     x, y = free.path.points[len(free.path.points) // 2]
     block = shapely.Point(x, y).buffer(0.3)
@@ -177,12 +178,12 @@ def test_closed_cells_are_gone_round(planner_of: Any) -> None:
 
 
 def test_clearance_weighs_more_than_length(planner_of: Any) -> None:
-    short = planner_of("ompl-rrtstar").plan(*ENDS)
-    wide = planner_of("ompl-rrtstar", "objective=clearance").plan(*ENDS)
+    short = planner_of("ompl", "planner=RRTstar").plan(*ENDS)
+    wide = planner_of("ompl", "planner=RRTstar", "objective=clearance").plan(*ENDS)
     assert wide.metric == "clearance-weighted"
     assert wide.cost > wide.path.length_m > short.cost
     assert wide.lower_bound <= wide.cost
-    weigh = planner_of("ompl-rrtstar", "objective=clearance")._ompl._clearance.cost_of
+    weigh = planner_of("ompl", "planner=RRTstar", "objective=clearance")._ompl._clearance.cost_of
     assert wide.cost == pytest.approx(weigh(wide.path.points))
     assert wide.cost < weigh(short.path.points)
 
@@ -225,7 +226,7 @@ def test_a_long_robot_goes_through_doors_without_touching(
 def long_robot(rooms: hn.TopologicalMap, space: str, settings: str) -> hn.HybridPlanner:
     radius = "" if space == "se2" else ", turning_radius_m: 0.8"
     section = f"{{space: {space}, footprint: '{ROBOT}', {settings}{radius}}}"
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={section}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl={section}"])
     return hn.HybridPlanner(rooms, preset=preset)
 
 
@@ -258,17 +259,17 @@ def test_parameters_that_ompl_does_not_take_are_refused(office: hn.TopologicalMa
         ("BITstar", "use_strict_queue_ordering: false", "not take use_strict_queue_ordering"),
     ):
         settings = f"{{planner: {planner}, parameters: {{{parameters}}}}}"
-        preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+        preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
         with pytest.raises(hn.OmplError, match=words):
             hn.HybridPlanner(office, preset=preset)
 
 
 def test_smoothing_rounds_bends_and_lengthens_nothing(planner_of: Any) -> None:
     settings = ("planner=RRTConnect", "iterations=4000", "budget_s=60")
-    plain = planner_of("ompl-rrtconnect", *settings).plan(*ENDS)
-    smooth = planner_of("ompl-rrtconnect", *settings, "smooth=true").plan(*ENDS)
+    plain = planner_of("ompl", *settings).plan(*ENDS)
+    smooth = planner_of("ompl", *settings, "smooth=true").plan(*ENDS)
     assert smooth.refinement.steps == (*plain.refinement.steps, "smoothed: yes")
-    assert segment_faults(planner_of("ompl-rrtconnect").topology.grid, smooth.path.points) == ()
+    assert segment_faults(planner_of("ompl").topology.grid, smooth.path.points) == ()
     assert smooth.cost < plain.cost
 
     def mean_bend(points: Any) -> float:
@@ -283,7 +284,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
     """A robot 2 m wide fits into the rooms and through no door."""
     wide = "[[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]"
     preset = load_preset(
-        "ompl-rrtconnect",
+        "ompl",
         overrides=[f"planner.ompl={{space: se2, footprint: '{wide}', budget_s: 0.4}}"],
     )
     result = hn.HybridPlanner(rooms, preset=preset).plan((3.0, 3.0, 0.0), (17.0, 9.0, 0.0))
@@ -301,7 +302,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
 
 def test_on_small_random_maps_paths_are_legal_and_not_below_the_optimum() -> None:
     rng = np.random.default_rng(3)
-    preset = load_preset("ompl-rrtconnect", overrides=["planner.ompl.budget_s=2"])
+    preset = load_preset("ompl", overrides=["planner.ompl.budget_s=2"])
     for yaw_rad in (0.0, 0.7):
         occupied = (rng.random((24, 30)) < 0.25).astype(np.float32)
         frame = hn.Frame(0.1, (3.0, -2.0), yaw_rad)
@@ -335,7 +336,7 @@ grid = hn.OccupancyGrid(np.zeros((8, 8)))
 topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
 assert hn.HybridPlanner(topology).plan((1, 1), (6, 6)).solved
 try:
-    hn.HybridPlanner(topology, preset="ompl-rrtconnect")
+    hn.HybridPlanner(topology, preset="ompl")
 except hn.OmplError as error:
     print(error)
 """
@@ -350,7 +351,7 @@ except hn.OmplError as error:
 def test_two_thousand_plans_leak_and_hang_nowhere(
     planner_of: Any, office: hn.TopologicalMap
 ) -> None:
-    made = planner_of("ompl-rrtconnect", "budget_s=0.25")
+    made = planner_of("ompl", "budget_s=0.25")
     pids = (os.getpid(), made._ompl._worker._running.process.pid)
     rng = np.random.default_rng(0)
     free = np.argwhere(office.grid.classes == hn.CellClass.FREE)
@@ -367,9 +368,7 @@ def test_two_thousand_plans_leak_and_hang_nowhere(
 
 def test_drawn_maps_without_a_way_have_no_path() -> None:
     grid = occupancy_grid(drawn("....#....", "....#....", "....#...."))
-    made = hn.HybridPlanner(
-        hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
-    )
+    made = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl")
     assert made.plan((0.5, 0.5), (8.5, 0.5)).status is hn.PlanStatus.NO_PATH
 
 
@@ -384,7 +383,7 @@ def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=rooms))
     robot = "[[0.6, 0.25], [-0.6, 0.25], [-0.6, -0.25], [0.6, -0.25]]"
     settings = f"{{space: se2, footprint: '{robot}', budget_s: 5}}"
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(topology, preset=preset)
     tour = hn.plan_tour(made, [(5.5, 2.2, 1.57), (7.5, 2.4, 1.57)])
     result = tour.results[0]

@@ -15,7 +15,7 @@ from shapely import Polygon
 from shapely import box as area
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
+from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.planner.test_costs import optimum_m, random_layer, scene, seeds, topology_of
@@ -24,16 +24,12 @@ from tests.strategies import class_grids, examples, occupancy_grid
 
 ROUNDING = 1e-4
 """Share of a cost by which the overlay's integers may miss the least one."""
-ON_OVERLAY = pytest.mark.parametrize("preset", ["portals", "overlay"])
 
 
-def preset_of(name: str, *, epsilon: float | None = None) -> hn.Preset:
-    """`coarse: overlay`, or `portals`, which is searched like it once there are costs."""
-    preset = hn.load_preset("portals")
-    changed = preset.planner.model_copy(
-        update={"coarse": "overlay" if name == "overlay" else "portals", "epsilon": epsilon}
-    )
-    return preset.model_copy(update={"planner": changed})
+def preset_of(*, epsilon: float | None = None) -> hn.Preset:
+    """`coarse: overlay`, without costs of its own."""
+    given = [] if epsilon is None else [f"planner.epsilon={epsilon}"]
+    return hn.load_preset("octile", overrides=["planner.coarse=overlay", *given])
 
 
 def check(result: hn.PlanResult, least: float, is_open: Any, *, epsilon: float = 0.0) -> None:
@@ -52,15 +48,14 @@ def check(result: hn.PlanResult, least: float, is_open: Any, *, epsilon: float =
 @given(
     class_grids(max_side=20),
     seeds,
-    st.sampled_from(["portals", "overlay"]),
     st.sampled_from([0.0, 0.1]),
 )
 @settings(max_examples=examples(60), deadline=None)
 def test_paths_are_the_cheapest_with_proof_before_and_after_preparation(
-    classes: Any, seed: int, name: str, epsilon: float
+    classes: Any, seed: int, epsilon: float
 ) -> None:
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
-    preset = preset_of(name, epsilon=epsilon)
+    preset = preset_of(epsilon=epsilon)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)
     ends = grid.frame.points_of([start, goal])
     least = optimum_m(grid, layer, is_open, start)[goal]
@@ -87,10 +82,9 @@ def test_answers_follow_updates_exactly(
 ) -> None:
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
-    name, overrides = ["portals", "grid-astar"][rng.integers(2)], []
+    preset = [preset_of(), hn.load_preset("grid-astar")][rng.integers(2)]
     if has_own:
-        overrides = ["planner.costs.clearance.multiplier=3"]
-    preset = hn.load_preset(name, overrides=overrides)
+        preset = hn.load_preset(preset, overrides=["planner.costs.clearance.multiplier=3"])
     layer = random_layer(grid.shape, rng)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)
     own = hn.CostLayer.clearance(grid, multiplier=3.0).factors if has_own else np.ones(grid.shape)
@@ -135,18 +129,16 @@ def test_answers_follow_updates_exactly(
             planner.prepare()
 
 
-@ON_OVERLAY
 @given(class_grids(max_side=20), seeds, st.booleans())
 @settings(max_examples=examples(20), deadline=None)
 def test_a_changed_map_is_taken_into_the_overlay_that_was_built(
-    preset: str,
     classes: Any,
     seed: int,
     has_own: bool,  # noqa: FBT001 - drawn
 ) -> None:
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
-    chosen = preset_of(preset)
+    chosen = preset_of()
     layer = None if has_own else hn.CostLayer((1 + 3 * rng.random(grid.shape)).astype(np.float32))
     if has_own:
         named = chosen.planner.model_copy(update={"costs": hn.load_preset("robot").planner.costs})
@@ -179,11 +171,10 @@ def halls(n: int = 40) -> hn.OccupancyGrid:
     return grid_of(probability, hn.Frame(0.5), robot_radius_m=0)
 
 
-@ON_OVERLAY
-def test_a_closed_door_opens_again_and_results_name_the_change(preset: str) -> None:
+def test_a_closed_door_opens_again_and_results_name_the_change() -> None:
     grid = halls()
     planner = hn.HybridPlanner(
-        topology_of(grid), preset=preset_of(preset), costs=layer_of(np.ones(grid.shape))
+        topology_of(grid), preset=preset_of(), costs=layer_of(np.ones(grid.shape))
     )
     planner.prepare()
     before = planner.plan((5.0, 2.0), (15.0, 2.0))
@@ -205,8 +196,8 @@ def test_a_closed_door_opens_again_and_results_name_the_change(preset: str) -> N
 
 def test_a_planner_of_lengths_takes_costs_later() -> None:
     grid = halls()
-    for name in ("grid-astar", "paper", "portals"):
-        planner = hn.HybridPlanner(topology_of(grid), preset=name)
+    for preset in (preset_of(), "grid-astar", "paper"):
+        planner = hn.HybridPlanner(topology_of(grid), preset=preset)
         assert planner.plan((5.0, 2.0), (15.0, 2.0)).metric == "octile"
         planner.update(costs=layer_of(np.full(grid.shape, 2.0)))
         result = planner.plan((5.0, 2.0), (15.0, 2.0))
@@ -217,7 +208,7 @@ def test_a_planner_of_lengths_takes_costs_later() -> None:
 def test_the_overlay_is_built_once_queries_have_spent_as_much() -> None:
     grid = halls(60)
     layer = layer_of(np.random.default_rng(1).uniform(1, 4, grid.shape))
-    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of("overlay"), costs=layer)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of(), costs=layer)
     free = np.argwhere(grid.enterable())
     stages = []
     for pair in free[np.random.default_rng(0).integers(len(free), size=(400, 2))]:
@@ -234,7 +225,7 @@ def test_factors_too_large_for_the_overlay_are_planned_by_on_the_grid() -> None:
     probability[1::4, :-1] = probability[3::4, 1:] = 1.0  # one long winding corridor
     grid = grid_of(probability, hn.Frame(0.5), robot_radius_m=0)
     layer = layer_of(np.full(grid.shape, 1000.0))
-    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of("overlay"), costs=layer)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of(), costs=layer)
     planner.prepare()
     result = planner.plan((0.25, 0.25), (0.25, 29.25))
     plain = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
@@ -256,7 +247,7 @@ def test_threads_finish_by_the_costs_before_or_after_an_update() -> None:
         for layer in layers
     ]
     assert (np.abs(optima[0] / optima[1] - 1) > 10 * ROUNDING).all()
-    planner = hn.HybridPlanner(topology, preset=preset_of("overlay"), costs=layers[0])
+    planner = hn.HybridPlanner(topology, preset=preset_of(), costs=layers[0])
     planner.prepare()
     wrong, seen, done = [], set(), threading.Event()
 
@@ -295,7 +286,7 @@ def test_threads_finish_by_the_costs_before_or_after_an_update() -> None:
     assert seen == {0, 1}
 
 
-@pytest.mark.parametrize("preset", ["shortest", "octile", "portals", "robot", "grid-astar"])
+@pytest.mark.parametrize("preset", ["shortest", "octile", "robot", "grid-astar"])
 def test_a_progress_callback_may_plan(preset: str) -> None:
     grid = halls()
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)
@@ -312,7 +303,7 @@ def test_a_progress_callback_may_change_costs(is_built: bool) -> None:  # noqa: 
         layer_of(np.random.default_rng(seed).uniform(1, 4, grid.shape).round()) for seed in (1, 2)
     ]
     topology, ends = topology_of(grid), ((2.0, 2.0), (28.0, 28.0))
-    planner = hn.HybridPlanner(topology, preset=preset_of("overlay"), costs=layers[0])
+    planner = hn.HybridPlanner(topology, preset=preset_of(), costs=layers[0])
     if is_built:
         planner.prepare()
         planner.update(costs=layers[1])
@@ -375,14 +366,13 @@ def test_closed_cells_that_make_paths_too_long_leave_the_search_of_the_grid() ->
     assert planner.plan(*ends, smooth="none").cost >= least * (1 - 1e-9)
 
 
-@ON_OVERLAY
 @pytest.mark.parametrize("shut_by", ["costs", "nothing"])
-def test_a_map_without_a_free_cell_opens_after_preparation(preset: str, shut_by: str) -> None:
+def test_a_map_without_a_free_cell_opens_after_preparation(shut_by: str) -> None:
     """Prepared while no cell may be entered, opened by a map, and then by costs."""
     walls = grid_of(np.ones((12, 16)), robot_radius_m=0)
     ones = np.ones(walls.shape, np.float32)
     shut = layer_of(ones, np.full(walls.shape, shut_by == "costs"))
-    planner = hn.HybridPlanner(topology_of(walls), preset=preset_of(preset), costs=shut)
+    planner = hn.HybridPlanner(topology_of(walls), preset=preset_of(), costs=shut)
     planner.prepare()
     grid = grid_of(np.zeros((12, 16)), robot_radius_m=0)
     planner.update(topology=topology_of(grid))

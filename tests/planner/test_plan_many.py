@@ -101,5 +101,5 @@ def test_many_refuses_what_are_no_points(
     office_planners: dict[str, hn.HybridPlanner], starts: Any, goals: Any, message: str
 ) -> None:
     with pytest.raises(hn.InvalidValueError, match=message) as caught:
-        office_planners["portals"].plan_many(starts, goals)
+        office_planners["octile"].plan_many(starts, goals)
     assert str(caught.value).isprintable()

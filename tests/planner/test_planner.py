@@ -18,15 +18,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
-from tests.oracle.grid import (
-    assert_legal,
-    centre,
-    components,
-    distances,
-    move_graph,
-    recounted,
-)
+from hybridnav.maps import CellClass
+from tests.oracle.grid import assert_legal, centre, components, distances, move_graph, recounted
 from tests.strategies import Scene, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
@@ -479,7 +472,7 @@ def test_equal_questions_have_equal_answers_whatever_was_asked_before() -> None:
 
 def test_importing_the_package_loads_neither_numba_nor_matplotlib() -> None:
     program = (
-        "import sys, hybridnav, hybridnav.io, hybridnav.config, hybridnav.grid\n"
+        "import sys, hybridnav, hybridnav.maps.files, hybridnav.planner, hybridnav.maps\n"
         "hybridnav.load_preset('paper'), hybridnav.OccupancyGrid, hybridnav.PlanStatus\n"
         "print(sorted({'numba', 'matplotlib', 'networkx'} & set(sys.modules)))"
     )

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.messages import pose_of
+from hybridnav._base.messages import pose_of
+from hybridnav.planner import load_preset
 from tests.plans import TWO_ROOMS, grid_of, map_of, points_in, scene_map
 from tests.strategies import Scene, examples, scenes
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-PLAIN = ("shortest", "octile", "grid-astar", "paper", "portals", "robot")
+PLAIN = ("shortest", "octile", "grid-astar", "paper", "robot")
 OMPL = ("r2", "se2", "dubins", "reeds-shepp", "differential")
 NEEDS_YAW = OMPL[1:]
 SMOOTH: Any = ("none", "line-of-sight", "arcs")
@@ -34,7 +34,7 @@ def planner_of(topology: hn.TopologicalMap, preset: str) -> hn.HybridPlanner:
     pytest.importorskip("ompl")
     turning = "" if preset not in {"dubins", "reeds-shepp"} else ", turning_radius_m: 0.04"
     section = f"planner.ompl={{space: {preset}, budget_s: 0.4{turning}}}"
-    chosen = load_preset("ompl-rrtconnect", overrides=[section])
+    chosen = load_preset("ompl", overrides=[section])
     return hn.HybridPlanner(topology, preset=chosen)
 
 

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.costs import cost_along
-from hybridnav.metrics import segment_faults
+from hybridnav.harness.judges import segment_faults
+from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.planner.test_costs import optimum_m, scene, seeds, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid

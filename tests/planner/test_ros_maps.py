@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from tests.oracle.grid import assert_legal, components, inflated, length_of_points, recounted
 
 if TYPE_CHECKING:

@@ -36,7 +36,7 @@ def read(thing: Any) -> dict[str, Any]:
     return told
 
 
-@pytest.mark.parametrize("preset", ["shortest", "portals", "paper", "grid-astar"])
+@pytest.mark.parametrize("preset", ["shortest", "octile", "paper", "grid-astar"])
 @pytest.mark.parametrize("smooth", ["none", "line-of-sight"])
 def test_a_tour_has_the_keys_of_a_plan_for_the_whole_way(preset: str, smooth: Any) -> None:
     tour = hn.plan_tour(planner(preset), STOPS, smooth=smooth)

@@ -21,7 +21,7 @@ from tests.oracle.bends import Windows, simplified_corners
 from tests.strategies import examples
 
 if TYPE_CHECKING:
-    from hybridnav.sentences import Instruction
+    from hybridnav.planner.guide import Instruction
 
 
 def turns_of(instructions: tuple[Instruction, ...]) -> list[tuple[float, float]]:

@@ -15,8 +15,8 @@ import pytest
 import yaml
 
 import hybridnav as hn
+from benchmarks.worlds import figure1_world
 from docs.extensions import notebook_pages
-from hybridnav.grid.worlds import figure1_world
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -144,7 +144,6 @@ def behaviour() -> dict[str, str]:
                 "chooses the route on the places first": "chosen on places",
                 "finds the shortest path of cells": "read off the path",
                 "finds a path that keeps its distance": "read off the path",
-                "finds a shortest octile path by look-ups": "read off the path",
                 "finds the shortest path of a disc": "read off the path",
                 "searches the whole grid": "read off the path",
             },
@@ -153,7 +152,6 @@ def behaviour() -> dict[str, str]:
             "CONTRIBUTING.md",
             {
                 "| the places of the `TopologicalMap` |": "chosen on places",
-                "| portals between the regions": "read off the path",
                 "| the corner cells at which shortest paths of cells turn |": "read off the path",
                 "| a convex mesh of free space": "read off the path",
                 "| costs between the border cells": "read off the path",
@@ -180,7 +178,7 @@ def test_both_pages_draw_the_same_flow() -> None:
         for page in ("docs/index.md", "CONTRIBUTING.md")
     ]
     assert drawn[0] == drawn[1]
-    assert len(drawn[0]) == 8  # the line for all, and one for each kind of preset
+    assert len(drawn[0]) == 7  # the line for all, and one for each kind of preset
 
 
 def test_the_picture_of_the_layers_is_the_contract() -> None:

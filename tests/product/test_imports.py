@@ -39,7 +39,7 @@ def name_of(file: Path) -> str:
 def package_of(module: str) -> str:
     """Return the package inside which a module is private; an empty name for a public module."""
     parts = module.split(".")
-    private = [i for i, part in enumerate(parts) if part.startswith("_")]
+    private = [i for i, part in enumerate(parts) if part.startswith("_") or part == "kernels"]
     return ".".join(parts[: private[0]]) if private else ""
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.graphs import route_messages
-from hybridnav.messages import fill_message
+from hybridnav._base.messages import fill_message
+from hybridnav.ext.graphs import route_messages
 from tests import ros_stand_in
 from tests.nav2_reader import read_nav2
 

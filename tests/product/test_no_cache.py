@@ -45,9 +45,9 @@ KERNELS = """
 import importlib, pathlib, hybridnav
 root = pathlib.Path(hybridnav.__file__).parent
 assert root.is_relative_to({folder!r})
-for path in sorted(root.rglob("_*kernels.py")):
+for path in sorted(root.rglob("kernels/[!_]*.py")):
     importlib.import_module(".".join(("hybridnav", *path.relative_to(root).with_suffix("").parts)))
-from hybridnav.refine._curve_kernels import _wrapped
+from hybridnav.refine.kernels.curves import _wrapped
 print(round(float(_wrapped(7.0)), 6))
 """
 
@@ -71,7 +71,7 @@ def test_a_folder_that_is_set_takes_what_was_compiled(locked, tmp_path):
 def test_the_command_works_and_says_so_in_one_line(locked):
     figure = ROOT / "maps" / "figure1" / "figure1.yaml"
     query = ("--start", "0.5,1.5", "--goal", "3.5,1.5", "--robot-radius", "0")
-    settings = ("--set", "planner.allow_unexplored=true", "--preset", "ompl-rrtconnect")
+    settings = ("--set", "planner.allow_unexplored=true", "--preset", "ompl")
     done = _python(locked, "-m", "hybridnav", "plan", figure, *query, *settings)
     assert done.returncode == 0, done.stderr
     assert "solved" in done.stdout

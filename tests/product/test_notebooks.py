@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
-from hybridnav.grid import Frame
-from hybridnav.grid.worlds import World, office_world, write_world
+from benchmarks.worlds import World, office_world, write_world
+from hybridnav.maps import Frame
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -30,13 +30,6 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
     "07_a_robot_wakes_up": {"STARTS": [(12.0, 2.0)]},
 }
 """Settings with which each notebook runs on another map."""
-SHARED_PORTALS = f"""
-import sys
-sys.path.append({str(ROOT)!r})
-from tests.portal_memory import remember_portals
-remember_portals(setattr)
-sys.path.remove({str(ROOT)!r})
-"""
 WITHOUT_OMPL = """
 import importlib.util
 found = importlib.util.find_spec
@@ -46,11 +39,8 @@ importlib.util.find_spec = lambda name, *args: None if name == "ompl" else found
 
 @pytest.fixture(autouse=True)
 def clean_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No start-up files of whoever runs the tests; one that prepares the office's portals once."""
+    """No start-up files of whoever runs the tests."""
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
-    startup = tmp_path / "profile_default" / "startup"
-    startup.mkdir(parents=True)
-    (startup / "shared_portals.py").write_text(SHARED_PORTALS)
 
 
 def executed(notebook: Any, start: Path = ROOT / "notebooks") -> list[Any]:

@@ -99,8 +99,8 @@ def test_a_command_loads_nothing_that_it_does_not_use(arguments, code, unused):
 @pytest.mark.parametrize(
     ("preset", "others"),
     [
-        ("shortest", {"hybridnav.jumps.search", "hybridnav.portals.search"}),
-        ("octile", {"hybridnav.portals.search", "hybridnav.refine.motions"}),
+        ("shortest", {"hybridnav.search.octile.search", "hybridnav.search.overlay.search"}),
+        ("octile", {"hybridnav.search.overlay.search", "hybridnav.refine.motions"}),
     ],
 )
 def test_a_plan_loads_nothing_of_other_presets(preset, others):
@@ -167,12 +167,12 @@ def test_a_result_that_cannot_be_written_is_one_line():
 
 def test_ctrl_c_during_the_work():
     script = (
-        "import os, signal, time, hybridnav.io.maps\n"
+        "import os, signal, time, hybridnav.maps.files.load\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def load_map(*_, **__):\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    time.sleep(60)\n"
-        "hybridnav.io.maps.load_map = load_map\n"
+        "hybridnav.maps.files.load.load_map = load_map\n"
         "from hybridnav.cli import main\n"
         "main()\n"
     )
@@ -289,17 +289,22 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     stubs = {path.relative_to(source).as_posix() for path in source.rglob("*.pyi")}
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
-    pages = {f"hybridnav/harness/{page}.html.j2" for page in ("check", "report")}
-    assets = source / "hybridnav" / "view" / "assets"
+    pages = {"hybridnav/harness/report.html.j2", "hybridnav/ext/graphs/check.html.j2"}
+    assets = source / "hybridnav" / "ext" / "page" / "assets"
     pages |= {path.relative_to(source).as_posix() for path in assets.iterdir()}
-    others = {"hybridnav/py.typed", "hybridnav/topology/room_judge.npz", *pages}
+    maps = {
+        f"hybridnav/example_maps/{n}/{n}.{end}"
+        for n in ("figure1", "office")
+        for end in ("pgm", "yaml")
+    }
+    others = {"hybridnav/py.typed", "hybridnav/topology/rooms/room_judge.npz", *pages}
     assert "hybridnav/__init__.pyi" in stubs
-    assert content == modules | stubs | presets | others
+    assert content == modules | stubs | presets | maps | others
     assert len(names) == len(set(names))
     assert any(name.endswith("licenses/LICENSE") for name in names)
 
 
-def test_the_unpacked_wheel_finds_its_presets(wheel, tmp_path):
+def test_the_unpacked_wheel_finds_its_presets_and_maps(wheel, tmp_path):
     shutil.unpack_archive(wheel, tmp_path / "site", "zip")
     script = "import hybridnav, sys; from hybridnav.cli import main; main()"
     options = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path / "site")}}
@@ -309,6 +314,9 @@ def test_the_unpacked_wheel_finds_its_presets(wheel, tmp_path):
     assert [f"{line.split()[0]}.yaml" for line in done.stdout.splitlines()] == PLANNERS
     shown = _python("-c", script, "preset", "show", "paper", **options).stdout
     assert yaml.safe_load(shown) == yaml.safe_load(hn.load_preset("paper").to_yaml())
+    script = "import hybridnav as hn; print(hn.example_map('figure1'), hn.example_map())"
+    maps = _python("-c", script, **options)
+    assert (maps.stdout, maps.stderr) == (f"{hn.example_map('figure1')} {hn.example_map()}\n", "")
 
 
 def test_a_wheel_made_from_the_source_distribution_is_the_same(wheel, tmp_path):

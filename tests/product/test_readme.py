@@ -87,9 +87,9 @@ def _run_python(text: str, page: str, names: dict[str, object]) -> str:
 def _run_command(text: str, folder: Path) -> str:
     """Run a line of a page, and return what it prints.
 
-    `hybridnav` with a file for its output at most runs in this process, which has its kernels and
-    the portals of the maps already. What else a shell reads runs in one, and with it the program as
-    it is installed (`hybridnav preset`).
+    `hybridnav` with a file for its output at most runs in this process, which has its kernels
+    already. What else a shell reads runs in one, and with it the program as it is installed
+    (`hybridnav preset`).
     """
     words = shlex.split(text)
     command, output = words, None

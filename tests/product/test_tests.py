@@ -19,12 +19,18 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__")
 
 
+def in_private(module: str) -> bool:
+    """Tell whether a module is private, or one of kernels."""
+    *packages, name = module.split(".")
+    return is_private(name) or packages[-1:] == ["kernels"]
+
+
 def home_of(private: str) -> Path:
     """Return where the tests of a private module stand, relative to the folder of tests.
 
     That is the folder of its package, and for a module beside the packages a file of its name.
     """
-    _, *packages, module = private.split(".")
+    _, *packages, module = private.removesuffix(".kernels").replace(".kernels.", ".").split(".")
     return Path(*packages) if packages else Path(f"test_{module.lstrip('_')}.py")
 
 
@@ -38,7 +44,7 @@ def listed(file: Path) -> set[str]:
 
 def public_names(private: str) -> set[str]:
     """Return what the public modules beside a private one list."""
-    folder = SOURCE.joinpath(*private.split(".")[1:-1])
+    folder = SOURCE.joinpath(*private.replace(".kernels.", ".").split(".")[1:-1])
     return {
         name for file in folder.glob("*.py") if not is_private(file.stem) for name in listed(file)
     }
@@ -53,9 +59,9 @@ def private_uses(tree: ast.Module) -> list[tuple[str, str]]:
         for alias in node.names:
             whole = f"{node.module}.{alias.name}"
             if (SOURCE.parent / whole.replace(".", "/")).with_suffix(".py").is_file():
-                if is_private(alias.name):
+                if in_private(whole):
                     aliases[alias.asname or alias.name] = whole
-            elif is_private(str(node.module).rpartition(".")[2]) or is_private(alias.name):
+            elif in_private(str(node.module)) or is_private(alias.name):
                 found.append((str(node.module), alias.name))
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
@@ -74,7 +80,7 @@ def test_private_modules_are_imported_by_their_own_tests_only() -> None:
     for file in FILES:
         here = file.relative_to(TESTS)
         for module, name in private_uses(ast.parse(file.read_text(encoding="utf-8"))):
-            if not is_private(module.rpartition(".")[2]):
+            if not in_private(module):
                 wrong.append(f"{here}: {name} is private to {module}")
             elif home_of(module) not in {here, here.parent}:
                 wrong.append(f"{here}: {module} is tested in {home_of(module)}")

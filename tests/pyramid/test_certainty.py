@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.grid.clearance import greatest_within
+from hybridnav.maps.clearance import greatest_within
 from tests.strategies import examples
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from hybridnav.grid.worlds import figure1_world
+from benchmarks.worlds import figure1_world
 from hybridnav.pyramid import DualGraphPyramid, FaceKind
 from tests.oracle.checks import crossing_darts, phi_walks
 from tests.oracle.inclusion import nested_scenes, signed_area

@@ -15,8 +15,8 @@ import sys
 import numpy as np
 import pytest
 
-from hybridnav.grid import Frame, OccupancyGrid
-from hybridnav.grid.worlds import figure1_world, office_world, tiled
+from benchmarks.worlds import figure1_world, office_world, tiled
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
 
 GOLDEN = {

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid._size_kernels import level_sizes
+from hybridnav.pyramid.kernels.sizes import level_sizes
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap

@@ -9,7 +9,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 import hybridnav as hn
-from hybridnav.pyramid import _base_kernels
+from hybridnav.pyramid.kernels import base as _base_kernels
 from tests.strategies import occupancy_grid
 
 

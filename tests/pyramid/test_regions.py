@@ -300,7 +300,7 @@ def test_copies_have_the_same_levels() -> None:
 def test_a_model_holds_a_pyramid_with_regions(tmp_path: Any) -> None:
     grid = occupancy_grid(TWO_ROOMS)
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.5).with_regions(40)
-    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="portals")
+    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="octile")
     hn.save(planner, tmp_path / "rooms.hnm")
     topology = hn.load(tmp_path / "rooms.hnm").topology
     again = topology.pyramid

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.costs.integral import segment_cost
-from hybridnav.refine._arc_kernels import round_bends
-from hybridnav.refine._legal_cost_kernels import legal_cost
-from hybridnav.refine._segment_kernels import is_legal
+from hybridnav.maps.costs.integral import segment_cost
+from hybridnav.refine.kernels.arcs import round_bends
+from hybridnav.refine.kernels.cost_line import legal_cost
+from hybridnav.refine.kernels.segments import is_legal
 from tests.strategies import examples
 
 SIDE = 8

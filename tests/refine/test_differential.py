@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.refine import MotionCheck
 from hybridnav.refine.differential import driven
 from hybridnav.refine.footprint import Footprint

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.io import load_map
-from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.harness.judges import VisibilityGraph, segment_faults
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps.files import load_map
 from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.metrics import segment_faults
+from hybridnav.harness.judges import segment_faults
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.refine import MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.footprint import Footprint

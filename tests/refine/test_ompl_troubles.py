@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.config import load_preset
-from hybridnav.grid.worlds import office_world
-from hybridnav.metrics import segment_faults
+from benchmarks.worlds import office_world
+from hybridnav.harness.judges import segment_faults
+from hybridnav.planner import load_preset
 from tests.refine.troubled_query import TroubledQuery
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ ENDS = (1.0, 13.2), (40.6, 19.4)
 BUDGET_S = 1.0
 START_S = 60.0
 OVER_PLACES = "planner.coarse=max-distance"
-"""For processes of their own, which would prepare portals for seconds."""
+"""For processes of their own, which would prepare a mesh."""
 LATE = "the worker did not answer in time"
 """What a busy machine can make of the first of these."""
 REASONS = {
@@ -48,7 +48,7 @@ def planner() -> Iterator[hn.HybridPlanner]:
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(office_world().grid(robot_radius_m=0.25))
     )
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl.budget_s={BUDGET_S}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl.budget_s={BUDGET_S}"])
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("PYTHONPATH", str(ROOT))
         yield hn.HybridPlanner(topology, preset=preset)
@@ -141,7 +141,7 @@ def test_planners_that_go_on_keep_to_their_time(
     planner: hn.HybridPlanner, planner_name: str, confine: str
 ) -> None:
     settings = f"{{planner: {planner_name}, confine: {confine}, budget_s: {BUDGET_S}}}"
-    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+    preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(planner.topology, preset=preset)
     spent = []
     for _ in range(2):
@@ -195,11 +195,11 @@ def test_nothing_outlives_a_planner_that_is_killed(tmp_path: Path) -> None:
     code = f"""
 import hybridnav as hn
 from functools import partial
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 from hybridnav.planner import ompl_plans
 from tests.refine.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
-preset = hn.load_preset("ompl-rrtconnect", overrides=["{OVER_PLACES}"])
+preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])
 planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
 print(planner._ompl._worker._running.process.pid, flush=True)
 ompl_plans.Query = TroubledQuery
@@ -225,7 +225,8 @@ def test_ctrl_c_ends_a_search_that_has_an_hour_left(tmp_path: Path) -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     code += "from hybridnav.cli import main; main()"
     points = ["--start", "1.0,13.2,0", "--goal", "40.6,19.4,0"]
-    settings = ["--preset", "ompl-rrtstar", "--set", "planner.ompl.space=se2"]
+    settings = ["--preset", "ompl", "--set", "planner.ompl.planner=RRTstar"]
+    settings += ["--set", "planner.ompl.space=se2"]
     settings += ["--set", "planner.ompl.budget_s=3600", "--set", OVER_PLACES]
     office = str(ROOT / "maps" / "office" / "office.yaml")
     command = [sys.executable, "-c", code, "plan", office, *points, *settings]
@@ -301,10 +302,10 @@ def test_who_ignores_the_ends_of_children_gets_answers_too() -> None:
 import signal
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
 import hybridnav as hn
-from hybridnav.grid.worlds import office_world
+from benchmarks.worlds import office_world
 grid = office_world().grid(robot_radius_m=0.25)
 topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-preset = hn.load_preset("ompl-rrtconnect", overrides=["{OVER_PLACES}"])
+preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])
 planner = hn.HybridPlanner(topology, preset=preset)
 print([planner.plan(*{ENDS}).refinement.by_grid for _ in range(2)])
 """
@@ -322,7 +323,7 @@ def test_files_of_the_working_directory_are_not_taken_for_modules(tmp_path: Path
         "plan",
         str(ROOT / "maps/office/office.yaml"),
     ]
-    command += ["--start", "1.0,13.2", "--goal", "40.6,19.4", "--preset", "ompl-rrtconnect"]
+    command += ["--start", "1.0,13.2", "--goal", "40.6,19.4", "--preset", "ompl"]
     command += ["--set", OVER_PLACES]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
-from hybridnav.io.movingai import read_scenarios
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.maps import CellClass
+from hybridnav.maps.files.movingai import read_scenarios
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
 from tests.oracle.grid import assert_legal, moves, recounted
 
 if TYPE_CHECKING:
-    from hybridnav.io.movingai import Scenario
+    from hybridnav.maps.files.movingai import Scenario
 
 PROBLEMS = 24
 LONGEST = 6

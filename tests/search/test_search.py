@@ -12,11 +12,9 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from hybridnav.grid import CellClass
-from hybridnav.search import _astar_kernels, _kernels
-from hybridnav.search.fields import field_distances
-from hybridnav.search.grid_search import GridSearch, move_tables
-from hybridnav.search.moves import (
+from hybridnav._base.fields import field_distances
+from hybridnav._base.kernels import fields as _kernels
+from hybridnav._base.moves import (
     DIAGONAL,
     STRAIGHT,
     legal_moves,
@@ -25,6 +23,9 @@ from hybridnav.search.moves import (
     octile_distance_in_cells,
     path_length_in_cells,
 )
+from hybridnav.maps import CellClass
+from hybridnav.search.grid_search import GridSearch, move_tables
+from hybridnav.search.kernels import astar as _astar_kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import block_labels, class_grids, drawn, examples
 

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridnav.grid import CellClass
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
 from hybridnav.search.waypoints import cheapest_waypoints
 from tests.strategies import class_grids
 

@@ -9,10 +9,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from hybridnav.grid import CellClass
-from hybridnav.search import _weighted_kernels as kernels
+from hybridnav._base.moves import octile_distance_in_cells
+from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import octile_distance_in_cells
+from hybridnav.search.kernels import weighted as kernels
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.strategies import class_grids, drawn, examples
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from hybridnav.topology.cutting import closed_by_disc
+from hybridnav.topology.rooms.cutting import closed_by_disc
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.grid import CellClass, RoomLabels
-from hybridnav.io.rooms_paint import without_slivers
+from hybridnav.maps import CellClass, RoomLabels
+from hybridnav.topology.rooms.files.paint import without_slivers
 from hybridnav.viz import plot_rooms
 from tests.strategies import drawn, examples, labelled, occupancy_grid
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.grid import CellClass
-from hybridnav.metrics import compare_rooms
-from hybridnav.topology.merging import Segments
-from hybridnav.topology.segmentation import divide_rooms
-from hybridnav.topology.segments import main_direction
+from hybridnav.harness.judges import compare_rooms
+from hybridnav.maps import CellClass
+from hybridnav.topology.rooms.find import divide_rooms
+from hybridnav.topology.rooms.merging import Segments
+from hybridnav.topology.rooms.segments import main_direction
 from tests.strategies import class_grids, occupancy_grid
 
 METHODS = ["judged", "walls", "watershed"]

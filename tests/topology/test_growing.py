@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.grid import CellClass, RoomLabels
-from hybridnav.topology.growing import Growth, Likely, Small, contract
+from hybridnav.maps import CellClass, RoomLabels
+from hybridnav.topology.rooms.growing import Growth, Likely, Small, contract
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
 from tests.topology.test_judging import segments_of
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.worlds import figure1_world
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import figure1_world
+from hybridnav.maps import CellClass
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import Component, Obstacle

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.topology.cutting import Ground, fine_segments, wall_directions
-from hybridnav.topology.growing import Likely, Small, contract
-from hybridnav.topology.judging import EVIDENCE, Forest, JudgedSegments
+from hybridnav.topology.rooms.cutting import Ground, fine_segments, wall_directions
+from hybridnav.topology.rooms.growing import Likely, Small, contract
+from hybridnav.topology.rooms.judging import EVIDENCE, Forest, JudgedSegments
 from tests.strategies import class_grids, occupancy_grid
 from tests.topology.test_find_rooms import floor
 

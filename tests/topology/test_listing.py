@@ -12,8 +12,8 @@ from scipy.spatial.distance import cdist
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, RoomLabels
-from hybridnav.io.ros_out import write_ros_map
+from hybridnav.maps import CellClass, RoomLabels
+from hybridnav.maps.files.write import write_ros_map
 from hybridnav.viz import plot_rooms
 from tests.strategies import drawn, examples, labelled, occupancy_grid
 

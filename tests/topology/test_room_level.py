@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.grid import RoomLabels
+from hybridnav.maps import RoomLabels
 from tests.strategies import drawn, examples, labelled, occupancy_grid
 
 TWO_ROOMS = drawn(

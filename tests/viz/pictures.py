@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.mesh import build_mesh, trace_search
+from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_dual,
     plot_losses,

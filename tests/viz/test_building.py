@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import hybridnav as hn
-from hybridnav.viz import plot_building
-from tests.building.test_queries import office
+from hybridnav.ext.fleet import plot_building
+from tests.ext.fleet.test_queries import office
 
 
 def gids(ax: Any) -> list[str]:

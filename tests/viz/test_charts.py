@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed, save_figure, style
 from hybridnav.viz.layout import text_width
 from tests.viz.pictures import two_rooms

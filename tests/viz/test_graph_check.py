@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.quiver import Quiver
 
 import hybridnav as hn
-from hybridnav.viz import plot_graph_check
+from hybridnav.ext.graphs import plot_graph_check
 from hybridnav.viz.style import PATH
 
 

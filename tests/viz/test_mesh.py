@@ -10,10 +10,10 @@ import shapely
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.mesh import build_mesh, trace_search
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import plot_mesh, plot_search
-from tests.mesh.test_trace import seeds, traced
+from tests.search.mesh.test_trace import seeds, traced
 from tests.strategies import class_grids, examples, occupancy_grid
 
 if TYPE_CHECKING:

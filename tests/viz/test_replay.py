@@ -11,15 +11,16 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.online import replay
-from hybridnav.viz import ReplayAnimation
+from hybridnav.ext.live import ReplayAnimation, replay
 from hybridnav.viz.canvas import known_view
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from hybridnav.ext.live import ReplayStep
 
-def steps(count: int, **options: Any) -> list[hn.online.ReplayStep]:
+
+def steps(count: int, **options: Any) -> list[ReplayStep]:
     """Replay two rooms in which a pallet moves, far from the second room."""
     grids = []
     for at in range(count):

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 import hybridnav as hn
-from hybridnav.grid import RoomLabels
+from hybridnav.maps import RoomLabels
 from hybridnav.planner.alternatives import Alternatives
 from hybridnav.viz import plot_alternatives, plot_plan, plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid

@@ -18,9 +18,8 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.dual import FaceKind
 from hybridnav.viz import plot_dual, plot_figure1, plot_topology, save_figure, style
 from hybridnav.viz.boundaries import Boundaries, boundary_line
-from hybridnav.viz.curves import Arc
-from hybridnav.viz.fields import Field
-from hybridnav.viz.loops import Loops
+from hybridnav.viz.fields import Field, Loops
+from hybridnav.viz.topology import Arc
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[2] / "maps"

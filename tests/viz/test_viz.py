@@ -18,9 +18,8 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.viz import plot_level, plot_map, plot_places, plot_plan, save_figure, style
-from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import round_length, text_width, wrapped
-from hybridnav.viz.places import Places
+from hybridnav.viz.places import Places, colour_vertices
 from tests.strategies import class_grids, examples, occupancy_grid
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -334,7 +333,7 @@ def test_the_title_tells_map_length_loss_and_places(rooms, plan):
     assert _title(plot_plan(rooms, plan, title="")) == ""
 
 
-@pytest.mark.parametrize("preset", ["shortest", "portals", "grid-astar"])
+@pytest.mark.parametrize("preset", ["shortest", "octile", "grid-astar"])
 def test_a_route_that_is_read_off_the_path_is_shown_and_no_corridor(rooms, preset):
     result = _plan(rooms, START, GOAL, preset)
     ax = plot_plan(rooms, result)

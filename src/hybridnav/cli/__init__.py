@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 
-from hybridnav._files import remove_unfinished
+from hybridnav._base.files import remove_unfinished
 
 _EXIT_INTERRUPTED = 130
 """As a shell reports a program that Ctrl-C (SIGINT, 2) ended: 128 + 2."""

@@ -11,8 +11,8 @@ from hybridnav.cli.errors import UsageError
 from hybridnav.cli.request import Wanted
 
 if TYPE_CHECKING:
-    from hybridnav.config import Preset
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner import Preset
+    from hybridnav.planner.alternatives import By
 
 AlternativesOption = Annotated[
     int,

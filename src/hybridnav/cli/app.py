@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 import hybridnav as hn
+from hybridnav._base.extension import extension, extensions
 from hybridnav.cli.common import answer, complain
 from hybridnav.cli.compiling import notice_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
@@ -19,19 +20,13 @@ from hybridnav.errors import HybridNavError
 _HOME_OF = {
     "plan": "plan",
     "build": "build",
-    "map": "map",
-    "explore": "explore",
     "show": "show",
     "rooms": "rooms",
-    "replay": "replay",
-    "view": "view",
-    "export": "export",
-    "check": "check",
     "evaluate": "evaluate",
     "compare": "evaluate",
     "preset": "presets",
 }
-"""The module of each command, in the order of the help."""
+"""The module of each command of this package, in the order of the help; others are registered."""
 
 _WrongUsage: Any = typer.BadParameter.__base__
 """click's UsageError: Typer brings a click of its own or not, and names only this subclass."""
@@ -43,19 +38,24 @@ class _Commands(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
         del ctx
-        return list(_HOME_OF)
+        return [*_HOME_OF, *sorted(extensions("commands"))]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None where there is none of the name."""
-        if cmd_name in _HOME_OF and cmd_name not in self.commands:
-            home = import_module(f"hybridnav.cli.{_HOME_OF[cmd_name]}")
-            self.add_command(_command(cmd_name, getattr(home, cmd_name)), cmd_name)
+        if cmd_name not in self.commands:
+            if cmd_name in _HOME_OF:
+                home = getattr(import_module(f"hybridnav.cli.{_HOME_OF[cmd_name]}"), cmd_name)
+                self.add_command(_command(cmd_name, home), cmd_name)
+            elif cmd_name in extensions("commands"):
+                home = extension("commands", cmd_name)
+                self.add_command(_command(cmd_name, home), cmd_name)
         return super().get_command(ctx, cmd_name)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse an unknown command before Typer loads what checks the options of a known one."""
-        if args and args[0] not in _HOME_OF and not args[0].startswith("-"):
-            for name in _HOME_OF:  # one of them may have been meant
+        known = not args or args[0].startswith("-") or args[0] in _HOME_OF
+        if not known and args[0] not in extensions("commands"):
+            for name in self.list_commands(ctx):  # one of them may have been meant
                 self.get_command(ctx, name)
             self.resolve_command(ctx, args)
         return super().parse_args(ctx, args)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hybridnav._files import printable
+from hybridnav._base.files import printable
 from hybridnav.cli.errors import UsageError
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import hybridnav as hn
-    from hybridnav.io.cost_specs import CostSpec
+    from hybridnav.maps.costs.files import CostSpec
 
 BlockedOption = Annotated[
     list[str] | None,
@@ -57,8 +57,7 @@ class Closing:
         if not self.given:
             return None
         # They load shapely.
-        from hybridnav.io import load_blocked  # noqa: PLC0415
-        from hybridnav.planner import Blocked  # noqa: PLC0415
+        from hybridnav.planner import Blocked, load_blocked  # noqa: PLC0415
 
         closed = Blocked(doors=self.doors, rooms=self.rooms)
         for path in self.files:
@@ -101,7 +100,7 @@ def parsed_closing(texts: list[str] | None) -> Closing:
 
 
 def _mask(text: str) -> CostSpec:
-    from hybridnav.io.cost_specs import parse_costs  # noqa: PLC0415 - loads numpy
+    from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
 
     try:
         (mask,) = parse_costs([text])

@@ -9,41 +9,20 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX, printable
-from hybridnav.cli.building import (
-    BUILD_OPTIONS,
-    BuildingSource,
-    build_building,
-    check_options,
-    is_building_file,
-    refused_options,
-)
-from hybridnav.cli.common import (
-    Reading,
-    answer,
+from hybridnav._base.extension import extension
+from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav.cli.common import answer, check_writable, progress_bar, stage, timings
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import MapOrBuildingArgument
+from hybridnav.cli.reading import (
+    MapOptions,
     check_room_to_be,
-    check_writable,
     grow_topology,
     is_model_file,
     load_model,
     overridden,
-    progress_bar,
-    read_settings,
-    stage,
-    timings,
+    with_map,
 )
-from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import (
-    FreeOption,
-    LeastIslandOption,
-    MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
-)
-from hybridnav.grid import DEFAULT_MAX_CELLS
 
 OutOption = Annotated[
     Path, typer.Option("-o", "--out", metavar="MODEL", help=f"The file, ending in {MODEL_SUFFIX}.")
@@ -68,21 +47,17 @@ CompressOption = Annotated[
 ]
 
 
+@with_map(before="compress", without=("preset",))
 def build(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     out: OutOption,
     preset: PresetsOption = None,
-    overrides: SetOption = None,
     rooms_file: RoomsOption = None,
     find_rooms: FindRoomsOption = False,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     compress: CompressOption = False,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Prepare MAP for planning, and write it to a model, which other commands take as MAP.
 
@@ -93,20 +68,17 @@ def build(
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
     check_writable(out, "--out")
-    if is_building_file(map_file):
-        check_options(refused_options(ctx, BUILD_OPTIONS))
-        build_building(BuildingSource.of(ctx.params), out, compress=compress)
+    fleet = extension("formats", "building")
+    if fleet.is_building_file(map_file):
+        fleet.check_options(fleet.refused_options(ctx, fleet.BUILD_OPTIONS))
+        fleet.build_building(fleet.BuildingSource.of(ctx.params), out, compress=compress)
         return
-    settings = [
-        read_settings(name, overrides, robot_radius_m, seed, map_file=map_file)
-        for name in preset or (None,)
-    ]
+    settings = [reading.settings(map_file, preset=name) for name in preset or (None,)]
     seconds: dict[str, float] = {}
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings[0], seconds, reading)
     if preset is None:  # all that a model was built for
         settings += [
-            overridden(model.fitted(other), overrides, robot_radius_m, seed)
+            overridden(model.fitted(other), reading.overrides, reading.robot_radius_m, reading.seed)
             for other in model.presets[1:]
         ]
     for each in settings:

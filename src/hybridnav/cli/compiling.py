@@ -18,7 +18,7 @@ from hybridnav.errors import CacheWarning
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from hybridnav.config import Preset
+    from hybridnav.planner import Preset
 
 _LOG = logging.getLogger("hybridnav.kernels")
 _PATIENCE_S = 2.0
@@ -110,7 +110,9 @@ def _is_cold(job: str) -> bool:
 
     if _is_kept(decimation.KERNEL):
         return False
-    home = {"mesh": "mesh.search", "jumps": "jumps.search"}.get(job, "search.grid_search")
+    home = {"mesh": "search.mesh.search", "jumps": "search.octile.search"}.get(
+        job, "search.grid_search"
+    )
     return not _is_kept(import_module(f"hybridnav.{home}").KERNEL)
 
 

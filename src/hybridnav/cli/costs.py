@@ -14,7 +14,7 @@ from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import hybridnav as hn
-    from hybridnav.io.cost_specs import CostSpec
+    from hybridnav.maps.costs.files import CostSpec
 
 CostsOption = Annotated[
     list[str] | None,
@@ -57,7 +57,7 @@ def parsed_costs(specs: list[str] | None) -> Costs:
     UsageError
         When one of them has another form.
     """
-    from hybridnav.io.cost_specs import parse_costs  # noqa: PLC0415 - loads numpy
+    from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
 
     try:
         found = parse_costs(specs or ())

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
-from hybridnav.cli.building import is_building_file
-from hybridnav.cli.common import answer, complain, progress_bar, read_settings
+from hybridnav._base.extension import extension
+from hybridnav._base.files import printable
+from hybridnav.cli.common import answer, complain, progress_bar
 from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.cli.reading import read_settings
+from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
@@ -251,7 +252,7 @@ def evaluate(
 def _check_maps(files: list[Path]) -> None:
     """Refuse buildings, whose routes over floors are no pairs of cells of one map."""
     for file in files:
-        if is_building_file(file):
+        if extension("formats", "building").is_building_file(file):
             raise UsageError(
                 f"{printable(file)} is a building, and methods are measured on maps: give the "
                 "maps of its floors, or compare the routes of a graph over all of them by "
@@ -297,5 +298,5 @@ def compare(
     rows = compare_runs(first, second, metric=_yardstick(metric))
     for over in dict.fromkeys(row["loss over"] for row in rows):
         own = [row for row in rows if row["loss over"] == over]
-        columns = [column for column in own[0] if column != "loss over"]
-        answer(f"## Loss over {over}\n\n{to_markdown(own, columns)}\n")
+        table = to_markdown([{key: row[key] for key in row if key != "loss over"} for row in own])
+        answer(f"## Loss over {over}\n\n{table}\n")

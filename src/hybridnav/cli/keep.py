@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hybridnav._files import printable
-from hybridnav.cli.common import complain, is_model_file, load_model
+from hybridnav._base.files import printable
+from hybridnav.cli.common import complain
+from hybridnav.cli.reading import is_model_file, load_model
 from hybridnav.errors import ModelError
 
 if TYPE_CHECKING:
     import hybridnav as hn
-    from hybridnav.cli.common import Reading
+    from hybridnav.cli.reading import MapOptions
 
 KeepOption = Annotated[
     bool,
@@ -35,7 +36,7 @@ class Source:
 
     map_file: Path
     settings: hn.Preset
-    reading: Reading
+    reading: MapOptions
     keeps: bool = False
     folder: Path | None = None
     """None for the user's cache folder."""
@@ -67,7 +68,7 @@ class Source:
         key = self._key(rooms_file, needs_rooms=needs_rooms)
         if key is not None:
             # Loads numba, which help and wrong usage can do without.
-            from hybridnav.io.models import kept  # noqa: PLC0415
+            from hybridnav.planner.saved import kept  # noqa: PLC0415
 
             folder = self._folder()
             model = kept.find(key, folder)
@@ -83,7 +84,7 @@ class Source:
         """Keep the prepared structures of a planner, or report the failure in one line."""
         if key is None:
             return
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
         try:
             path = kept.keep(planner, key, self._folder())
@@ -93,15 +94,15 @@ class Source:
         complain(f"kept a model of {path.stat().st_size / 1e6:.1f} MB in {printable(path)}")
 
     def _folder(self) -> Path:
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
         return kept.cache_folder() if self.folder is None else self.folder
 
     def _key(self, rooms_file: Path | None, *, needs_rooms: bool) -> str | None:
         if not (self.keeps or self.folder is not None) or is_model_file(self.map_file):
             return None
-        from hybridnav.io.models import kept  # noqa: PLC0415
+        from hybridnav.planner.saved import kept  # noqa: PLC0415
 
-        how = asdict(self.reading) | {"needs_rooms": needs_rooms}
-        del how["max_cells"]
+        names = ("free_threshold", "occupied_threshold", "least_island_m2")
+        how = {name: getattr(self.reading, name) for name in names} | {"needs_rooms": needs_rooms}
         return kept.key_of(self.map_file, self.settings, how, rooms_file)

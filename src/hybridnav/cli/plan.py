@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hybridnav._base.extension import extension
 from hybridnav.cli.alternatives import (
     AlternativesOption,
     ByOption,
@@ -19,36 +20,22 @@ from hybridnav.cli.alternatives import (
     wanted_of,
 )
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
-from hybridnav.cli.building import (
-    PLAN_OPTIONS,
-    is_building_file,
-    plan_in_building,
-    refused_options,
-)
-from hybridnav.cli.common import Reading, check_new, check_output, check_picture, read_settings
+from hybridnav.cli.common import check_new, check_output, check_picture
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
 from hybridnav.cli.options import (
     BesideRoomsOption,
-    FreeOption,
     JsonOption,
-    LeastIslandOption,
     MapOrBuildingArgument,
-    MaxCellsOption,
-    OccupiedOption,
     PlotOption,
-    PresetOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
     SmoothOption,
 )
+from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import Request
 from hybridnav.errors import brief
-from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.names import read_point
-from hybridnav.sentences import check_language, languages
+from hybridnav.maps.names import read_point
+from hybridnav.planner.guide import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
@@ -150,6 +137,7 @@ CompareOption = Annotated[
 ]
 
 
+@with_map(before="keep")
 def plan(
     ctx: typer.Context,
     map_file: MapOrBuildingArgument,
@@ -169,15 +157,7 @@ def plan(
     blocked: BlockedOption = None,
     no_stairs: NoStairsOption = False,
     costs: CostsOption = None,
-    preset: PresetOption = None,
-    overrides: SetOption = None,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
     smooth: SmoothOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     keep: KeepOption = False,
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
@@ -186,6 +166,8 @@ def plan(
     bag: BagOption = None,
     language: LanguageOption = "en",
     as_json: JsonOption = False,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Plan a route on MAP, or over the floors of a building, from a point or room to another.
 
@@ -197,15 +179,12 @@ def plan(
         return
     given = parsed_costs(costs)
     check_language(language)
-    settings = read_settings(
-        PRESET if preset is None and given else preset,
-        [*given.overrides, *(overrides or ())],
-        robot_radius_m,
-        seed,
+    settings = reading.settings(
+        map_file,
+        preset=PRESET if given else None,
+        overrides=given.overrides,
         smooth=smooth,
-        map_file=map_file,
     )
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     closing = parsed_closing(blocked)
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
@@ -240,9 +219,8 @@ def _check_files(plot: Path | None, poses: Path | None, bag: Path | None) -> Non
     check_output(poses, "--poses", _POSES)
     if bag is not None:
         check_new(bag, "--bag")
-        from hybridnav.io.bag_files import check_rosbags  # noqa: PLC0415 - on demand
 
-        check_rosbags("--bag")
+        extension("formats", "bag").check_rosbags("--bag")
 
 
 def _check_fits(request: Request) -> None:
@@ -258,11 +236,13 @@ def _check_fits(request: Request) -> None:
 
 def _planned_in_building(ctx: typer.Context, at: At, *, no_stairs: bool) -> bool:
     """Plan over floors if the map is a building, and return whether it is one."""
-    if not is_building_file(ctx.params["map_file"]):
+    fleet = extension("formats", "building")
+    if not fleet.is_building_file(ctx.params["map_file"]):
         if no_stairs:
             raise UsageError("--no-stairs is for a building, and this is one map: leave it out")
         return False
-    if not plan_in_building(ctx.params, at, refused_options(ctx, PLAN_OPTIONS)):
+    refused = fleet.refused_options(ctx, fleet.PLAN_OPTIONS)
+    if not fleet.plan_in_building(ctx.params, at, refused):
         raise typer.Exit(EXIT_NOT_SOLVED)
     return True
 

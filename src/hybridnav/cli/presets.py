@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.common import answer, read_preset
+from hybridnav.cli.common import answer
+from hybridnav.cli.reading import read_preset
 
 preset = typer.Typer(
     name="preset",

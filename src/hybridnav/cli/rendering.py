@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import printable
+from hybridnav._base.files import printable
 from hybridnav.cli.blocked import closing_lines
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
 

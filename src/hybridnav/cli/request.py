@@ -6,16 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav.cli.common import (
-    check_room_to_be,
-    complain,
-    grow_topology,
-    islands_figures,
-    outside,
-    refused_result,
-    stage,
-)
+from hybridnav.cli.common import complain, islands_figures, stage
 from hybridnav.cli.compiling import compiling_beside
+from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
 
 if TYPE_CHECKING:
@@ -25,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.costs import Costs
     from hybridnav.cli.keep import Source
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner.alternatives import By
     from hybridnav.planner.named import At
 
 _GRID_SEARCH = {
@@ -258,7 +251,7 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     """Return alternatives with the rooms and doors that they pass, and whether they are all."""
-    from hybridnav.result import COST_METRICS  # noqa: PLC0415 - loads numpy
+    from hybridnav.planner import COST_METRICS  # noqa: PLC0415 - loads numpy
 
     routes = []
     by_costs = bool(found) and found[0].result.metric in COST_METRICS

@@ -10,43 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_output,
-    check_picture,
-    check_room_to_be,
-    islands_line,
-    load_model,
-    read_settings,
-    stage,
-    timings,
-)
+from hybridnav._base.files import printable
+from hybridnav.cli.common import answer, check_output, check_picture, islands_line, stage, timings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
-from hybridnav.cli.options import (
-    FreeOption,
-    JsonOption,
-    LeastIslandOption,
-    MapArgument,
-    MaxCellsOption,
-    OccupiedOption,
-    PlotOption,
-    PresetOption,
-    RadiusOption,
-    RoomsOption,
-)
-from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
-from hybridnav.grid.names import Segmentation, read_point
+from hybridnav.cli.options import JsonOption, MapArgument, PlotOption, RoomsOption
+from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
+from hybridnav.maps import CellClass
+from hybridnav.maps.names import Segmentation, read_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.grid.room_labels import Point
-    from hybridnav.io.room_measures import RoomMeasures
-    from hybridnav.topology import Door, Rooms
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.maps.room_labels import Point
+    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.topology.rooms.files.text import RoomMeasures
 
 OutOption = Annotated[
     Path | None,
@@ -92,24 +71,21 @@ AllOption = Annotated[
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
+@with_map(before="at")
 def rooms(
     map_file: MapArgument,
     out: OutOption = None,
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = None,
-    robot_radius_m: RadiusOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     at: AtOption = None,
     force: ForceOption = False,
     tolerance_m: ToleranceOption = None,
     everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Find the rooms of MAP, or read them from a file, and list them with their doors."""
     check_picture(plot)
@@ -126,9 +102,8 @@ def rooms(
         raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
     checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
-    settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
+    settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     grid = model.grid
     check_room_to_be(grid)
@@ -143,7 +118,7 @@ def rooms(
         answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))
         raise typer.Exit(EXIT_SOLVED if found["room"] is not None else EXIT_NOT_SOLVED)
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.topology.room_level import room_areas_m2  # noqa: PLC0415
+    from hybridnav.topology.rooms.level import room_areas_m2  # noqa: PLC0415
 
     areas_m2 = room_areas_m2(labels, grid)
     if out is not None:
@@ -169,7 +144,7 @@ def rooms(
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
-    from hybridnav.io.room_measures import measures_of  # noqa: PLC0415 - loads numpy
+    from hybridnav.topology.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
 

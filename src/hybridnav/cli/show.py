@@ -7,32 +7,11 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
-from hybridnav.cli.common import (
-    Reading,
-    answer,
-    check_picture,
-    extent_line,
-    grow_topology,
-    islands_line,
-    load_model,
-    read_settings,
-    timings,
-)
+from hybridnav._base.files import printable
+from hybridnav.cli.common import answer, check_picture, extent_line, islands_line, timings
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import (
-    FreeOption,
-    LeastIslandOption,
-    MapArgument,
-    MaxCellsOption,
-    OccupiedOption,
-    PlotOption,
-    PresetOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
-)
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.cli.options import MapArgument, PlotOption
+from hybridnav.cli.reading import MapOptions, grow_topology, load_model, with_map
 
 LevelOption = Annotated[
     int | None,
@@ -64,26 +43,20 @@ GuessOption = Annotated[
 ]
 
 
+@with_map()
 def show(
     map_file: MapArgument,
     level: LevelOption = None,
     regions: RegionsOption = None,
     guess_below: GuessOption = None,
-    preset: PresetOption = None,
-    overrides: SetOption = None,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = None,
-    free_threshold: FreeOption = None,
-    occupied_threshold: OccupiedOption = None,
-    least_island_m2: LeastIslandOption = 0.0,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     plot: PlotOption = None,
+    *,
+    reading: MapOptions,
 ) -> None:
     """Show the classes of MAP's cells and the levels of its pyramid."""
     check_picture(plot)
-    settings = read_settings(preset, overrides, robot_radius_m, seed, map_file=map_file)
+    settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
-    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     pyramid = grow_topology(model, settings, seconds).pyramid
     if regions is not None:
@@ -157,7 +130,7 @@ def _describe_level(level: hn.Level) -> str:
     """Return one line on a level; a simple graph would lose its parallel arcs: second doors."""
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
 
-    from hybridnav.grid.runs import unique_rows  # noqa: PLC0415
+    from hybridnav.maps.islands import unique_rows  # noqa: PLC0415
 
     free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
     largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2

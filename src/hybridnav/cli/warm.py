@@ -39,11 +39,11 @@ def small_grid(size: int = 64) -> hn.OccupancyGrid:
 
 def compile_search(coarse: str) -> None:
     """Compile a kind of search, by a search of a small map."""
-    from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
     from hybridnav.planner.cell_planner import CellQuery  # noqa: PLC0415 - loads numba
     from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415
     from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
     from hybridnav.refine import GridRefiner  # noqa: PLC0415
+    from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
 
     grid, settings = small_grid(), hn.load_preset(SEARCHES[coarse]).planner
     refiner, query = GridRefiner(grid), CellQuery.between(grid.frame, *_ENDPOINTS)

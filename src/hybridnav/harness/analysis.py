@@ -8,19 +8,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
 from hybridnav.harness.records import commands_of, latest_sources, read_records
-from hybridnav.harness.times import Circumstances, circumstances_of, lay_times
+from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav._typing import FloatArray
+    import pandas as pd
+
     from hybridnav.harness.outcome import MapQuery
     from hybridnav.harness.records import Record
     from hybridnav.harness.yardstick import Yardstick
@@ -114,11 +113,6 @@ class Study:
         checked = sum("visibility_optimum_m" in record for record in known)
         return f"{checked:,} of {len(known):,}" if known else ""
 
-    def pooled(self, label: str, name: str) -> FloatArray:
-        """Return an array of a method, such as "losses" or "seconds", over all its maps."""
-        arrays = [getattr(outcome, name) for outcome in self.of_method(label)]
-        return np.concatenate(arrays) if arrays else np.empty(0)
-
     @property
     def faults(self) -> list[tuple[Outcome, Record, str]]:
         """Every contradiction found."""
@@ -203,6 +197,88 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     )
     about = circumstances_of(timed, outcomes, together, commands_of(folder))
     return Study(outcomes, metric, about, _left_out(every, preparations, pairs, names))
+
+
+def to_frame(study: Study) -> pd.DataFrame:
+    """Return a study as a table with a row for each map, method and pair.
+
+    Parameters
+    ----------
+    study
+        The study. Pairs are those of different cells that the method answered and the reference
+        solved.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns `map`, `method`, `metric`, `kind`, `start_row`, `start_col`, `goal_row` and
+        `goal_col`; `length_m`, NaN where the method found no path without a fault itself;
+        `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
+        uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
+        `reference_seconds` of A* on the whole grid; `expanded` cells,
+        border cells, intervals and nodes together. In a run with costs
+        also `costs`, their text; `cost_m`, `weighted_optimum_m`, `cost_lower_bound_m` and, for
+        any-angle paths with a bound on paths of cells, `cost_grid_bound_m`; `weighted_loss`, `gap`
+        and `grid_gap`, as shares.
+
+    Raises
+    ------
+    InvalidValueError
+        When pandas is not installed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import load_study, to_frame
+    >>> frame = to_frame(load_study(Path("run")))  # of the example of `evaluate`
+    >>> frame.groupby("method")["octile_loss"].max().to_dict()
+    {'grid-astar': 0.0, 'octile': 0.0}
+    """
+    try:
+        import pandas as pd  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise InvalidValueError(
+            "a data frame needs pandas: pip install 'hybridnav[study]'"
+        ) from error
+    parts = [pd.DataFrame(_columns(outcome)) for outcome in study.outcomes if outcome.references]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def _columns(outcome: Outcome) -> dict[str, object]:
+    pairs, frame = outcome.references, outcome.frame
+    ends = {
+        f"{end}_{axis}": [record[end][at] for record in pairs]
+        for end in ("start", "goal")
+        for at, axis in enumerate(("row", "col"))
+    }
+    columns: dict[str, object] = {
+        "map": outcome.map_name,
+        "method": outcome.label,
+        "metric": outcome.metric,
+        "kind": [record["kind"] for record in pairs],
+        **ends,
+        "length_m": frame["lengths_m"],
+        "octile_optimum_m": frame["optima_m"],
+        "any_angle_optimum_m": frame["any_angle_optima_m"],
+        "loss": frame["losses"],
+        "octile_loss": frame["octile_losses"],
+        "any_angle_loss": frame["any_angle_losses"],
+        "seconds": frame["seconds"],
+        "reference_seconds": frame["reference_seconds"],
+        "expanded": frame["expansions"],
+    }
+    if outcome.costs:
+        columns |= {
+            "costs": outcome.costs,
+            "cost_m": frame["costs_m"],
+            "weighted_optimum_m": frame["weighted_optima_m"],
+            "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
+            "cost_grid_bound_m": outcome.figure("cost_grid_bound_m"),
+            "weighted_loss": frame["weighted_losses"],
+            "gap": frame["gaps"],
+            "grid_gap": frame["grid_gaps"],
+        }
+    return columns
 
 
 def _own_names(records: Iterable[Record]) -> dict[str, str]:

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import MapError
-from hybridnav.grid import MAX_CELLS, Frame
+from hybridnav.harness.judges import chords_of
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.paths import decode_path
-from hybridnav.harness.records import map_digest
+from hybridnav.harness.records import decode_path, map_digest
 from hybridnav.harness.report import CounterExample, WorstCase
 from hybridnav.harness.scenes import MapSpec, read_map
-from hybridnav.metrics import chords_of
+from hybridnav.maps import MAX_CELLS, Frame
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.records import Record
+    from hybridnav.maps import OccupancyGrid
 
 MAX_FAULTS_SHOWN = 50
 WORST_CASES = 2

@@ -1,78 +1,56 @@
-"""The columns of tables: which a page shows, and the meaning of each."""
+"""The columns of the report: what each holds, and how it is computed from the outcomes.
+
+S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, Artificial
+Intelligence 99(1), 1998.
+"""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from hybridnav.harness.analysis import not_everywhere, pairs_in_common
+from hybridnav.harness.contradictions import ANSWERED, KINDS, contradiction, kind_of_contradiction
+from hybridnav.harness.judges import summarise
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile, query_key
+from hybridnav.harness.tables import METHOD_COLUMNS, text_of
+from hybridnav.harness.yardstick import OPTIMA
+
 if TYPE_CHECKING:
-    from hybridnav.harness.yardstick import Optimum, Yardstick
+    from collections.abc import Callable, Sequence
 
-YARDSTICKS: dict[Yardstick, tuple[Optimum, ...]] = {
-    "both": ("any-angle", "octile"),
-    "any-angle": ("any-angle",),
-    "octile": ("octile",),
-    "weighted": ("weighted",),
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.contradictions import Kind
+    from hybridnav.harness.outcome import MapQuery, Outcome
+    from hybridnav.harness.records import Record
+    from hybridnav.harness.tables import Row
+    from hybridnav.harness.yardstick import Optimum
+
+RIGHTLY, WRONGLY = '"no path", right', '"no path", wrong'
+CONSISTENCY_COLUMNS = {
+    "regions": "contradictions in checks of a map: every region is connected, and regions are "
+    "joined by edges exactly when moves join their cells, for all pairs of cells at once",
+    "plan to path": "contradictions in checked plans: a metric path leads through the regions of "
+    "the plan, arc by arc, in their order",
+    "path to plan": "contradictions in checked paths: each step between two regions has an edge",
+    "paths": "contradictions in checked paths: endpoints, steps, exact intersection with blocked "
+    "cells",
+    RIGHTLY: "pairs for which it said rightly that there is no path",
+    WRONGLY: "answers that contradict the grid on whether there is a path: no path "
+    "where there is one, or a path where there is none",
+    "bounds": "contradictions in checked answers by the optima: a length or cost below the "
+    "optimum, a bound that is broken, a claim about its own path that is wrong",
+    "without an answer": "queries that ended in an error, out of time, or with a lost process",
 }
-"""The optima that losses refer to, one table each, by the metric that is asked for."""
+"""Columns of the table of consistency, and their meaning."""
 
-OPTIMA: dict[Optimum, str] = {
-    "any-angle": "the any-angle optimum",
-    "octile": "the octile optimum",
-    "weighted": "the least cost of paths of cells",
-}
-"""The name of each optimum in captions."""
-
-_OF_LOSS = ("mean %", "95 % interval", "median %", "p95 %", "max %", "without loss %")
-_OF_COSTS = ("length mean m", "cost mean m", "gap mean %", "gap max %", "gap to cells mean %")
-
-EFFICIENCY_COLUMNS = (
-    "expansions",
-    "an expansion in cells",
-    "work in cells",
-    "query ms, median",
-    "query ms, p95",
-    "spread %",
-    "speed-up",
-    "speed-up of means",
-    "preparation s",
-    "memory MB",
-    "break-even queries",
-)
-"""Columns of the table of efficiency."""
-
-
-def loss_columns(optimum: Optimum) -> tuple[str, ...]:
-    """Return the columns of the table of losses over an optimum."""
-    losses = tuple(f"{optimum} loss {what}" for what in _OF_LOSS)
-    plan = () if optimum == "any-angle" else ("loss of the plan %",)
-    costs = _OF_COSTS if optimum == "weighted" else ()
-    return ("metric", "solved %", "by the grid %", *losses, *plan, *costs)
-
-
-def shown(column: str) -> str:
-    """Return the heading of a column in a table whose caption names the optimum."""
-    for optimum in OPTIMA:
-        column = column.removeprefix(f"{optimum} loss ")
-    return column
-
-
-MEANINGS: dict[str, str] = {
-    "method": "name of the method",
-    "maps": "number of maps",
-    "kind": "what the method is: a preset of this package, a baseline of it, a planner of others, "
-    "a class, or a graph",
-    "version": "version of the package that plans, or the hash of the file of a class",
-    "settings": "settings that differ from the usual ones",
-    "not asked": "maps that the method cannot take by a limit of its own, and the reason; they are "
-    "no fault, and it is in no table of theirs",
-    "nodes": "mean over the maps of the nodes of its graph or topological layer",
-    "edges": "mean over the maps of the edges of the same, both directions as one",
-    "metric": "metric of its paths: octile, paths of cells; any-angle, paths of points; weighted "
-    "and any-angle-weighted, the same, planned by costs",
-    "solved %": "share of the pairs of two joined cells for which it found a path of its own "
-    "without a fault",
-    "by the grid %": "share of these pairs for which the path of the grid, shortened by line of "
-    "sight, replaced one that it did not find; it counts in no other column",
+_OF_LOSS = {
     "mean %": "mean of length (or cost) over the optimum of the caption, minus 1, over the pairs "
     "that all methods solved",
     "95 % interval": "bootstrap interval of that mean, over pairs, not over maps",
@@ -80,8 +58,12 @@ MEANINGS: dict[str, str] = {
     "p95 %": "their 95th percentile",
     "max %": "the largest of them",
     "without loss %": "share of the same pairs whose loss is 0",
+}
+_OF_PLAN = {
     "loss of the plan %": "Thrun's loss: mean over the same pairs of the best path of cells inside "
     "the regions of the plan over the best of all, minus 1, whatever path the method takes there",
+}
+_OF_COSTS = {
     "length mean m": "mean length over the same pairs, metres",
     "cost mean m": "mean cost over the same pairs, metres times factors",
     "gap mean %": "mean of cost over the lower bound that the method proved, minus 1, over the "
@@ -89,6 +71,16 @@ MEANINGS: dict[str, str] = {
     "gap max %": "the largest of these gaps",
     "gap to cells mean %": "the mean gap to a proved bound on paths of cells alone, for any-angle "
     "paths; below 0 where they cost less",
+}
+_SOLVED = {
+    "metric": "metric of its paths: octile, paths of cells; any-angle, paths of points; weighted "
+    "and any-angle-weighted, the same, planned by costs",
+    "solved %": "share of the pairs of two joined cells for which it found a path of its own "
+    "without a fault",
+    "by the grid %": "share of these pairs for which the path of the grid, shortened by line of "
+    "sight, replaced one that it did not find; it counts in no other column",
+}
+EFFICIENCY_COLUMNS = {
     "expansions": "mean over the pairs that all methods solved of the things taken from the queue "
     "of a search: cells, border cells, intervals of the mesh, nodes; maps.csv has each kind by "
     "itself. They differ in price: see the next two columns",
@@ -111,18 +103,294 @@ MEANINGS: dict[str, str] = {
     "of OMPL's process and those inside packages of others",
     "break-even queries": "queries after which the longer preparation has paid off, by mean times; "
     "never without a gain",
-    "regions": "contradictions in checks of a map: every region is connected, and regions are "
-    "joined by edges exactly when moves join their cells, for all pairs of cells at once",
-    "plan to path": "contradictions in checked plans: a metric path leads through the regions of "
-    "the plan, arc by arc, in their order",
-    "path to plan": "contradictions in checked paths: each step between two regions has an edge",
-    "paths": "contradictions in checked paths: endpoints, steps, exact intersection with blocked "
-    "cells",
-    '"no path", right': "pairs for which it said rightly that there is no path",
-    '"no path", wrong': "answers that contradict the grid on whether there is a path: no path "
-    "where there is one, or a path where there is none",
-    "bounds": "contradictions in checked answers by the optima: a length or cost below the "
-    "optimum, a bound that is broken, a claim about its own path that is wrong",
-    "without an answer": "queries that ended in an error, out of time, or with a lost process",
+}
+"""Columns of the table of efficiency, and their meaning."""
+
+MEANINGS = {
+    "method": "name of the method",
+    "maps": "number of maps",
+    "nodes": "mean over the maps of the nodes of its graph or topological layer",
+    "edges": "mean over the maps of the edges of the same, both directions as one",
+    **METHOD_COLUMNS,
+    **_SOLVED,
+    **_OF_LOSS,
+    **_OF_PLAN,
+    **_OF_COSTS,
+    **EFFICIENCY_COLUMNS,
+    **CONSISTENCY_COLUMNS,
 }
 """What each column of the report holds."""
+
+DEFINITION = (
+    "Two layers are consistent when each path of one has its counterpart in the other (S. Thrun: "
+    "Learning metric-topological maps for indoor mobile robot navigation, Artificial Intelligence "
+    "99(1), 1998, pages 21-71): every plan over regions has a metric path inside them, every "
+    "metric path maps to a walk over regions, and both agree on whether there is a path. "
+    "Connectivity is computed by scipy, not by the planners. Beside these the harness checks that "
+    "paths are paths and that bounds hold. A cell reads: contradictions of checks; it is empty "
+    "where nothing was to check."
+)
+"""What the table of consistency holds."""
+
+
+def loss_columns(optimum: Optimum) -> tuple[str, ...]:
+    """Return the columns of the table of losses over an optimum."""
+    losses = (f"{optimum} loss {what}" for what in _OF_LOSS)
+    plan = () if optimum == "any-angle" else _OF_PLAN
+    return (*_SOLVED, *losses, *plan, *(_OF_COSTS if optimum == "weighted" else ()))
+
+
+def consistency_row(outcomes: Sequence[Outcome]) -> Row:
+    """Return the contradictions of one method on some maps, by kind.
+
+    Parameters
+    ----------
+    outcomes
+        Outcomes of the method, one for each map.
+
+    Returns
+    -------
+    dict
+        By column: for each kind a text "WRONG of CHECKED", empty where nothing was checked, and
+        both numbers as "KIND wrong" and "KIND checked". A record with several contradictions of a
+        kind counts once.
+    """
+    wrong: Counter[Kind] = Counter()
+    checked: Counter[Kind] = Counter()
+    rightly = 0
+    for outcome in outcomes:
+        for record in (outcome.preparation, *outcome.records):
+            reference = outcome.optimum.get(query_key(record)) if "start" in record else None
+            found = kinds_of(record, reference)
+            wrong.update(found)
+            checked.update(_checked(record, reference) | found)
+            rightly += record["status"] == "no path" and "no path" not in found
+    row: Row = {}
+    for kind in KINDS:
+        row[WRONGLY if kind == "no path" else kind] = _share(wrong[kind], checked[kind])
+        row[f"{kind} wrong"], row[f"{kind} checked"] = wrong[kind], checked[kind]
+    row[RIGHTLY] = rightly
+    row["without an answer"] = sum(outcome.failures for outcome in outcomes)
+    return row
+
+
+def kinds_of(record: Record, reference: Record | None) -> set[Kind]:
+    """Return the kinds of contradictions of a record, by the judge and by the optima."""
+    kinds: set[Kind] = set(record.get("fault_kinds", ()))
+    if record.get("faults") and not kinds:  # of a preparation, or of an older version
+        kinds.add("regions" if record["type"] == "preparation" else "paths")
+    text = None if reference is None else contradiction(record, reference)
+    return kinds if text is None else kinds | {kind_of_contradiction(text)}
+
+
+def _checked(record: Record, reference: Record | None) -> set[Kind]:
+    kinds: set[Kind] = set(record.get("checked", ()))
+    if record["type"] == "pair" and record["status"] in ANSWERED:
+        if record["status"] == "solved":
+            kinds.add("paths")
+        if reference is not None and reference["status"] in ANSWERED:
+            kinds.add("no path")
+            if record["status"] == reference["status"] == "solved":
+                kinds.add("bounds")
+    return kinds
+
+
+def _share(wrong: int, checked: int) -> str:
+    return f"{wrong:,} of {checked:,}" if checked else ""
+
+
+class _Pool:
+    """Arrays of the outcomes of one method, laid end to end: of all pairs, and of those in
+    common."""
+
+    def __init__(self, outcomes: Sequence[Outcome], common: set[MapQuery]) -> None:
+        self._outcomes = outcomes
+        self._shared = np.array([x for one in outcomes for x in one.among(common)], np.bool_)
+
+    def of(self, get: Callable[[Outcome], FloatArray]) -> FloatArray:
+        """Return an array over all pairs."""
+        parts = [get(outcome) for outcome in self._outcomes]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def shared(self, get: str | Callable[[Outcome], FloatArray]) -> FloatArray:
+        """Return an array, or the one of this name, over the pairs in common."""
+        return self.of(attrgetter(get) if isinstance(get, str) else get)[self._shared]
+
+    def mean_of(self, key: str) -> float:
+        """Return the mean over the maps of a field of the records of preparation."""
+        values = [outcome.preparation.get(key, math.nan) for outcome in self._outcomes]
+        return nanmean(np.array(values, dtype=float))
+
+
+def figures(
+    outcomes: Sequence[Outcome], references: Sequence[Outcome], common: set[MapQuery]
+) -> Row:
+    """Return the figures of one method on some maps.
+
+    Parameters
+    ----------
+    outcomes
+        Outcomes of the method, one for each map.
+    references
+        Outcomes of the reference on the same maps, in the same order.
+    common
+        The pairs over which methods are compared: losses, times and expansions are theirs.
+
+    Returns
+    -------
+    dict
+        By column, see `MEANINGS`. Nodes, memory and preparation are means over the maps. Columns
+        about costs are those of runs with costs alone; losses over an optimum that no pair has are
+        left out.
+    """
+    pool = _Pool(outcomes, common)
+    lengths = pool.of(attrgetter("lengths_m"))
+    fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
+    by_grid = int(sum(fallbacks)) if fallbacks else math.nan
+    solved, pairs = int(np.isfinite(lengths).sum()), len(lengths)
+    by_costs = any(outcome.costs for outcome in outcomes)
+    # A method that was not asked on a map says nothing of its metric there.
+    asked = [outcome for outcome in outcomes if outcome.is_asked] or outcomes
+    row: Row = {
+        "metric": asked[0].metric if asked else "",
+        "pairs": pairs,
+        "solved": solved,
+        "solved %": 100 * solved / pairs if pairs else math.nan,
+        "by the grid": by_grid,
+        "by the grid %": 100 * by_grid / pairs if pairs else math.nan,
+        "faults": sum(len(outcome.faults) for outcome in outcomes),
+        "pairs in common": int(np.isfinite(pool.shared("lengths_m")).sum()),
+        **consistency_row(outcomes),
+    }
+    for optimum in OPTIMA:
+        if optimum != "weighted" or by_costs:
+            row |= _losses(pool, optimum)
+    row["loss of the plan %"] = 100 * nanmean(pool.shared("plan_losses"))
+    if by_costs:
+        row |= {
+            "length mean m": nanmean(pool.shared("lengths_m")),
+            "cost mean m": nanmean(pool.shared("costs_m")),
+            "gap mean %": 100 * nanmean(pool.shared("gaps")),
+            "gap max %": 100 * nanquantile(pool.shared("gaps"), 1.0),
+            "gap to cells mean %": 100 * nanmean(pool.shared("grid_gaps")),
+            "gap to cells p99 %": 100 * nanquantile(pool.shared("grid_gaps"), 0.99),
+        }
+    return row | _efficiency(pool, outcomes, references)
+
+
+def _losses(pool: _Pool, optimum: Optimum) -> Row:
+    """Return the losses over one optimum: over the pairs in common, and, in one column, over all
+    that the method solved."""
+    losses = methodcaller("losses_over", optimum)
+    every, shared = pool.of(losses), pool.shared(losses)
+    summary = summarise(shared[np.isfinite(shared)])
+    low, high = (text_of(100 * end) for end in summary.mean_interval)
+    figures: Row = {
+        "mean %": 100 * summary.mean,
+        "95 % interval": f"{low} to {high}" if np.isfinite(shared).any() else "",
+        "median %": 100 * summary.median,
+        "p95 %": 100 * summary.p95,
+        "p99 %": 100 * summary.p99,
+        "max %": 100 * summary.max,
+        "without loss %": 100 * summary.share_without_loss,
+        "mean of all solved %": 100 * nanmean(every),
+    }
+    return {f"{optimum} loss {what}": value for what, value in figures.items()}
+
+
+def _efficiency(pool: _Pool, outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
+    """Return counts and times over the pairs in common, and what preparation takes."""
+    seconds, expansions = pool.shared("seconds"), pool.shared("expansions")
+    whole, of_grid = pool.shared("reference_seconds"), pool.shared("reference_expansions")
+    preparation, own = (
+        nanmean(np.array([outcome.preparation_seconds for outcome in some]))
+        for some in (outcomes, references)
+    )
+    queries = len(pool.of(attrgetter("seconds"))) / max(len(outcomes), 1)
+    counts = np.array([outcome.thrun_count for outcome in outcomes])
+    of_map = {outcome.map_name: outcome.thrun_count for outcome in references}
+    grid_counts = np.array([of_map.get(outcome.map_name, math.nan) for outcome in outcomes])
+    both = np.isfinite(seconds)
+    each = _quotient(float(np.nansum(seconds)), float(np.nansum(expansions)))
+    of_cell = _quotient(float(whole[both].sum()), float(of_grid[both].sum()))
+    return {
+        "nodes": pool.mean_of("n_nodes"),
+        "edges": pool.mean_of("n_edges"),
+        "backups": nanmean(counts),
+        "backups of the grid / backups": nanquantile(_ratio(grid_counts, counts), 0.5),
+        **{
+            column: nanmean(pool.shared(methodcaller("figure", key)))
+            for key, column in EXPANSIONS.items()
+        },
+        "expansions": nanmean(expansions),
+        "expansions of the grid / expansions": nanquantile(_ratio(of_grid, expansions), 0.5),
+        "us an expansion": 1e6 * each,
+        "an expansion in cells": _quotient(each, of_cell),
+        "work in cells": _quotient(nanmean(seconds), of_cell),
+        "query ms, median": 1e3 * nanquantile(seconds, 0.5),
+        "query ms, p95": 1e3 * nanquantile(seconds, 0.95),
+        "spread %": 100 * nanquantile(pool.shared("spreads"), 0.5),
+        "query ms, mean": 1e3 * nanmean(seconds),
+        "without refinement ms": 1e3 * nanquantile(pool.shared("coarse_seconds"), 0.5),
+        "with preparation ms": 1e3 * (nanmean(seconds) + preparation / max(queries, 1)),
+        "speed-up": nanquantile(_ratio(whole, seconds), 0.5),
+        "speed-up of means": _quotient(nanmean(whole[both]), nanmean(seconds)),
+        "preparation s": preparation,
+        "memory MB": pool.mean_of("memory_bytes") / 1e6,
+        "break-even queries": _break_even(preparation - own, nanmean(whole - seconds)),
+    }
+
+
+def _quotient(first: float, second: float) -> float:
+    """Return a quotient, NaN for a zero divisor."""
+    return first / second if second else math.nan
+
+
+def _break_even(price: float, gain: float) -> float:
+    """Return the queries after which a gain for each has paid a price, seconds both. The result is
+    infinite without a gain, and NaN if nothing is known or the method is the reference itself."""
+    if not abs(gain) > 0 or math.isnan(price):
+        return math.nan
+    return math.ceil(max(price, 0.0) / gain) if gain > 0 else math.inf
+
+
+def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return quotients, NaN for a zero divisor."""
+    quotients: FloatArray = np.divide(
+        first, second, out=np.full(len(first), math.nan), where=second > 0
+    )
+    return quotients
+
+
+def rows_of_map(study: Study, name: str) -> list[Row]:
+    """Return one row for each method on a map that was asked there."""
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
+    reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
+    common = pairs_in_common(outcomes)
+    return [
+        {"map": name, "method": outcome.label, **figures([outcome], reference, common)}
+        for outcome in outcomes
+    ]
+
+
+def rows_of_study(study: Study) -> list[Row]:
+    """Return one row for each method, over all of its maps.
+
+    One that was not asked on some of them has no losses and times here: they would be those of
+    other pairs. The rows of the maps have them.
+    """
+    references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
+    partly = not_everywhere(study.outcomes)
+    rows = []
+    for label in study.labels:
+        outcomes = [outcome for outcome in study.of_method(label) if outcome.is_asked]
+        if not outcomes:
+            continue
+        common = set() if label in partly else study.common
+        there = [references[o.map_name] for o in outcomes if o.map_name in references]
+        row: Row = {"method": label, "maps": len(outcomes)}
+        row |= figures(outcomes, there, common)
+        if label in partly:
+            row |= dict.fromkeys(EFFICIENCY_COLUMNS, math.nan)
+        rows.append(row)
+    return rows

@@ -9,15 +9,15 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study
-from hybridnav.harness.columns import OPTIMA
+from hybridnav.harness.judges import paired_difference
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import loss_of, nanmean, query_key
-from hybridnav.metrics import paired_difference
+from hybridnav.harness.yardstick import OPTIMA
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.tables import Row

@@ -14,15 +14,15 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from hybridnav.grid import CellClass
-from hybridnav.grid.runs import unique_rows
-from hybridnav.search.moves import legal_moves, moves_along
+from hybridnav._base.moves import legal_moves, moves_along
+from hybridnav.maps import CellClass
+from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]

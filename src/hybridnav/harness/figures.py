@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
 
 _CASE_WIDTH_IN = 4.0
 _CASE_DPI = 144.0

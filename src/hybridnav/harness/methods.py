@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import inspect
 import json
 import os
@@ -12,69 +11,43 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.baselines.packages import needed_package
-from hybridnav.config import Preset, load_preset
+from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.graph_method import GraphMethod
-from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.adapters import HybridMethod, OnOwnGrid
 from hybridnav.harness.names import baseline_name, class_of, source_hash
-from hybridnav.harness.own_grid import OnOwnGrid
-from hybridnav.io import load_graph
+from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav.baselines import Method, MethodResult
-    from hybridnav.costs import CostLayer
-    from hybridnav.graphs import WaypointGraph
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.baselines import Method, MethodResult
     from hybridnav.harness.names import NamedMethod
-    from hybridnav.result import Metric
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
 
 LINE_OF_SIGHT = "line-of-sight"
 """Value of `planner.smooth`; added to the names of presets that have it, as in
-`portals+line-of-sight`."""
+`octile+line-of-sight`."""
 
 BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
-    "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),
-    "grid-dijkstra": ("hybridnav.baselines.grid:GridDijkstra", {}),
-    "weighted-astar": ("hybridnav.baselines.grid:WeightedAstar", {}),
-    "hpa-star": ("hybridnav.baselines.hpa:HpaStar", {}),
-    "hpa-star-raw": ("hybridnav.baselines.hpa:HpaStar", {"smooth": False}),
-    "hpa-star-lines": ("hybridnav.baselines.hpa:HpaStar", {"line_cells": 1000}),
-    "simple-graph": ("hybridnav.baselines.simple_graph:SimpleGraphPyramid", {}),
-    "exact-overlay": ("hybridnav.baselines.overlay:ExactOverlay", {}),
-    "thrun": ("hybridnav.baselines.thrun:ThrunMap", {}),
+    "grid-astar": ("hybridnav.harness.baselines.grid:GridAstar", {}),
+    "grid-dijkstra": ("hybridnav.harness.baselines.grid:GridDijkstra", {}),
+    "weighted-astar": ("hybridnav.harness.baselines.grid:WeightedAstar", {}),
+    "hpa-star": ("hybridnav.harness.baselines.hpa:HpaStar", {}),
+    "hpa-star-raw": ("hybridnav.harness.baselines.hpa:HpaStar", {"smooth": False}),
+    "hpa-star-lines": ("hybridnav.harness.baselines.hpa:HpaStar", {"line_cells": 1000}),
+    "simple-graph": ("hybridnav.harness.baselines.simple_graph:SimpleGraphPyramid", {}),
+    "thrun": ("hybridnav.harness.baselines.thrun:ThrunMap", {}),
 }
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a
 `TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
 as `module:class`."""
 
-RIVALS: dict[str, tuple[str, dict[str, Any]]] = {
-    "extremitypathfinder": ("hybridnav.baselines.rivals_any_angle:ExtremityPathfinder", {}),
-    "nano-astar": ("hybridnav.baselines.rivals:NanoAstar", {}),
-    "networkx": ("hybridnav.baselines.rivals:Networkx", {}),
-    "ompl-whole": ("hybridnav.baselines.rivals_any_angle:OmplWhole", {}),
-    "ompl-whole-prmstar": (
-        "hybridnav.baselines.rivals_any_angle:OmplWhole",
-        {"planner": "PRMstar"},
-    ),
-    "pyastar2d": ("hybridnav.baselines.rivals:Pyastar2d", {}),
-    "pyroutingkit": ("hybridnav.baselines.rivals:RoutingKit", {}),
-    "tcod": ("hybridnav.baselines.rivals:Tcod", {}),
-}
-"""Planners of others, named like baselines."""
-
-_PACKAGES = {"nano-astar": "nano_astar"}
-"""Packages of rivals that have another name than the rival."""
-
-ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
-
-
-_KNOWN = BASELINES | RIVALS
+ON_PLACES = frozenset({"simple-graph"})
 
 
 @dataclass(frozen=True)
@@ -87,8 +60,8 @@ class MethodSpec:
     """The preset's sections; None for a baseline."""
     pyramid: dict[str, Any] = field(default_factory=dict)
     """merge_distance_m, linkage, seed: of the places that it plans on."""
-    graph: WaypointGraph | None = None
-    """The graph whose routes it follows, if that is all that it does."""
+    graph: Any = None
+    """The `WaypointGraph` whose routes it follows, if that is all that it does; None for others."""
     clear_edges_only: bool = False
     """Whether edges of the graph that the robot cannot follow are left out."""
     factory: str = ""
@@ -212,11 +185,9 @@ def baseline_spec(
         When there is none of that name, or its class cannot be imported.
     """
     if ":" not in name:
-        name = baseline_name(name, _KNOWN)
-    if name in RIVALS:
-        _require(name)
-    class_of(_KNOWN.get(name, (name, {}))[0])
-    spec = MethodSpec(name, None, source="" if name in _KNOWN else source_hash(name))
+        name = baseline_name(name, BASELINES)
+    class_of(BASELINES.get(name, (name, {}))[0])
+    spec = MethodSpec(name, None, source="" if name in BASELINES else source_hash(name))
     if named is not None and (named.name or named.settings or named.grid):
         settings = named.settings
         spec = replace(spec, name=named.name or name, factory=name, settings=settings)
@@ -224,24 +195,6 @@ def baseline_spec(
         return spec
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
     return replace(spec, pyramid=pyramid | _given(merge_distance_m, seed))
-
-
-def rival_version(name: str) -> str:
-    """Return package and version of a planner of others; empty for other methods."""
-    if name not in RIVALS:
-        return ""
-    package = "ompl" if name.startswith("ompl") else name
-    return f"{package} {importlib.metadata.version(package)}"
-
-
-def _require(rival: str) -> None:
-    """Refuse to continue without the package of a rival."""
-    if rival.startswith("ompl"):
-        from hybridnav.refine.ompl import require_ompl  # noqa: PLC0415 - as above
-
-        require_ompl()
-    else:
-        needed_package(_PACKAGES.get(rival, rival))
 
 
 def named_spec(
@@ -269,12 +222,13 @@ def named_spec(
     else:
         if method.settings:
             raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
-        spec = graph_spec(load_graph(method.source), clear_edges_only=clear_edges_only)
+        spec = graph_spec(method.source, clear_edges_only=clear_edges_only)
     return replace(spec, name=method.name or spec.name, grid=method.grid)
 
 
-def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> MethodSpec:
-    """Return the method that follows a graph; see `GraphMethod`."""
+def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:
+    """Return the method that follows a graph, or that of a file; see `ext.graphs.GraphMethod`."""
+    graph = extension("methods", "graph").checked_graph(given)
     name = f"graph {graph.name}" + (" (clear edges)" if clear_edges_only else "")
     return MethodSpec(name, None, graph=graph, clear_edges_only=clear_edges_only)
 
@@ -330,9 +284,11 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         method = HybridMethod(topology, preset, costs)
     elif spec.graph is not None:
         costs = None
-        method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
+        method = extension("methods", "graph").GraphMethod(
+            grid, spec.graph, clear_edges_only=spec.clear_edges_only
+        )
     else:
-        path, options = _KNOWN.get(spec.made_by, (spec.made_by, {}))
+        path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
         made_of = class_of(path)
         options = options | spec.settings
         if not _takes(made_of, "costs"):

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.own_grid import checked_grid
+from hybridnav.harness.adapters import checked_grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import ModuleType
 
-    from hybridnav._typing import PathLike
+    from hybridnav._base.typing import PathLike
 
 ALIASES = {
     "a-star": "grid-astar",
@@ -34,6 +34,18 @@ ALIASES = {
 }
 """Other names of baselines, as the literature writes them, in small letters, "-" for blanks and
 "-star" for "*"."""
+
+_RIVALS = {
+    "extremitypathfinder": "rivals_any_angle:ExtremityPathfinder",
+    "nano-astar": "rivals:NanoAstar",
+    "networkx": "rivals:Networkx",
+    "ompl-whole": "rivals_any_angle:OmplWhole",
+    "ompl-whole-prmstar": "rivals_any_angle:OmplWhole with settings: {planner: PRMstar}",
+    "pyastar2d": "rivals:Pyastar2d",
+    "pyroutingkit": "rivals:RoutingKit",
+    "tcod": "rivals:Tcod",
+}
+"""Planners of others, which were baselines by these names: their classes in `benchmarks`."""
 
 _KEYS = ("name", "baseline", "class", "preset", "graph", "settings", "grid")
 _SOURCES = _KEYS[1:5]
@@ -77,6 +89,11 @@ def baseline_name(name: str, known: Iterable[str]) -> str:
     names = list(known)
     if found in names:
         return found
+    if found in _RIVALS:
+        raise InvalidValueError(
+            f"baseline {found} is no longer in the package: in a checkout write "
+            f"benchmarks.{_RIVALS[found]}, or give a class of your own as module:class"
+        )
     near = difflib.get_close_matches(found, [*names, *ALIASES], n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     raise InvalidValueError(

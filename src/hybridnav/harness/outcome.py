@@ -19,11 +19,13 @@ from hybridnav.harness.contradictions import (
     is_any_angle,
     octile_optimum_m,
 )
-from hybridnav.harness.paths import path_steps
-from hybridnav.metrics import thrun_count
+from hybridnav.harness.judges import thrun_count
+from hybridnav.harness.records import path_steps
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.harness.records import Record
     from hybridnav.harness.yardstick import Optimum, Yardstick
 
@@ -109,83 +111,91 @@ class Outcome:
         return str(self.preparation.get("costs", ""))
 
     @cached_property
-    def optima_m(self) -> FloatArray:
-        """Lengths of the shortest path of cells."""
-        return np.array([octile_optimum_m(record) for record in self.references], dtype=float)
+    def frame(self) -> dict[str, FloatArray]:
+        """The arrays by name; each is an attribute, too."""
+        return self._lengths | self._losses | self._efforts
 
     @cached_property
-    def weighted_optima_m(self) -> FloatArray:
-        """Least costs of paths of cells; NaN in a run without costs."""
-        known = [record.get("weighted_m", math.nan) for record in self.references]
-        return np.array(known, dtype=float)
+    def _lengths(self) -> dict[str, FloatArray]:
+        """What was found and the optima: of the method's own paths without faults, of the grid's
+        paths that stand in for them, and of all."""
+        figure, own = self.figure, [record or {} for record in self._matched]
+        of_grid = np.nan_to_num(figure("by_grid")) > 0
+        faulty = np.array([bool(record.get("faults")) for record in own], dtype=np.bool_)
+        lines = np.array([is_any_angle(record) for record in own], dtype=np.bool_)
+        octile = np.array([octile_optimum_m(record) for record in self.references], dtype=float)
+        weighted, any_angle = self._known("weighted_m"), self._known("any_angle_m")
+        # An any-angle path has no loss over the octile optimum.
+        of_cells = np.where(lines, math.nan, octile)
+        best = {
+            "weighted": weighted,
+            "octile": of_cells,
+            "any-angle": any_angle,
+            "both": np.where(lines, any_angle, octile),
+        }
+        found = {"lengths_m": figure("length_m"), "costs_m": figure("cost_m")}
+        judged = found["costs_m" if self.yardstick == "weighted" else "lengths_m"]
+        missed = of_grid | faulty
+        return {
+            **{name: np.where(missed, math.nan, values) for name, values in found.items()},
+            "judged_m": np.where(missed, math.nan, judged),
+            "fallback_m": np.where(of_grid & ~faulty, judged, math.nan),
+            "best_m": best[self.yardstick],
+            "optima_m": octile,
+            "octile_optima_m": of_cells,
+            "any_angle_optima_m": any_angle,
+            "weighted_optima_m": weighted,
+        }
 
     @cached_property
-    def any_angle_optima_m(self) -> FloatArray:
-        """Lengths of the any-angle optimum between the same endpoints; NaN if paths may cut
-        corners."""
-        known = [record.get("any_angle_m", math.nan) for record in self.references]
-        return np.array(known, dtype=float)
+    def _losses(self) -> dict[str, FloatArray]:
+        """Lengths, or costs, over what they are compared with, minus one."""
+        of, figure = self._lengths, self.figure
+        lengths, costs = of["lengths_m"], of["costs_m"]
+        of_all = of["weighted_optima_m" if self.costs else "optima_m"]
+        return {
+            "losses": loss_of(of["judged_m"], of["best_m"]),
+            "octile_losses": loss_of(lengths, of["octile_optima_m"]),
+            "any_angle_losses": loss_of(lengths, of["any_angle_optima_m"]),
+            "weighted_losses": loss_of(costs, of["weighted_optima_m"]),
+            "fallback_losses": loss_of(of["fallback_m"], of["best_m"]),
+            # Thrun's: the best path of cells inside the regions of the plan, over the best of all.
+            "plan_losses": loss_of(figure("plan_optimum_m"), of_all),
+            "gaps": _gaps(costs, figure("cost_lower_bound_m")),
+            # Below 0 for any-angle paths that cost less than the bound on paths of cells.
+            "grid_gaps": loss_of(costs, figure("cost_grid_bound_m")),
+        }
 
     @cached_property
-    def _octile_optima_m(self) -> FloatArray:
-        """Octile optima; NaN for any-angle paths, which have no loss over them."""
-        lines = [bool(record and is_any_angle(record)) for record in self._matched]
-        return np.where(lines, math.nan, self.optima_m)
+    def _efforts(self) -> dict[str, FloatArray]:
+        """Times, and the things taken from the queues of searches: none of a method that counts
+        none."""
+        figure, own = self.figure, [record or {} for record in self._matched]
+        solved = np.isfinite(self._lengths["lengths_m"])
+        seconds, asked = figure("seconds"), figure("asked_seconds")
+        answered = np.where(np.isfinite(asked), asked, seconds)
+        refined = np.array([(one.get("stages") or {}).get("refine", math.nan) for one in own])
+        kinds = np.array([figure(key) for key in EXPANSIONS])
+        counted = solved & (np.nansum(kinds) > 0)
+        return {
+            "expansions": np.where(counted, np.nansum(kinds, axis=0), math.nan),
+            "reference_expansions": sum((self._known(key, 0) for key in EXPANSIONS), 0.0),
+            "seconds": np.where(solved, seconds, math.nan),
+            "reference_seconds": self._known("seconds"),
+            # Of the answers themselves, without those in the metric layer.
+            "coarse_seconds": np.where(solved, answered, math.nan) - refined,
+            "spreads": np.array([_spread(one.get("repeats") or ()) for one in own], dtype=float),
+        }
 
-    @cached_property
-    def best_m(self) -> FloatArray:
-        """Reference lengths of the losses, or costs."""
-        if self.yardstick == "weighted":
-            return self.weighted_optima_m
-        if self.yardstick == "octile":
-            return self._octile_optima_m
-        if self.yardstick == "any-angle":
-            return self.any_angle_optima_m
-        lines = np.isnan(self._octile_optima_m)
-        return np.where(lines, self.any_angle_optima_m, self.optima_m)
+    def __getattr__(self, name: str) -> FloatArray:
+        if name.startswith("_") or name in vars(type(self)) or name not in (frame := self.frame):
+            raise AttributeError(f"an outcome has no {name}")
+        return frame[name]
 
-    @cached_property
-    def losses(self) -> FloatArray:
-        """Lengths, or costs, over those of the reference, minus one. An any-angle path may cost
-        less than the cheapest path of cells: then its loss is negative."""
-        return loss_of(self.judged_m, self.best_m)
-
-    @property
-    def judged_m(self) -> FloatArray:
-        """What losses are computed from: the costs of the method's own paths, or their lengths."""
-        return self.costs_m if self.yardstick == "weighted" else self.lengths_m
-
-    @cached_property
-    def weighted_losses(self) -> FloatArray:
-        """Cost over the least cost of paths of cells, minus one, for paths in any metric."""
-        return loss_of(self.costs_m, self.weighted_optima_m)
-
-    @cached_property
-    def gaps(self) -> FloatArray:
-        """Proved distances from the optimum: cost over the proved lower bound on costs, minus one;
-        NaN without costs or bound."""
-        bounds = self.figure("cost_lower_bound_m")
-        gaps: FloatArray = np.divide(
-            self.costs_m, bounds, out=np.full(len(bounds), math.nan), where=bounds > 0
-        )
-        gaps -= 1
-        return np.where(gaps <= SLACK, 0.0, gaps)
-
-    @cached_property
-    def grid_gaps(self) -> FloatArray:
-        """Costs over the proved lower bounds on paths of cells, minus one; below 0 for any-angle
-        paths that cost less; NaN without such a bound."""
-        return loss_of(self.costs_m, self.figure("cost_grid_bound_m"))
-
-    @cached_property
-    def octile_losses(self) -> FloatArray:
-        """Length over the octile optimum, minus one; NaN for any-angle paths."""
-        return loss_of(self.lengths_m, self._octile_optima_m)
-
-    @cached_property
-    def any_angle_losses(self) -> FloatArray:
-        """Lengths over the any-angle optimum, minus one, for paths in any metric."""
-        return loss_of(self.lengths_m, self.any_angle_optima_m)
+    def _known(self, key: str, missing: float = math.nan) -> FloatArray:
+        """Return one number of each record of the reference."""
+        known = (record.get(key) for record in self.references)
+        return np.array([missing if value is None else value for value in known], dtype=float)
 
     @cached_property
     def solved_keys(self) -> set[MapQuery]:
@@ -195,18 +205,7 @@ class Outcome:
 
     def losses_over(self, optimum: Optimum) -> FloatArray:
         """Return lengths, or with "weighted" costs, over an optimum, minus one."""
-        if optimum == "weighted":
-            return self.weighted_losses
-        return self.octile_losses if optimum == "octile" else self.any_angle_losses
-
-    @cached_property
-    def expansions(self) -> FloatArray:
-        """Things taken from the queues of the searches, of all kinds; NaN without a path, and for a
-        method that counts none."""
-        kinds = np.array([self.figure(key) for key in EXPANSIONS])
-        if not np.nansum(kinds) > 0:
-            return np.full(len(self.references), math.nan)
-        return np.where(np.isfinite(self.lengths_m), np.nansum(kinds, axis=0), math.nan)
+        return self.frame[f"{optimum.replace('-', '_')}_losses"]
 
     def among(self, pairs: set[MapQuery]) -> BoolArray:
         """Return whether each pair is one of some."""
@@ -214,90 +213,11 @@ class Outcome:
         return np.array(mine, dtype=np.bool_)
 
     @cached_property
-    def lengths_m(self) -> FloatArray:
-        """Lengths of the method's own paths without faults."""
-        return np.where(self._by_grid, math.nan, self._sound("length_m"))
-
-    @cached_property
-    def costs_m(self) -> FloatArray:
-        """Costs of the same paths; NaN in a run without costs."""
-        return np.where(self._by_grid, math.nan, self._sound("cost_m"))
-
-    @cached_property
-    def fallback_losses(self) -> FloatArray:
-        """Loss of the grid's paths that stand in for the method's own."""
-        key = "cost_m" if self.yardstick == "weighted" else "length_m"
-        return loss_of(np.where(self._by_grid, self._sound(key), math.nan), self.best_m)
-
-    @cached_property
     def by_grid(self) -> float:
         """Number of paths that are the grid's, because the method found none; NaN for a method
         without such a fallback."""
-        counted = [(record or {}).get("by_grid") for record in self._matched]
-        return math.nan if all(one is None for one in counted) else float(self._by_grid.sum())
-
-    @cached_property
-    def _by_grid(self) -> BoolArray:
-        return np.nan_to_num(self.figure("by_grid")) > 0
-
-    def _sound(self, key: str) -> FloatArray:
-        """Return one number of each path without a fault."""
-        faulty = [bool(record and record.get("faults")) for record in self._matched]
-        return np.where(faulty, math.nan, self.figure(key))
-
-    @cached_property
-    def plan_losses(self) -> FloatArray:
-        """Thrun's loss of the plan: the best path of cells inside its regions, over the best of
-        all, by length or, in a run with costs, by cost."""
-        best = self.weighted_optima_m if self.costs else self.optima_m
-        return loss_of(self.figure("plan_optimum_m"), best)
-
-    @cached_property
-    def seconds(self) -> FloatArray:
-        """Wall-clock seconds of each query that the method solved without a fault."""
-        return np.where(np.isfinite(self.lengths_m), self.figure("seconds"), math.nan)
-
-    @cached_property
-    def reference_seconds(self) -> FloatArray:
-        """Wall-clock seconds of the reference on the same pairs."""
-        return np.array([record["seconds"] for record in self.references], dtype=float)
-
-    @cached_property
-    def reference_expansions(self) -> FloatArray:
-        """Expansions of the reference on the same pairs."""
-        counts = [sum(record.get(key) or 0 for key in EXPANSIONS) for record in self.references]
-        return np.array(counts, dtype=float)
-
-    @cached_property
-    def coarse_seconds(self) -> FloatArray:
-        """Seconds of the answers themselves, without those in the metric layer."""
-        asked = np.where(
-            np.isfinite(self.figure("asked_seconds")),
-            self.figure("asked_seconds"),
-            self.figure("seconds"),
-        )
-        return np.where(np.isfinite(self.lengths_m), asked, math.nan) - self.refine_seconds
-
-    @cached_property
-    def spreads(self) -> FloatArray:
-        """Longest minus shortest time of the repeats of each pair, over their median."""
-        spreads = []
-        for record in self._matched:
-            times = (record or {}).get("repeats") or ()
-            known = len(times) > 1
-            spreads.append(
-                (max(times) - min(times)) / float(np.median(times)) if known else math.nan
-            )
-        return np.array(spreads, dtype=float)
-
-    @cached_property
-    def refine_seconds(self) -> FloatArray:
-        """Seconds of these queries in the metric layer."""
-        return self._stage("refine")
-
-    def _stage(self, name: str) -> FloatArray:
-        stages = ((record or {}).get("stages") or {} for record in self._matched)
-        return np.array([stage.get(name, math.nan) for stage in stages], dtype=float)
+        known = [record for record in self._matched if record and record.get("by_grid") is not None]
+        return float(sum(record["by_grid"] for record in known)) if known else math.nan
 
     @property
     def preparation_seconds(self) -> float:
@@ -362,6 +282,18 @@ def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
     loss = lengths / best - 1
     rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -ANY_ANGLE_SLACK), 0.0, loss)
     return rounded
+
+
+def _gaps(costs: FloatArray, bounds: FloatArray) -> FloatArray:
+    """Return costs over proved lower bounds on them, minus one; NaN without costs or bound."""
+    nothing = np.full(len(bounds), math.nan)
+    gaps: FloatArray = np.divide(costs, bounds, out=nothing, where=bounds > 0) - 1
+    return np.where(gaps <= SLACK, 0.0, gaps)
+
+
+def _spread(times: Sequence[float]) -> float:
+    """Return the longest minus the shortest of some times, over their median."""
+    return (max(times) - min(times)) / float(np.median(times)) if len(times) > 1 else math.nan
 
 
 def nanmean(values: FloatArray) -> float:

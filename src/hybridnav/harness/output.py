@@ -2,24 +2,50 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from hybridnav._files import replace_file, without_controls
-from hybridnav.harness.ahead import ahead_of_presets
-from hybridnav.harness.analysis import Study, load_study
-from hybridnav.harness.columns import EFFICIENCY_COLUMNS, OPTIMA, YARDSTICKS, loss_columns, shown
-from hybridnav.harness.kinds import CONSISTENCY_COLUMNS
-from hybridnav.harness.method_table import METHOD_COLUMNS, rows_of_methods
-from hybridnav.harness.report import render_report
-from hybridnav.harness.rows import rows_of_map, rows_of_study
-from hybridnav.harness.sections import failures_of, report_of, with_values
-from hybridnav.harness.tables import Row, to_csv, to_markdown
+import numpy as np
+
+from hybridnav._base.files import replace_file, without_controls
+from hybridnav.harness.analysis import Study, load_study, pairs_in_common
+from hybridnav.harness.cases import cases_of, counter_examples
+from hybridnav.harness.columns import (
+    CONSISTENCY_COLUMNS,
+    DEFINITION,
+    EFFICIENCY_COLUMNS,
+    MEANINGS,
+    loss_columns,
+    rows_of_map,
+    rows_of_study,
+)
+from hybridnav.harness.judges import distance_buckets
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
+from hybridnav.harness.report import MapSection, ReportData, render_report
+from hybridnav.harness.tables import (
+    METHOD_COLUMNS,
+    Table,
+    ahead_of_presets,
+    markdown_of,
+    rows_of_methods,
+    table_of,
+    to_csv,
+    with_values,
+)
+from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from hybridnav.harness.yardstick import Yardstick
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.harness.cases import CaseKey
+    from hybridnav.harness.tables import Row
+    from hybridnav.harness.yardstick import Optimum, Yardstick
+
+_EFFICIENCY = "Efficiency"
+_BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (pairs)"
 
 
 def write_outputs(
@@ -69,40 +95,233 @@ def write_outputs(
 def markdown(overall: Sequence[Row], study: Study) -> str:
     """Return the tables of all maps together, one for consistency, one for the losses over each
     optimum, one for efficiency."""
-    found, checked = len(study.faults), study.any_angle_checked
+    checked = study.any_angle_checked
+    consistency, *others = _tables(study, overall)
     text = (
-        f"## Consistency\n\n{study.checks:,} answers checked, {found} counter-examples, "
-        f"{study.failures} queries without an answer."
+        f"## Consistency\n\n{study.checks:,} answers checked, {len(study.faults)} "
+        f"counter-examples, {study.failures} queries without an answer."
         f"{f' Checked any-angle: {checked}.' if checked else ''}\n\n"
-        f"{_table(overall, CONSISTENCY_COLUMNS)}\n"
+        f"{markdown_of(consistency.columns, consistency.rows)}\n"
     )
-    text += f"## Methods\n\n{_table(rows_of_methods(study), METHOD_COLUMNS)}\n"
+    methods = _methods(study)
+    text += f"## Methods\n\n{markdown_of(methods.columns, methods.rows)}\n"
     failures = failures_of(study)
     if failures:
         text += "## Methods without answers\n\n"
     for reason, trace in failures:
         text += f"* {reason}\n\n" + (f"```text\n{trace.rstrip()}\n```\n\n" if trace else "")
-    for optimum in YARDSTICKS[study.metric]:
-        rows = with_values(overall, f"{optimum} loss mean %")
-        if rows:
-            columns = loss_columns(optimum)
-            text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, columns)}\n"
-            text += _note(rows, columns, study)
-    text += "".join(f"{warning}\n\n" for warning in study.warnings)
-    timed = any(with_values(overall, column) for column in EFFICIENCY_COLUMNS)
-    if timed:
-        text += f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}\n"
-        text += _note(overall, EFFICIENCY_COLUMNS, study)
+    warnings = "".join(f"{warning}\n\n" for warning in study.warnings)
+    for table in others:
+        # Warnings are about times, so they stand in front of the table that has them.
+        text += warnings if table.caption == _EFFICIENCY else ""
+        text += f"## {table.caption}\n\n{markdown_of(table.columns, table.rows)}\n"
+        text += f"{table.note}\n\n" if table.note else ""
+    text += "" if any(table.caption == _EFFICIENCY for table in others) else warnings
     return without_controls(text.rstrip("\n") + "\n")
 
 
-def _note(rows: Sequence[Row], columns: Sequence[str], study: Study) -> str:
-    note = ahead_of_presets(rows, columns, study.presets)
-    return f"{note}\n\n" if note else ""
+def report_of(
+    study: Study,
+    title: str,
+    overall: Sequence[Row],
+    by_map: dict[str, list[Row]],
+    *,
+    first: int = 1,
+) -> ReportData:
+    """Return the contents of the report.
+
+    Parameters
+    ----------
+    study
+        The study.
+    title
+        Title of the report.
+    overall, by_map
+        Rows of all maps together, and of each map.
+    first
+        Number of the first section, in a report that has sections of other studies before it.
+
+    Returns
+    -------
+    ReportData
+        With a section of all maps together only where there are several.
+    """
+    drawn: dict[CaseKey, str] = {}
+    maps = [
+        _section(study, name, by_map[name], number, drawn)
+        for number, name in enumerate(study.maps, start=first)
+    ]
+    together = _tables(study, overall) if len(maps) > 1 else []
+    methods = _methods(study)
+    facts = [
+        *_machines(study).items(),
+        ("maps", str(len(study.maps))),
+        ("methods", ", ".join(study.labels)),
+        *([("costs", study.costs)] if study.costs else []),
+        ("losses refer to", REFERS_TO[study.metric]),
+        ("pairs", _pairs_text(study)),
+        *study.circumstances.facts,
+        ("queries without an answer", f"{study.failures:,}"),
+        *([("checked any-angle", checked)] if (checked := study.any_angle_checked) else []),
+    ]
+    labels = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
+    several = labels if together else {}
+    used = dict.fromkeys(
+        column
+        for table in [methods, *together, *(t for m in maps for t in m.tables)]
+        for column in table.columns
+    )
+    return ReportData(
+        title=title,
+        facts=facts,
+        faults=counter_examples(study, drawn),
+        n_faults=len(study.faults),
+        checks=study.checks,
+        methods=methods,
+        overall=together,
+        maps=maps,
+        failures=failures_of(study),
+        warnings=study.warnings,
+        definition=DEFINITION,
+        meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
+        overall_losses={label: _losses(study.of_method(label), study) for label in several},
+        overall_times_ms={label: _median_ms(study.of_method(label), study) for label in several},
+        metric_of={
+            outcome.label: outcome.metric for outcome in study.outcomes if study.metric == "both"
+        },
+    )
 
 
-def _table(rows: Sequence[Row], columns: Sequence[str]) -> str:
-    """Return rows as Markdown without columns that are empty."""
-    kept = ["method", *(column for column in columns if with_values(rows, column))]
-    renamed = [{shown(column): row.get(column, "") for column in kept} for row in rows]
-    return to_markdown(renamed, [shown(column) for column in kept])
+def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
+    """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
+    for each method on a map, over the pairs that all methods solved."""
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
+    common = pairs_in_common(outcomes)
+    rows = []
+    for outcome in outcomes:
+        buckets = distance_buckets(outcome.optima_m)
+        losses = np.where(outcome.among(common), outcome.losses_over(optimum), math.nan)
+        row: Row = {"method": outcome.label}
+        for at, label in enumerate(buckets.labels):
+            inside = losses[(buckets.indices == at) & np.isfinite(losses)]
+            if len(inside):
+                row[f"{label} ({len(inside)})"] = 100 * nanmean(inside)
+        if len(row) > 1:
+            rows.append(row)
+    return rows
+
+
+def failures_of(study: Study) -> list[tuple[str, str]]:
+    """Return for each method and map with queries without an answer the reason of the first, and
+    its traceback, empty for none."""
+    found = []
+    for outcome in study.outcomes:
+        record = outcome.failure
+        if record is not None:
+            reason = record.get("error", record["status"])
+            what = "preparation" if record["type"] == "preparation" else "a query"
+            text = (
+                f"{outcome.map_name}, {outcome.label}: {outcome.failures:,} queries without an "
+                f"answer; {what}: {reason}"
+            )
+            found.append((text, str(record.get("traceback", ""))))
+    return found
+
+
+def _pairs_text(study: Study) -> str:
+    """Return the number of pairs, and how many of them all methods solved."""
+    asked = sum(len(outcome.references) for outcome in study.of_method(REFERENCE))
+    text = f"{asked:,} of joined cells, of which all methods solved {len(study.common):,}"
+    shares = {
+        label: sum(len(outcome.solved_keys) for outcome in study.of_method(label))
+        for label in study.labels
+    }
+    fewest = min((label for label in shares if shares[label]), key=shares.__getitem__, default="")
+    if fewest and shares[fewest] < asked:
+        text += f"; the fewest, {shares[fewest]:,}, {fewest}"
+    return text
+
+
+def _machines(study: Study) -> dict[str, str]:
+    """Return versions and host of the runs, as recorded; several if they differ."""
+    found: dict[str, dict[str, None]] = {}
+    for outcome in study.outcomes:
+        for key, value in outcome.preparation.get("environment", {}).items():
+            found.setdefault(key, {})[value] = None
+    return {key: ", ".join(values) for key, values in found.items()}
+
+
+def _methods(study: Study) -> Table:
+    return table_of(rows_of_methods(study), METHOD_COLUMNS, "Versions and settings")
+
+
+def _tables(study: Study, rows: Sequence[Row]) -> list[Table]:
+    """Return the tables of Thrun's three criteria: one of losses over each optimum."""
+    presets = study.presets
+    tables = [table_of(rows, CONSISTENCY_COLUMNS, "Consistency")]
+    for optimum in YARDSTICKS[study.metric]:
+        known = with_values(rows, f"{optimum} loss mean %")
+        if known:
+            columns = loss_columns(optimum)
+            note = ahead_of_presets(known, columns, presets)
+            tables.append(table_of(known, columns, f"Loss over {OPTIMA[optimum]}", note))
+    timed = any(with_values(rows, column) for column in EFFICIENCY_COLUMNS)
+    if timed:
+        note = ahead_of_presets(rows, EFFICIENCY_COLUMNS, presets)
+        tables.append(table_of(rows, EFFICIENCY_COLUMNS, _EFFICIENCY, note))
+    return tables
+
+
+def _section(
+    study: Study, name: str, rows: list[Row], number: int, drawn: dict[CaseKey, str]
+) -> MapSection:
+    """Return the section of a map; the anchors of its pictures are added to `drawn`."""
+    outcomes = study.of_map(name)
+    charted = [outcome for outcome in _drawn(study, outcomes) if outcome.is_asked]
+    first = outcomes[0].preparation
+    shape = first.get("shape", [0, 0])
+    tables = _tables(study, rows)
+    for optimum in YARDSTICKS[study.metric]:
+        distance = _rows_by_distance(study, name, optimum)
+        columns = [key for row in distance for key in row if key != "method"]
+        if columns:
+            caption = _BY_DISTANCE.format(OPTIMA[optimum])
+            tables.append(table_of(distance, list(dict.fromkeys(columns)), caption))
+    cases = [case for outcome in outcomes for case in cases_of(outcome)]
+    for at, (key, _) in enumerate(cases, start=1):
+        drawn.setdefault(key, f"case-{number}-{at}")
+    return MapSection(
+        name=name,
+        facts=[
+            ("size", f"{shape[0]} x {shape[1]} cells of {first.get('resolution_m', 0):g} m"),
+            ("free cells", f"{first.get('free_cells', 0):,}"),
+            ("robot radius", f"{first.get('robot_radius_m', 0):g} m"),
+            ("SHA-256", str(first["map_sha"])[:16]),
+        ],
+        tables=tables,
+        losses={outcome.label: _losses([outcome], study) for outcome in charted},
+        times_ms={outcome.label: _median_ms([outcome], study) for outcome in charted},
+        worst=[case for _, case in cases],
+    )
+
+
+def _median_ms(outcomes: Sequence[Outcome], study: Study) -> float:
+    """Return the median time of a method over the pairs that all methods solved."""
+    parts = [outcome.seconds[outcome.among(study.common)] for outcome in outcomes]
+    return 1e3 * nanquantile(np.concatenate(parts), 0.5) if parts else math.nan
+
+
+def _losses(outcomes: Sequence[Outcome], study: Study) -> FloatArray:
+    """Return the losses of a method over the pairs that all methods solved."""
+    parts = [np.where(o.among(study.common), o.losses, math.nan) for o in outcomes]
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
+    """Return the methods for charts, each with those that its losses are compared with."""
+    if study.metric == "octile":
+        return [outcome for outcome in outcomes if not outcome.is_any_angle]
+    others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
+    if study.metric == "both" and all(outcome.metric == "any-angle" for outcome in others):
+        return others or outcomes
+    return outcomes

@@ -9,15 +9,15 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.grid.runs import unique_rows
+from hybridnav.maps import CellClass
+from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.io.movingai import Scenario
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.files.movingai import Scenario
 
 Cell = tuple[int, int]
 Kind = Literal["sampled", "across", "lattice", "scenario"]

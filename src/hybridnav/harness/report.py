@@ -10,35 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, StrictUndefined
 
-from hybridnav.errors import InvalidValueError, brief
-
 if TYPE_CHECKING:
     from jinja2 import Template
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.harness.tables import Table
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of texts."""
-
-    columns: list[str]
-    rows: list[list[str]]
-    caption: str
-    numeric: frozenset[int] = frozenset()
-    """Indices of the columns that are aligned to the right."""
-    note: str = ""
-    """A sentence below it."""
-
-    def __post_init__(self) -> None:
-        for row in self.rows:
-            if len(row) != len(self.columns):
-                raise InvalidValueError(
-                    f"table {brief(self.caption)}: a row has {len(row)} cells, "
-                    f"expected {len(self.columns)}"
-                )
 
 
 @dataclass(frozen=True)

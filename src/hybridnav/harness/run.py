@@ -8,15 +8,11 @@ import shlex
 import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
-from hybridnav._files import MODEL_SUFFIX
-from hybridnav._progress import no_progress
-from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
+from hybridnav._base.files import MODEL_SUFFIX
+from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs import WaypointGraph
-from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.checks import checked_type
 from hybridnav.harness.contradictions import ANSWERED, TOO_SLOW
 from hybridnav.harness.methods import (
     REFERENCE,
@@ -35,28 +31,23 @@ from hybridnav.harness.pairs import (
     scenario_pairs,
 )
 from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile, read_records
-from hybridnav.harness.scenes import (
-    GivenCosts,
-    MapSpec,
-    clear_scenes,
-    read_scene,
-    text_of_costs,
-)
+from hybridnav.harness.scenes import GivenCosts, MapSpec, clear_scenes, read_scene, text_of_costs
 from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
-from hybridnav.io import load_graph
-from hybridnav.io.movingai import read_scenarios
+from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps.files.movingai import read_scenarios
+from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from hybridnav._progress import Progress
-    from hybridnav._typing import PathLike
-    from hybridnav.config import Preset
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import PathLike
     from hybridnav.harness.names import NamedMethod
     from hybridnav.harness.records import Record
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import Preset
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""
@@ -82,7 +73,7 @@ class RunSettings:
     maps: tuple[str, ...]
     presets: tuple[str | Preset, ...] = ("shortest",)
     baselines: tuple[str, ...] = ()
-    graphs: tuple[str | WaypointGraph, ...] = ()
+    graphs: tuple[Any, ...] = ()
     """Graphs that others have made, or files of them; there must be one map. Routes go straight to
     the nearest node in sight of the start, over the edges that are shortest in metres, and straight
     from the nearest node in sight of the goal."""
@@ -356,10 +347,9 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         # The preset of the same name as the reference is that very search: measured once.
         if spec.name != REFERENCE:
             specs.append(spec)
-    for graph in settings.graphs:
-        read = load_graph(graph) if isinstance(graph, str) else graph
-        checked_type("graph", read, WaypointGraph)
-        specs.append(graph_spec(read, clear_edges_only=settings.clear_edges_only))
+    specs += [
+        graph_spec(graph, clear_edges_only=settings.clear_edges_only) for graph in settings.graphs
+    ]
     for named in settings.methods:
         spec = named_spec(
             named,
@@ -375,7 +365,7 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         raise InvalidValueError(
             f"method {lines[0]}: an any-angle path never passes between two blocked cells that "
             "meet at a corner: leave corner cutting out, or take presets with octile paths, such "
-            "as portals"
+            "as octile"
         )
     return list({spec.digest: spec for spec in specs}.values())
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.costs import CostLayer
 from hybridnav.errors import MapWarning
-from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.harness.records import map_digest
-from hybridnav.io import load_map
-from hybridnav.io.cost_specs import read_costs
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.costs.files import read_costs
+from hybridnav.maps.files import load_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,17 +1,44 @@
-"""Tables: CSV for machines, Markdown for pages, texts of numbers for people."""
+"""Tables: CSV for machines, Markdown and HTML for people; the methods of a run in a table."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.harness.yardstick import OPTIMA
+from hybridnav.planner import Preset
+from hybridnav.refine.ompl import OmplSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterable, Sequence
+
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import Outcome
+    from hybridnav.harness.records import Record
 
 Row = dict[str, str | float]
 
+METHOD_COLUMNS = {
+    "kind": "what the method is: a preset of this package, a baseline of it, a planner of others, "
+    "a class, or a graph",
+    "version": "version of the package that plans, or the hash of the file of a class",
+    "settings": "settings that differ from the usual ones",
+    "not asked": "maps that the method cannot take by a limit of its own, and the reason; they are "
+    "no fault, and it is in no table of theirs",
+}
+"""Columns of the table of methods, and their meaning."""
+
+_WORDS = ("method", "map", "metric", *METHOD_COLUMNS)
+"""Columns that hold no numbers."""
+_LOWER = ("mean %", "p95 %", "max %", "query ms, median", "query ms, p95", "preparation s")
+_HIGHER = ("solved %", "speed-up of means")
+_MOST_NAMES = 4
+_ALIKE = 0.005
 _DIGITS = 3
 _LEAST = 1e-4
 
@@ -30,16 +57,17 @@ def _blank(value: str | float) -> str | float:
     return "" if isinstance(value, float) and math.isnan(value) else value
 
 
-def to_markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
+def to_markdown(rows: Sequence[Row]) -> str:
     """Return rows as a table in Markdown, numbers rounded to three digits."""
-    columns = (
-        list(dict.fromkeys(key for row in rows for key in row)) if columns is None else columns
-    )
-    lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
-    for row in rows:
-        cells = (text_of(row.get(column, "")) for column in columns)
-        lines.append(f"| {' | '.join(cells)} |")
-    return "".join(f"{line}\n" for line in lines)
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    return markdown_of(columns, [[text_of(row.get(c, "")) for c in columns] for row in rows])
+
+
+def markdown_of(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """Return texts as a table in Markdown."""
+    columns = list(columns)
+    lines = [f"| {' | '.join(cells)} |\n" for cells in (columns, *rows)]
+    return "".join([lines[0], f"|{'---|' * len(columns)}\n", *lines[1:]])
 
 
 def text_of(value: str | float) -> str:
@@ -57,3 +85,207 @@ def text_of(value: str | float) -> str:
         return f"{value:,.0f}"
     digits = max(0, _DIGITS - 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{min(digits, 4)}f}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    columns: list[str]
+    rows: list[list[str]]
+    caption: str
+    numeric: frozenset[int] = frozenset()
+    """Indices of the columns that are aligned to the right."""
+    note: str = ""
+    """A sentence below it."""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise InvalidValueError(
+                    f"table {brief(self.caption)}: a row has {len(row)} cells, "
+                    f"expected {len(self.columns)}"
+                )
+
+
+def table_of(rows: Sequence[Row], columns: Iterable[str], caption: str, note: str = "") -> Table:
+    """Return a table without columns that are empty."""
+    kept = ["method", *(column for column in columns if with_values(rows, column))]
+    return Table(
+        columns=[shown(column) for column in kept],
+        rows=[[text_of(row.get(column, "")) for column in kept] for row in rows],
+        caption=caption,
+        numeric=frozenset(at for at, column in enumerate(kept) if column not in _WORDS),
+        note=note,
+    )
+
+
+def with_values(rows: Sequence[Row], column: str) -> list[Row]:
+    """Return the rows that have a value in a column."""
+    return [row for row in rows if text_of(row.get(column, "")) != ""]
+
+
+def shown(column: str) -> str:
+    """Return the heading of a column in a table whose caption names the optimum."""
+    for optimum in OPTIMA:
+        column = column.removeprefix(f"{optimum} loss ")
+    return column
+
+
+def ahead_of_presets(rows: Sequence[Row], columns: Iterable[str], presets: Collection[str]) -> str:
+    """Return a sentence on the methods that are ahead of every preset in some column of a table.
+
+    Methods with a contradiction are not: what they found is no path. Figures that differ by less
+    than half a per cent are equal.
+
+    Parameters
+    ----------
+    rows
+        Rows of the table, with `method` and `faults`.
+    columns
+        Columns of the table.
+    presets
+        Methods that are presets.
+
+    Returns
+    -------
+    str
+        Empty if the table holds no preset, or nothing else.
+    """
+    own = [row for row in rows if row["method"] in presets]
+    n_maps = max((row.get("maps", 1) for row in rows), default=1)
+    others = [
+        row
+        for row in rows
+        if row["method"] not in presets
+        and not row.get("faults")
+        and row.get("maps", 1) == n_maps  # not of the easier maps alone
+    ]
+    sign_of = dict.fromkeys(_LOWER, 1) | dict.fromkeys(_HIGHER, -1)
+    judged = {column: sign_of[shown(column)] for column in columns if shown(column) in sign_of}
+    if not own or not others or not judged:
+        return ""
+    found = [
+        part for column, sign in judged.items() if (part := _ahead_in(column, sign, own, others))
+    ]
+    if not found:
+        return "No other method is ahead of every preset here."
+    return f"Ahead of every preset here: {'; '.join(found)}."
+
+
+def _ahead_in(column: str, sign: int, own: Sequence[Row], others: Sequence[Row]) -> str:
+    """Return the methods that are ahead in one column, the best first."""
+    best = min((row for row in own if _has(row, column)), key=_by(column, sign), default=None)
+    if best is None:
+        return ""
+    better = [
+        row
+        for row in others
+        if _has(row, column)
+        and _by(column, sign)(row) < _by(column, sign)(best)
+        and not math.isclose(float(row[column]), float(best[column]), rel_tol=_ALIKE)
+    ]
+    better.sort(key=_by(column, sign))
+    if not better:
+        return ""
+    names = [f"{row['method']} ({text_of(row[column])})" for row in better[:_MOST_NAMES]]
+    more = len(better) - len(names)
+    names += [f"{more} more"] if more else []
+    against = f"{text_of(best[column])} of {best['method']}"
+    return f'in "{shown(column)}" {", ".join(names)}, against {against}'
+
+
+def _by(column: str, sign: int) -> Any:
+    return lambda row: sign * float(row[column])
+
+
+def _has(row: Row, column: str) -> bool:
+    value = row.get(column, "")
+    return isinstance(value, (int, float)) and math.isfinite(value)
+
+
+def rows_of_methods(study: Study) -> list[Row]:
+    """Return one row for each method of a study."""
+    rows: list[Row] = []
+    for label in study.labels:
+        outcomes = study.of_method(label)
+        # A method that could not be made on a map has no version there.
+        best = max((o.preparation for o in outcomes), key=len)
+        rows.append(
+            {
+                "method": label,
+                "kind": _kind(best),
+                "version": _version(best),
+                "settings": _settings(best),
+                "not asked": _not_asked(outcomes, len(study.maps)),
+            }
+        )
+    return rows
+
+
+def _kind(record: Record) -> str:
+    made_by = str(record.get("made_by", record["method"]))
+    if "graph" in record:
+        return f"graph, {record['graph']['format']}"
+    kind = "class"
+    if record.get("preset") is not None:
+        kind, made_by = "preset", str(record["preset"].get("name", made_by))
+    elif ":" not in made_by:
+        # Earlier versions had names for planners of others, and noted the versions of these.
+        kind = "planner of others" if "version" in record else "baseline"
+    # A class is shown by the name that it gives itself.
+    is_named = made_by != record["method"] or kind == "class"
+    return f"{kind} {made_by}" if is_named else kind
+
+
+def _version(record: Record) -> str:
+    if record.get("version"):
+        return str(record["version"])
+    if "source" in record:
+        return f"file {record['source']}"
+    own = record.get("environment", {}).get("hybridnav", "")
+    return f"hybridnav {own}" if own and "graph" not in record else ""
+
+
+def _settings(record: Record) -> str:
+    given = record.get("settings") or {}
+    if record.get("preset") is not None:
+        given = _unlike(record["preset"].get("planner", {}), _DEFAULTS["planner"])
+    words = record.get("settings_text") or _words(given)
+    grid = record.get("grid") or {}
+    return words + (f"{'; ' if words else ''}on a grid with {_words(grid)}" if grid else "")
+
+
+_DEFAULTS = Preset().model_dump()
+_OF_OMPL = OmplSettings().model_dump() | {"planner": None}
+
+
+def _words(settings: dict[str, Any]) -> str:
+    texts = {
+        key: value if isinstance(value, str) else json.dumps(value)
+        for key, value in settings.items()
+    }
+    return ", ".join(f"{key} {text}" for key, text in texts.items())
+
+
+def _unlike(own: dict[str, Any], usual: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return the settings that differ from the usual ones, by dotted key."""
+    found: dict[str, Any] = {}
+    for key, value in own.items():
+        other = usual.get(key)
+        if isinstance(value, dict):
+            inner = other if isinstance(other, dict) else (_OF_OMPL if key == "ompl" else {})
+            found |= _unlike(value, inner, f"{prefix}{key}.")
+        elif value != other and value is not None:
+            found[f"{prefix}{key}"] = value
+    return found
+
+
+def _not_asked(outcomes: Sequence[Outcome], n_maps: int) -> str:
+    """Return the maps on which a method was not asked, and the reason on the first."""
+    without = [outcome for outcome in outcomes if not outcome.is_asked]
+    if not without:
+        return ""
+    reason = str(without[0].preparation.get("error", ""))
+    where = "" if n_maps == 1 else f"on {len(without)} of {n_maps} maps: "
+    return where + reason

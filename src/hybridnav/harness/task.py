@@ -11,23 +11,22 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav.costs import CostLayer
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
-from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
-from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare, rival_version
+from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.pairs import SAMPLER_VERSION
-from hybridnav.harness.paths import encode_path
-from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
+from hybridnav.harness.records import encode_path, environment, map_digest, pair_id, preparation_id
 from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
+from hybridnav.maps import CellClass
+from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.files import example_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from hybridnav.baselines import AnyAngleResult, MethodResult
+    from hybridnav.harness.baselines import AnyAngleResult, MethodResult
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.harness.scenes import MapSpec, Scene
@@ -185,7 +184,6 @@ def _about(scene: Scene, task: Task) -> Record:
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
         "metric": task.method.metric,
         "made_by": task.method.made_by,
-        **({"version": version} if (version := rival_version(task.method.made_by)) else {}),
         **({"settings": task.method.settings} if task.method.settings else {}),
         **({"grid": task.method.grid} if task.method.grid else {}),
         "preset": None if task.method.preset is None else _plain(task.method.preset),
@@ -360,7 +358,7 @@ def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     """
     if (spec.digest, by_costs) in _WARM:
         return
-    grid = figure1_world().grid(robot_radius_m=0)
+    grid = example_map("figure1", robot_radius_m=0)
     layer = CostLayer.clearance(grid) if by_costs else None
     with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
         Judge(grid, prepared, reference=False, costs=layer)

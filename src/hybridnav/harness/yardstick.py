@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, get_args
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid import CellClass
-from hybridnav.mesh import MeshSearch, build_mesh
+from hybridnav.maps import CellClass
+from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 
@@ -21,6 +21,31 @@ paths of cells, for the costs of all paths."""
 
 Optimum = Literal["any-angle", "octile", "weighted"]
 """What the losses of one table refer to."""
+
+
+YARDSTICKS: dict[Yardstick, tuple[Optimum, ...]] = {
+    "both": ("any-angle", "octile"),
+    "any-angle": ("any-angle",),
+    "octile": ("octile",),
+    "weighted": ("weighted",),
+}
+"""The optima that losses refer to, one table each, by the metric that is asked for."""
+
+OPTIMA: dict[Optimum, str] = {
+    "any-angle": "the any-angle optimum",
+    "octile": "the octile optimum",
+    "weighted": "the least cost of paths of cells",
+}
+"""The name of each optimum in captions."""
+
+REFERS_TO: dict[Yardstick, str] = {
+    "both": "the any-angle optimum in one table, the octile optimum in another, which any-angle "
+    "paths are not in",
+    "any-angle": "the any-angle optimum, for all paths",
+    "octile": "the octile optimum; any-angle paths have none",
+    "weighted": "the least cost of paths of cells, for the costs of all paths",
+}
+"""What losses refer to, in words."""
 
 
 def check_yardstick(metric: str) -> None:

@@ -2,26 +2,86 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, overload
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args, overload
 
+from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.alternative_options import check_used, effort_of, limits_of
-from hybridnav.planner.by_classes import ClassTours
-from hybridnav.planner.by_doors import Chosen, DoorTours
+from hybridnav.maps.checks import checked_whole
+from hybridnav.planner.by_doors import Chosen, DoorTours, RouteLimits
 from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from numpy.typing import ArrayLike
 
-    from hybridnav.homotopy.classes import Word
-    from hybridnav.planner.alternative_options import By
+    from hybridnav.planner import Path, PlanResult
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.by_doors import RouteLimits
     from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
-    from hybridnav.result import Path, PlanResult
+
+
+# Options of alternatives: their defaults, their ranges, and where each changes something.
+
+By = Literal["doors", "homotopy"]
+"""Difference between two paths: the doors that they pass, or the sides of obstacles."""
+MOST = 20
+"""Most alternatives of one query."""
+_MAX_OVERLAP, _MAX_STRETCH = 0.8, 2.0
+_BY_DOORS = ("max_overlap", "max_stretch", "inside_rooms")
+_BY_CLASSES = ("least_hole_m2", "most_states", "time_limit_s")
+_T = TypeVar("_T")
+
+
+def check_used(by: str, given: Mapping[str, object]) -> None:
+    """Refuse a difference that does not exist, and options that change nothing with it.
+
+    Parameters
+    ----------
+    by
+        The difference between paths.
+    given
+        The options that the caller gave, by name.
+    """
+    if by not in get_args(By):
+        raise InvalidValueError(f"by must be 'doors' or 'homotopy', got {by!r:.80}")
+    idle: Iterable[str] = ()
+    where = "by='doors'"
+    if by == "homotopy":
+        idle = _BY_DOORS
+    elif "inside_rooms" not in given:
+        idle, where = _BY_CLASSES, "by='homotopy' or inside_rooms=True"
+    for name in idle:
+        if name in given:
+            raise InvalidValueError(
+                f"{name}={given[name]!r:.80} was given with by={by!r:.80}, and it is for "
+                f"alternatives with {where}: leave it out"
+            )
+
+
+def limits_of(count: int, max_overlap: float | None, max_stretch: float | None) -> RouteLimits:
+    """Return the limits if they are in range; None stands for the default."""
+    limits = {"max_overlap": (max_overlap, 0.0, 1.0), "max_stretch": (max_stretch, 1.0, math.inf)}
+    for name, (value, low, high) in limits.items():
+        if value is not None and not (isinstance(value, Real) and low <= float(value) <= high):
+            most = "or more" if math.isinf(high) else f"to {high:g}"
+            raise InvalidValueError(
+                f"{name} must be a number from {low:g} {most}, got {value!r:.80}"
+            )
+    return RouteLimits(
+        checked_whole("alternatives", count, 1, MOST),
+        _or(max_overlap, _MAX_OVERLAP),
+        _or(max_stretch, _MAX_STRETCH),
+    )
+
+
+def _or(given: _T | None, default: _T) -> _T:
+    """Return what was given, or the default for None."""
+    return default if given is None else given
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +106,7 @@ class Alternative:
     overlap: float = 0.0
     """Share of its length, or of its cost with a planner by costs, in common with one before it,
     the greatest one; 0 for the first."""
-    word: Word | None = None
+    word: tuple[int, ...] | None = None
     """Reduced word of its homotopy class, by homotopy; None by doors."""
 
     @property
@@ -229,10 +289,13 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
             'costs: take by="doors" without inside_rooms, or a planner without costs'
         )
     limits = limits_of(count, max_overlap, max_stretch)
-    effort = effort_of(least_hole_m2, most_states, time_limit_s)
     closed = planner.closed(blocked)
     waypoints = [start, goal]
-    classes = ClassTours(planner, waypoints, closed, effort) if needs_classes else None
+    classes: Classes | None = None
+    if needs_classes:
+        homotopy = extension("methods", "homotopy")
+        effort = homotopy.effort_of(least_hole_m2, most_states, time_limit_s)
+        classes = homotopy.ClassTours(planner, waypoints, closed, effort)
     first = plan_tour(planner, waypoints, at=at, blocked=closed)
     if not first.solved:
         return unplanned(first.status)
@@ -244,7 +307,22 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     return _by_doors(search, classes, first, limits, by_costs=planner.costs is not None)
 
 
-def _by_homotopy(classes: ClassTours, first: Tour, limits: RouteLimits) -> Alternatives:
+class Classes(Protocol):
+    """The search for tours of other homotopy classes than a first one."""
+
+    stopped: str
+    """Description of the limit at which the search stopped, empty if it did not."""
+
+    def find(self, first: Tour, count: int) -> list[tuple[Tour, tuple[int, ...]]]:
+        """Return tours of other classes with their words, the shortest first."""
+        ...
+
+    def inside(self, search: DoorTours, chosen: list[Chosen], limits: RouteLimits) -> list[Chosen]:
+        """Return what was chosen by doors, and tours by other sides of obstacles inside rooms."""
+        ...
+
+
+def _by_homotopy(classes: Classes, first: Tour, limits: RouteLimits) -> Alternatives:
     """Return the alternatives by sides of obstacles."""
     tours = classes.find(first, limits.count)
     found = tuple(Alternative(tour, word=word) for tour, word in tours)
@@ -256,7 +334,7 @@ def _by_homotopy(classes: ClassTours, first: Tour, limits: RouteLimits) -> Alter
 
 def _by_doors(
     search: DoorTours | None,
-    classes: ClassTours | None,
+    classes: Classes | None,
     first: Tour,
     limits: RouteLimits,
     *,
@@ -288,7 +366,7 @@ def _by_doors(
     return Alternatives(found, complete=not stopped, note=note)
 
 
-def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:
+def _stopped(search: DoorTours | None, classes: Classes | None) -> str:
     """Describe which search stopped before it had looked at everything."""
     if classes is not None and classes.stopped:
         return classes.stopped

@@ -9,14 +9,14 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.occupancy import extent
-from hybridnav.grid.runs import in_runs
+from hybridnav.maps.islands import in_runs
+from hybridnav.maps.occupancy import extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.grid import Frame, OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import Frame, OccupancyGrid
 
 _SHAPES = ("Polygon", "MultiPolygon", "LineString", "LinearRing", "MultiLineString")
 _FEWEST_POINTS = 3

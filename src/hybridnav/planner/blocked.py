@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.runs import in_runs
+from hybridnav.maps.islands import in_runs
 from hybridnav.planner.areas import checked_area, runs_of, shown
 from hybridnav.planner.boundaries import cells_on_boundaries
 from hybridnav.pyramid import LevelArc
-from hybridnav.topology import Door
+from hybridnav.topology.rooms import Door
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import LongArray
-    from hybridnav.topology import Rooms, TopologicalMap
+    from hybridnav._base.typing import LongArray
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.rooms import Rooms
 
 
 @copies_alike

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
+    from hybridnav._base.typing import LongArray
     from hybridnav.pyramid import Level
 
 

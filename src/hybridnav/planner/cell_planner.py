@@ -6,27 +6,27 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
-from hybridnav._progress import no_progress
-from hybridnav.grid import CellClass
-from hybridnav.result import PlanStats
+from hybridnav._base.progress import no_progress
+from hybridnav.maps import CellClass
+from hybridnav.planner import PlanStats
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from hybridnav._progress import Progress
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import Frame, OccupancyGrid
-    from hybridnav.jumps import JumpSearch
-    from hybridnav.mesh import MeshSearch
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import Frame, OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.portals import BuiltPortals
     from hybridnav.pyramid import Level
-    from hybridnav.result import Metric, Route
+    from hybridnav.route import Route
+    from hybridnav.search.mesh import MeshSearch
+    from hybridnav.search.octile import JumpSearch
     from hybridnav.topology import TopologicalMap
 
-    Prepared = MeshSearch | JumpSearch | BuiltPortals
+    Prepared = MeshSearch | JumpSearch
     """What planners of cell paths build of a map."""
 
 Cell = tuple[int, int]

@@ -1,4 +1,4 @@
-"""Planners of cell paths: over the whole map, by max-distance arcs, over portals."""
+"""Planners of cell paths: over the whole map, by max-distance arcs."""
 
 from __future__ import annotations
 
@@ -8,26 +8,21 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from hybridnav import portals
 from hybridnav import route as routes
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
-from hybridnav.planner.cell_planner import CellPlan, CellPlans
-from hybridnav.result import PlanStats, Route
-from hybridnav.search.moves import octile_distance_in_cells
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.moves import octile_distance_in_cells
+from hybridnav._base.progress import no_progress
+from hybridnav.planner import PlanStats
+from hybridnav.planner.cell_planner import CellPlan
+from hybridnav.route import Route
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, IntArray
-    from hybridnav.config import PlannerSettings
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, IntArray
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
-    from hybridnav.portals import BuiltPortals, PortalSearch
     from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner, Refiner
-    from hybridnav.result import Metric
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.topology import TopologicalMap
 
@@ -197,96 +192,3 @@ class MaxDistance:
     def fields(self, level: Level) -> IntArray:
         """Return the fields of the places; see `CellPlanner`."""
         return level.field_of
-
-
-@copies_alike
-class OverPortals:
-    """The shortest path by the portal table, which is built when the first query needs it."""
-
-    metric: Metric = "octile"
-
-    def __init__(
-        self,
-        topology: TopologicalMap,
-        refiner: GridRefiner,
-        settings: PlannerSettings,
-        built: BuiltPortals | None = None,
-    ) -> None:
-        self._topology = topology
-        self._refiner = refiner
-        self._settings = settings
-        self._built = built
-        self._search: PortalSearch | None = None
-        self._building = threading.RLock()  # a progress callback may plan
-
-    @property
-    def prepared(self) -> BuiltPortals | None:
-        """Portals and tables, None until they are built."""
-        return self._built
-
-    def prepare(self, progress: Progress = no_progress) -> PortalSearch:
-        """Build portals and table, once; see `CellPlanner`."""
-        if self._search is None:
-            with self._building:
-                if self._search is None:
-                    if self._built is None:
-                        self._built = portals.prepare_portals(
-                            self._topology,
-                            allow_unexplored=self._settings.allow_unexplored,
-                            progress=progress,
-                        )
-                    frame = self._topology.grid.frame
-                    self._search = portals.PortalSearch(self._built, self._refiner.search, frame)
-        return self._search
-
-    @property
-    def search(self) -> PortalSearch:
-        """The search over portals, built on first use."""
-        return self.prepare()
-
-    def plan(self, query: CellQuery) -> CellPlan:
-        """Find a path over portals; see `CellPlanner`."""
-        began, seconds = time.perf_counter(), {}
-        if self._search is None:
-            self.prepare()
-            seconds["table"] = time.perf_counter() - began
-        now, epsilon = time.perf_counter(), self._settings.epsilon or 0.0
-        found = self.search.path(*query.cells, epsilon=epsilon)
-        seconds["portals"] = time.perf_counter() - now
-        plan = CellPlan(
-            found.cells,
-            points=found.points,
-            length_cells=found.length_cells,
-            bound_cells=found.lower_bound_cells,
-            stats=PlanStats(
-                expanded=found.expanded,
-                expanded_border_cells=found.expanded_border_cells,
-                seconds=seconds,
-            ),
-        )
-        return round_closed(plan, query, self._refiner)
-
-    def plan_many(self, queries: CellQueries) -> CellPlans:
-        """Plan many pairs of cells as far as look-ups answer them; see `CellPlanner`."""
-        epsilon = self._settings.epsilon or 0.0
-        found = self.search.many(*queries.cells, epsilon=epsilon)
-        per_cell = self._topology.grid.resolution_m
-        return CellPlans(
-            found.is_done,
-            found.length_cells * per_cell,
-            found.lower_bound_cells * per_cell,
-            found.path_start,
-            found.points,
-        )
-
-    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:
-        """Return the bound by the sides of the portals; see `CellPlanner`."""
-        assert plan.cells is not None  # noqa: S101 - the protocol requires a path
-        frame = self._topology.grid.frame
-        start, goal = (frame.position_of(float(point[0]), float(point[1])) for point in points)
-        first, last = tuple(plan.cells[0].tolist()), tuple(plan.cells[-1].tolist())
-        return self.search.any_angle_bound(first, last, (start, goal)) * frame.resolution_m
-
-    def fields(self, level: Level) -> NDArray[np.int16 | np.int32]:  # noqa: ARG002
-        """Return the fields between which portals lie; see `CellPlanner`."""
-        return self.search.field_of

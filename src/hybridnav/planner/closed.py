@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav.result import PlanStatus
+from hybridnav._base.copies import copies_alike
+from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.planner.blocked import Closable
     from hybridnav.topology import TopologicalMap
 

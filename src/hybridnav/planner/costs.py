@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav.costs import CostLayer, cost_along
-from hybridnav.costs.checks import joined_cells
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.checks import checked_type
-from hybridnav.grid.clearance import within_radius
-from hybridnav.grid.lines import polyline_length
+from hybridnav.maps.checks import checked_type
+from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.costs import CostLayer, cost_along
+from hybridnav.maps.costs.checks import joined_cells
+from hybridnav.maps.lines import polyline_length
+from hybridnav.planner import Path
 from hybridnav.planner.closed import ClosedCells
 from hybridnav.refine import CostLine
-from hybridnav.result import Path
-from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.config import PlannerSettings, Preset
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.areas import Box
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.areas import Box
+    from hybridnav.planner import PlannerSettings, Preset
 
 
 @copies_alike

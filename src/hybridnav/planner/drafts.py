@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from hybridnav.result import PlanStatus
+from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from hybridnav.planner import PlanResult, PlanStats
     from hybridnav.planner.cell_planner import CellPlan, CellQuery
     from hybridnav.planner.mesh_plans import OverMesh
-    from hybridnav.result import PlanResult, PlanStats
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid import CellClass
-from hybridnav.result import PlanStatus
+from hybridnav.maps import CellClass
+from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 Points = tuple["FloatArray", "FloatArray"]

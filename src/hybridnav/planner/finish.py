@@ -7,23 +7,22 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, get_args
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import polyline_length
+from hybridnav.maps.lines import polyline_length
+from hybridnav.planner import Path
 from hybridnav.planner.costs import CostFinish
 from hybridnav.refine import LineOfSight
-from hybridnav.result import Path
-from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlannerSettings, PlanResult
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.outcome import Outcomes
-    from hybridnav.result import PlanResult
+    from hybridnav.planner.follow import Outcomes
 
 Smooth = Literal["none", "line-of-sight", "arcs"]
 

@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
-from hybridnav.grid.centres import centres
-from hybridnav.jumps import JumpPatch, JumpSearch, build_jump_graph, contract_graph
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
+from hybridnav.maps.centres import centres
+from hybridnav.planner import PlanStats
 from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
 from hybridnav.planner.cell_plans import WholeMap, round_closed
-from hybridnav.result import PlanStats
+from hybridnav.search.octile import JumpPatch, JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
-    from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner
-    from hybridnav.result import Metric
+
 
 CONTRACTED_FROM = 2000
 """Least number of corner cells for contraction: in smaller graphs a direct search is as fast."""

@@ -11,33 +11,31 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.mesh import (
+from hybridnav.maps.lines import cells_of_line, polyline_length, polyline_lengths
+from hybridnav.planner import PlanStats
+from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
+from hybridnav.refine import LineOfSight
+from hybridnav.search.mesh import (
     DetourSearch,
     MeshPath,
     MeshSearch,
     build_mesh,
-    locate_polygons,
     renew_mesh,
     shortest_paths,
 )
-from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
-from hybridnav.refine import LineOfSight
-from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, IntArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner
-    from hybridnav.result import Metric
 
 Position = tuple[float, float]
 
@@ -109,7 +107,7 @@ class OverMesh:
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search = search
-        self._is_renewed = self._is_located = False
+        self._is_renewed = False
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
         self._building = threading.RLock()  # a progress callback may plan
@@ -130,7 +128,6 @@ class OverMesh:
             mesh = renew_mesh(search.mesh, made._free, changed @ self._across)
             if mesh is search.mesh:
                 made._search, made._is_renewed = search, self._is_renewed
-                made._is_located = self._is_located
             elif (mesh.component < 0).sum() <= _MOST_REMOVED * mesh.n_polygons + _FEW:
                 made._search, made._is_renewed = MeshSearch(mesh), True
         return made
@@ -315,24 +312,12 @@ class OverMesh:
         passed: LongArray = cells_of_line(free, positions - low) + low
         return passed
 
-    def _located(self, search: MeshSearch) -> MeshSearch:
-        """Return the search of a mesh whose cells are listed, as searches round closed cells need
-        it."""
-        if not self._is_renewed:
-            return search
-        with self._building:
-            if not self._is_located:
-                self._search = MeshSearch(locate_polygons(search.mesh, self._free))
-                self._is_located = True
-        return self._search or search
-
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
         """Return the search round closed cells, which is cached."""
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            search = self._located(search)
-            found = self._detours[closed] = DetourSearch(search, closed.flat)
+            found = self._detours[closed] = DetourSearch(search.mesh, self._free, closed.flat)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)
         return found

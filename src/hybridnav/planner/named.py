@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from hybridnav._trig import atan2
+from hybridnav._base.trig import atan2
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.grid import CellClass
-from hybridnav.grid.clearance import clearance_cells
-from hybridnav.grid.names import did_you_mean
+from hybridnav.maps import CellClass
+from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.names import did_you_mean
 from hybridnav.planner.endpoints import check_at
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.waypoints import cheapest_waypoints
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlannerSettings
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.topology import TopologicalMap
 

@@ -12,26 +12,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._trig import directions
-from hybridnav.grid.lines import cells_of_line
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.poses import Motion
+from hybridnav._base.trig import directions
+from hybridnav.maps.lines import cells_of_line
+from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.planner.cell_planner import CellQuery
-from hybridnav.poses import Motion
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
 from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
-from hybridnav.result import Path, PlanStatus, Refinement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellPlanner
     from hybridnav.refine.ompl import Reply, Search
-    from hybridnav.result import Metric
     from hybridnav.topology import TopologicalMap
 
 

@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
-from hybridnav.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
+from hybridnav._base.turns import Turns
+from hybridnav.planner import PlanStats
 from hybridnav.planner.cell_planner import CellPlan
 from hybridnav.planner.cell_plans import WholeMap, round_closed
 from hybridnav.refine import GridRefiner
-from hybridnav.result import PlanStats
-from hybridnav.search.turns import Turns
+from hybridnav.search.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
 
 if TYPE_CHECKING:
-    from hybridnav._progress import Progress
-    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
-    from hybridnav.config import PlannerSettings
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid.areas import Box
-    from hybridnav.overlay import Overlay
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav.maps.areas import Box
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric, PlannerSettings
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.pyramid import Level
-    from hybridnav.result import Metric
+    from hybridnav.search.overlay import Overlay
     from hybridnav.topology import TopologicalMap
+
 
 _WORTH = 20
 """Times that queries expand all cells before the overlay is built: building it takes 3 to 7 us a

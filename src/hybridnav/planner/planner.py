@@ -5,19 +5,18 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from hybridnav._copies import copies_alike
-from hybridnav._progress import no_progress
-from hybridnav.config import Preset, load_preset
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.progress import no_progress
+from hybridnav._base.turns import Turns
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.areas import box_of_area
+from hybridnav.maps.areas import box_of_area
+from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
 from hybridnav.planner.follow import PlannerChange, change_of, followed
 from hybridnav.planner.queries import Queries
-from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
-from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,20 +25,20 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._progress import Progress
-    from hybridnav._typing import PathLike
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.areas import Box
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import PathLike
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.areas import Box
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanBatch, PlanResult
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.drafts import PlanDraft
     from hybridnav.planner.finish import Smooth
-    from hybridnav.planner.itinerary import Guide
+    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
 
 
@@ -63,7 +62,7 @@ class HybridPlanner:
     costs
         A factor for each cell, by which a metre in it costs more, joined with the costs that the
         preset names. The path is the cheapest one, and its result has the metric `weighted`. Only
-        for presets with `refine: grid-astar`, or with `coarse: overlay` or `portals`.
+        for presets with `refine: grid-astar`, or with `coarse: overlay`.
 
     Raises
     ------
@@ -72,7 +71,7 @@ class HybridPlanner:
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another;
         when the costs are those of another map, or the preset cannot plan by costs; when the map
-        allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl-*`).
+        allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl`).
 
     Examples
     --------
@@ -119,9 +118,8 @@ class HybridPlanner:
 
     @property
     def prepared(self) -> Prepared | None:
-        """The structure built for queries: a mesh, a jump-point graph or portals; None before that,
-        and with presets that build none or, as the overlay does, one that changes with the
-        costs."""
+        """The structure built for queries: a mesh or a jump-point graph; None before that, and
+        with presets that build none or, as the overlay does, one that changes with the costs."""
         return self._cells.prepared
 
     @property
@@ -246,7 +244,7 @@ class HybridPlanner:
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
-        portals, or overlay.
+        or overlay.
 
         Structures that exist already are kept; what `update` has made stale is renewed. Threads may
         call this, and plan meanwhile: each structure is built once.
@@ -272,12 +270,12 @@ class HybridPlanner:
         Queries of other threads that run already finish by what was before; the update waits for
         them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
 
-        With an overlay (`coarse: overlay`, or `portals` with costs) the changed fields get their
-        costs at once; searches leave stale tables above these out until `prepare` renews them.
-        `shortest`, `octile` and `grid-astar` follow a changed grid alone. Their results have no
-        route, and names, places and doors are refused, until an update brings the places of the map
-        now. All other presets need these at once. Costs that were given stay with their cells on a
-        changed map; those that the preset computes from the map are computed anew.
+        With `coarse: overlay` the changed fields get their costs at once; searches leave stale
+        tables above these out until `prepare` renews them. `shortest`, `octile` and `grid-astar`
+        follow a changed grid alone. Their results have no route, and names, places and doors are
+        refused, until an update brings the places of the map now. All other presets need these at
+        once. Costs that were given stay with their cells on a changed map; those that the preset
+        computes from the map are computed anew.
 
         Parameters
         ----------
@@ -361,3 +359,25 @@ class HybridPlanner:
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
         return self._queries.closed_for_all(closed)
+
+
+# Check of the robot's radius, which map and preset both state.
+
+
+def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
+    """Refuse a map of the default radius with a preset for another radius.
+
+    A radius that the caller chose for the map wins over the preset's, and results record it.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map has the default radius, not chosen by the caller, and the preset names another.
+    """
+    wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
+    if grid.radius_is_default and wanted_m != radius_m:
+        raise InvalidValueError(
+            f"preset {preset.name} is for a robot radius of {wanted_m} m, the map was made with "
+            f"the default of {radius_m} m: make it with robot_radius_m={wanted_m}, or with "
+            f"robot_radius_m={radius_m} if that is meant"
+        )

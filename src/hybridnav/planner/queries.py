@@ -9,30 +9,31 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav.planner.batch import plan_many
-from hybridnav.planner.cell_planner import CellQuery
+from hybridnav._base.copies import copies_alike, frozen
+from hybridnav.maps import CellClass
+from hybridnav.planner import PlanBatch, PlanStatus
+from hybridnav.planner.cell_planner import CellQueries, CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
 from hybridnav.planner.endpoints import cells_of_endpoints, check_at, read_end
 from hybridnav.planner.finish import Finish, Smooth
-from hybridnav.planner.follow import is_stale
-from hybridnav.planner.outcome import Outcomes
-from hybridnav.result import PlanStatus
+from hybridnav.planner.follow import Outcomes, is_stale
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.config import Preset
-    from hybridnav.costs import CostLayer
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanResult, Preset
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_planner import CellPlan, CellPlanner
-    from hybridnav.planner.itinerary import Guide
+    from hybridnav.planner.cell_planner import CellPlan, CellPlanner, CellPlans
+    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
 
 
@@ -82,7 +83,7 @@ class Queries:
         if is_stale(self._topology) or self._topology.pyramid.rooms is None:
             return None
         # Loads modules that plans without rooms do not need.
-        from hybridnav.planner.itinerary import Guide  # noqa: PLC0415
+        from hybridnav.planner.guide.itinerary import Guide  # noqa: PLC0415
 
         return Guide(self._topology.rooms)
 
@@ -221,3 +222,104 @@ class Queries:
         if shut is not None and (refused := shut.refusal(cells, grid.shape)):
             return refused
         return CellQuery(cells, endpoints, closed)
+
+
+# Many queries at once: those that look-ups answer in one kernel, the others one by one.
+
+
+def plan_many(
+    grid: OccupancyGrid,
+    at_once: CellPlanner | None,
+    endpoints: tuple[FloatArray, FloatArray],
+    closed: ClosedCells | None,
+    alone: Callable[[FloatArray, FloatArray], PlanResult],
+) -> PlanBatch:
+    """Return the answers to pairs of points, in arrays.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    at_once
+        Planner for many queries at once; None leaves all to `alone`.
+    endpoints
+        Starts and goals, float64 (n, 2) each, or poses (n, 3).
+    closed
+        Closed cells; None for none.
+    alone
+        Plans one of the remaining queries, between two of the `endpoints`.
+    """
+    starts, goals = endpoints
+    n = len(starts)
+    status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
+    cost, bound = np.full(n, np.inf), np.full(n, np.inf)
+    paths: list[FloatArray] = [np.empty((0, 2))] * n
+    headings = [np.empty(0)] * n
+    left = np.ones(n, dtype=np.bool_)
+    first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
+    asked = np.flatnonzero(_are_free(grid, first) & _are_free(grid, last))
+    found = None
+    if len(asked) and at_once is not None:
+        cells = first[asked], last[asked]
+        found = at_once.plan_many(CellQueries(cells, (starts[asked], goals[asked]), closed))
+    if at_once is not None and found is not None:
+        kept = found.is_done
+        if closed is not None:
+            on_cells = found if at_once.metric == "octile" else None
+            kept = kept & ~_met(closed, cells, grid, on_cells)
+        done = asked[kept]
+        left[done] = False
+        cost[done] = found.cost_m[kept]
+        bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
+        status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
+        for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
+            points = found.points[found.path_start[k] : found.path_start[k + 1]]
+            paths[i] = points if cost[i] > 0 else points[:1]
+    for i in np.flatnonzero(left).tolist():
+        result = alone(starts[i], goals[i])
+        status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
+        if result.path is not None:
+            paths[i] = result.path.points
+            if result.path.headings_rad is not None:
+                headings[i] = result.path.headings_rad
+    has_yaw = starts.shape[1] > 2  # noqa: PLR2004
+    turns = frozen(np.concatenate([np.empty(0), *headings])) if has_yaw else None
+    return PlanBatch(
+        status=frozen(status),
+        cost=frozen(cost),
+        lower_bound=frozen(bound),
+        path_start=frozen(
+            np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64)
+        ),
+        points=frozen(np.concatenate([np.empty((0, 2)), *paths])),
+        headings_rad=turns,
+    )
+
+
+def _met(
+    closed: ClosedCells,
+    endpoints: tuple[LongArray, LongArray],
+    grid: OccupancyGrid,
+    found: CellPlans | None,
+) -> BoolArray:
+    """Return which queries meet closed cells with an endpoint, or with their paths, bool (n,).
+
+    Only paths of cells are given; None for others.
+    """
+    across = np.array([grid.shape[1], 1])
+    met: BoolArray = closed.holds(endpoints[0] @ across) | closed.holds(endpoints[1] @ across)
+    if found is None:
+        return met
+    for k in np.flatnonzero(found.is_done & ~met).tolist():
+        points = found.points[found.path_start[k] : found.path_start[k + 1]]
+        met[k] = len(points) and closed.meets(grid.frame.cells_of(points), grid)
+    return met
+
+
+def _are_free(grid: OccupancyGrid, cells: LongArray) -> BoolArray:
+    """Return whether cells (n, 2) lie on the map and are free."""
+    classes = grid.classes
+    inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
+    free = np.zeros(len(cells), dtype=np.bool_)
+    free[inside] = classes[tuple(cells[inside].T)] == CellClass.FREE
+    return free

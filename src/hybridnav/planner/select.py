@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+import inspect
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from hybridnav.errors import InvalidValueError
-from hybridnav.planner.own import is_own, own_refiner
+import numpy as np
+
+from hybridnav._base.moves import STEPS, legal_moves
+from hybridnav.errors import InvalidValueError, PresetError
 from hybridnav.refine import GridRefiner
 
 if TYPE_CHECKING:
-    from hybridnav.config import PlannerSettings
-    from hybridnav.costs import CostLayer
+    from hybridnav._base.typing import BoolArray, ByteArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlannerSettings
     from hybridnav.planner.cell_planner import CellPlanner, Prepared
+    from hybridnav.refine import Refiner
+    from hybridnav.route import Corridor
     from hybridnav.topology import TopologicalMap
+
 
 _T = TypeVar("_T")
 
@@ -47,25 +57,19 @@ def cell_planner(
     """
     grid, coarse = topology.grid, settings.coarse
     refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored, costs=costs)
-    if coarse == "overlay" or (coarse == "portals" and costs is not None):
+    if coarse == "overlay":
         from hybridnav.planner.overlay_plans import OverOverlay  # noqa: PLC0415
 
-        if coarse == "overlay":
-            _taken(type(None), prepared, coarse)
+        _taken(type(None), prepared, coarse)
         return OverOverlay(topology, refiner, settings)
-    if coarse == "portals":
-        from hybridnav.planner.cell_plans import OverPortals  # noqa: PLC0415
-        from hybridnav.portals import BuiltPortals  # noqa: PLC0415
-
-        return OverPortals(topology, refiner, settings, _taken(BuiltPortals, prepared, coarse))
     if coarse == "mesh":
-        from hybridnav.mesh import MeshSearch  # noqa: PLC0415
         from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
+        from hybridnav.search.mesh import MeshSearch  # noqa: PLC0415
 
         return OverMesh(grid, refiner, settings, _taken(MeshSearch, prepared, coarse))
     if coarse == "jumps":
-        from hybridnav.jumps import JumpSearch  # noqa: PLC0415
         from hybridnav.planner.jump_plans import OverJumps  # noqa: PLC0415
+        from hybridnav.search.octile import JumpSearch  # noqa: PLC0415
 
         return OverJumps(grid, refiner, settings, _taken(JumpSearch, prepared, coarse))
     from hybridnav.planner.cell_plans import MaxDistance, WholeMap  # noqa: PLC0415
@@ -86,3 +90,141 @@ def _taken(kind: type[_T], prepared: Prepared | None, coarse: str) -> _T | None:
         f"coarse: {coarse} plans on nothing like a {type(prepared).__name__}: prepared must come "
         "from a planner of the same preset"
     )
+
+
+# Refiners of the user's own, which a preset names as `module:Class`.
+
+Cell = tuple[int, int]
+
+_MAX_SHOWN = 120
+"""Characters of a foreign error that a message quotes."""
+
+
+def is_own(refine: str) -> bool:
+    """Return whether a setting `refine` names a class."""
+    return ":" in refine
+
+
+def own_refiner(name: str, grid: OccupancyGrid, *, allow_unexplored: bool) -> Refiner:
+    """Import a class, make a refiner of it, and return one that checks its paths.
+
+    Parameters
+    ----------
+    name
+        `module:Class`. The class is called with the grid and the keyword `allow_unexplored`.
+    grid
+        The map.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+
+    Raises
+    ------
+    PresetError
+        When the module cannot be imported, has no such class, or the class makes no refiner.
+    """
+    own = _class_of(name)
+    try:
+        made = own(grid, allow_unexplored=allow_unexplored)
+    except Exception as error:
+        call = f"{own.__name__}(grid, allow_unexplored={allow_unexplored})"
+        raise _refused(name, f"{call} fails, {_one_line(error)}") from error
+    try:
+        inspect.signature(made.refine).bind((0, 0), (0, 0), None)
+    except (AttributeError, TypeError, ValueError) as error:
+        expected = "expected a method refine(start, goal, corridor)"
+        raise _refused(name, f"it is no refiner, {_one_line(error)}: {expected}") from error
+    return CheckedRefiner(name, made, grid, allow_unexplored=allow_unexplored)
+
+
+def _class_of(name: str) -> Any:
+    """Import the class that a setting names."""
+    module, _, attribute = name.partition(":")
+    try:
+        found = getattr(import_module(module), attribute, None)
+    except (Exception, SystemExit) as error:
+        raise _refused(name, f"module {module} cannot be imported, {_one_line(error)}") from error
+    if not inspect.isclass(found):
+        what = "has nothing of that name" if found is None else f"has a {type(found).__name__}"
+        raise _refused(name, f"module {module} {what}, expected a class {attribute}")
+    return found
+
+
+class CheckedRefiner:
+    """A refiner of the user's own, with its name; its answers are checked before a result shows
+    them."""
+
+    def __init__(
+        self, name: str, own: Refiner, grid: OccupancyGrid, *, allow_unexplored: bool
+    ) -> None:
+        self._name = name
+        self._own = own
+        self._grid = grid
+        self._allow_unexplored = allow_unexplored
+
+    def refine(
+        self, start: Cell, goal: Cell, corridor: Corridor | None
+    ) -> tuple[LongArray | None, int]:
+        """Find a path; see `Refiner`.
+
+        Raises
+        ------
+        PresetError
+            When the refiner returns something else than legal moves from start to goal inside the
+            corridor, and a number of expansions.
+        """
+        returned: Any = self._own.refine(start, goal, corridor)
+        try:
+            given, expanded = returned
+            cells = None if given is None else np.array(given)
+            count = int(expanded)
+        except (TypeError, ValueError, OverflowError):
+            raise self._wrong("something else than (cells, expanded)") from None
+        if cells is None:
+            return None, count
+        if cells.ndim != 2 or cells.shape[1] != 2 or cells.dtype.kind not in "iu":  # noqa: PLR2004
+            raise self._wrong(f"cells of shape {cells.shape} and type {cells.dtype}")
+        path: LongArray = cells.astype(np.int64)
+        if not len(path) or tuple(path[0]) != tuple(start) or tuple(path[-1]) != tuple(goal):
+            raise self._wrong(f"a path that does not lead from {tuple(start)} to {tuple(goal)}")
+        if not self._is_legal(path):
+            raise self._wrong("a path with a move that is not legal on the grid")
+        if corridor is not None and not corridor.mask()[tuple(path.T)].all():
+            raise self._wrong("a path that leaves its corridor")
+        return path, count
+
+    def _is_legal(self, path: LongArray) -> bool:
+        """Return whether all cells may be entered, and all moves are legal."""
+        if not ((path >= 0) & (path < self._grid.shape)).all():
+            return False
+        steps = np.diff(path, axis=0)
+        is_step = (steps[:, None] == STEPS).all(axis=2)
+        legal = self._moves[tuple(path[:-1].T)][:, None] >> np.arange(8, dtype=np.uint8) & 1 == 1
+        return bool(self._enterable[tuple(path[0])] and (is_step & legal).any(axis=1).all())
+
+    @cached_property
+    def _enterable(self) -> BoolArray:
+        return self._grid.enterable(allow_unexplored=self._allow_unexplored)
+
+    @cached_property
+    def _moves(self) -> ByteArray:
+        """uint8 (rows, cols), masks of the legal moves."""
+        enterable = np.ascontiguousarray(self._enterable)
+        moves: ByteArray = legal_moves(enterable, self._grid.corner_cutting)
+        return moves
+
+    def _wrong(self, what: str) -> PresetError:
+        return _refused(
+            self._name,
+            f"refine returned {what}, expected (cells, expanded): whole numbers of shape (n, 2) by "
+            "legal moves from start to goal, or None, and a count",
+        )
+
+
+def _refused(name: str, why: str) -> PresetError:
+    return PresetError(f"planner.refine: {name}: {why}")
+
+
+def _one_line(error: BaseException) -> str:
+    """Return a foreign error in one line."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]} ..."

@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.itinerary import heading_of, waypoint_text
+from hybridnav.planner import PlanStatus
+from hybridnav.planner.guide import sentences
+from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
 from hybridnav.planner.named import At, check_names, points_of_waypoints
-from hybridnav.result import PlanStatus
-from hybridnav.sentences import sentences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
+    from hybridnav.planner import Metric, PlanResult
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.finish import Smooth
-    from hybridnav.planner.legs import Leg
+    from hybridnav.planner.guide import Instruction
+    from hybridnav.planner.guide.legs import Leg
     from hybridnav.planner.planner import HybridPlanner
-    from hybridnav.result import Metric, PlanResult
-    from hybridnav.sentences import Instruction
 
 _COUNTS = (
     "expanded",
@@ -151,7 +151,7 @@ class Tour:
         Parameters
         ----------
         language
-            Code of a language, one of `hybridnav.sentences.languages`.
+            Code of a language, one of `hybridnav.planner.guide.languages`.
 
         Returns
         -------

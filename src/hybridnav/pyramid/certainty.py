@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import frozen
-from hybridnav.grid import CellClass
-from hybridnav.grid.clearance import greatest_within
-from hybridnav.pyramid._certainty_kernels import grow_cores
+from hybridnav._base.copies import frozen
+from hybridnav.maps import CellClass
+from hybridnav.maps.clearance import greatest_within
 from hybridnav.pyramid.cracks import endpoints_of
+from hybridnav.pyramid.kernels.certainty import grow_cores
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
 
 _FOREST = np.int64, np.uint8, np.float64, np.int64, np.uint8
 """Types of the arrays of a forest of cells."""

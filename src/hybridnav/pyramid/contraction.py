@@ -7,19 +7,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.combinatorial import CombinatorialMap
-from hybridnav.combinatorial import darts as dart_kernels
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _join_kernels, _kernels
-from hybridnav.pyramid.hulls import merge_hulls
+from hybridnav.pyramid import CombinatorialMap
+from hybridnav.pyramid import darts as dart_kernels
+from hybridnav.pyramid.kernels import base as _base_kernels
+from hybridnav.pyramid.kernels import decimation as _kernels
+from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels import hulls as _hull_kernels
+from hybridnav.pyramid.kernels import joins as _join_kernels
+from hybridnav.pyramid.kernels.decimation import Hulls
+from hybridnav.pyramid.kernels.hulls import hulls_of_points
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
 from hybridnav.pyramid.scratch import Scratch
 from hybridnav.pyramid.start import N_CLASSES
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, IntArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray
     from hybridnav.pyramid.start import Start
     from hybridnav.pyramid.steering import Steering
+
 
 NO_LIMIT = 2**62
 """A squared distance beyond all others."""
@@ -296,3 +302,36 @@ class Decimation:
         now = time.perf_counter()
         self.stats.seconds[stage] = self.stats.seconds.get(stage, 0.0) + now - self._began
         self._began = now
+
+
+# Convex hulls of the fields of a level, from those of the level below.
+
+
+def merge_hulls(hulls: Hulls, merged_into: IntArray, n_vertices: int) -> Hulls:
+    """Compute the hulls of fields from the hulls of their parts.
+
+    Parameters
+    ----------
+    hulls
+        Hulls of the parts.
+    merged_into
+        int (n_parts,), the field that each part belongs to.
+    n_vertices
+        Number of fields.
+
+    Returns
+    -------
+    Hulls
+        Hulls of the fields.
+    """
+    of_point = np.repeat(merged_into, np.diff(hulls.start))
+    rows, cols = hulls.points.T.astype(np.int64)
+    row_bits, col_bits = (int(part.max(initial=0)).bit_length() for part in (rows, cols))
+    # Sort with numpy: a sort in a kernel takes more than a second to compile.
+    keys = np.sort((of_point.astype(np.int64) << row_bits | rows) << col_bits | cols)
+    points = np.empty((len(keys), 2), np.int32)
+    points[:, 0] = keys >> col_bits & (1 << row_bits) - 1
+    points[:, 1] = keys & (1 << col_bits) - 1
+    offset = np.zeros(n_vertices + 1, np.int64)
+    np.cumsum(np.bincount(of_point, minlength=n_vertices), out=offset[1:])
+    return Hulls(*hulls_of_points(offset, points))

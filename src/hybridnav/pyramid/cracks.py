@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.pyramid._field_kernels import edges_to_rim, find_cracks
+from hybridnav.pyramid.kernels.fields import edges_to_rim, find_cracks
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 
 
 __all__ = [

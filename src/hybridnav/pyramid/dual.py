@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, LongArray
-    from hybridnav.combinatorial import CombinatorialMap
+    from hybridnav._base.typing import ByteArray, LongArray
+    from hybridnav.pyramid import CombinatorialMap
 
 
 class FaceKind(IntEnum):

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     import networkx as nx
 
-    from hybridnav._typing import ByteArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import ByteArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
 
 Node = tuple[int, dict[str, Any]]
 

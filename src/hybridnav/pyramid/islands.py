@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import ByteArray, IntArray, LongArray
 
 RIM = 0
 """Label of the occupied ring round the map and of every obstacle that touches it."""

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid.islands import Islands
 
 

@@ -7,26 +7,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._copies import copies_alike, frozen
-from hybridnav.combinatorial import CombinatorialMap
+from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.fields import field_distances
+from hybridnav._base.moves import STRAIGHT, length_in_cells
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _field_kernels, _hull_kernels
+from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.certainty import Certainty, certainty_of
 from hybridnav.pyramid.cracks import boundaries_of, cell_pairs, endpoints_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.export import multigraph, vertices_with_attributes
+from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels import hulls as _hull_kernels
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.pyramid.simple import SimpleGraph, simple_graph
-from hybridnav.search.fields import field_distances
-from hybridnav.search.moves import STRAIGHT, length_in_cells
 
 _SOUTH = 3
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid.lazy_islands import LazyIslands
     from hybridnav.pyramid.record import Record
 

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.checks import (
+from hybridnav.pyramid.lazy_islands import LazyIslands
+from hybridnav.pyramid.level import Level
+from hybridnav.pyramid.record import (
     check_fit,
     checked_most_cells,
     checked_settings,
     checked_vertices,
 )
-from hybridnav.pyramid.lazy_islands import LazyIslands
-from hybridnav.pyramid.level import Level
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav._base.typing import IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Linkage, Record
     from hybridnav.pyramid.steering import Resists

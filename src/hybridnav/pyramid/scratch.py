@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, KeyArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, KeyArray
 
 
 @dataclass

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.grid.runs import unique_rows
+from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     import networkx as nx
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid.export import Node
 
 _LISTED = 8

@@ -6,16 +6,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.combinatorial.darts import Darts
-from hybridnav.pyramid import _base_kernels, _field_kernels
-from hybridnav.pyramid._kernels import Vertices
-from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
-from hybridnav.pyramid.record import Record
+from hybridnav.pyramid.darts import Darts
+from hybridnav.pyramid.kernels import base as _base_kernels
+from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels.decimation import Vertices
+from hybridnav.pyramid.record import SURVIVES, Record
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import AnyArray, ByteArray, LongArray
+
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import ByteArray, IntArray
+    from hybridnav._base.typing import ByteArray, IntArray
     from hybridnav.pyramid.level import Level
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]
@@ -139,3 +143,176 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
         plane.base_edge.copy(),
     )
     return Start(record, darts, vertices, level.index, cols)
+
+
+# The lower levels of open ground in closed form: blocks.
+#
+# A *block* is an aligned square of 2, 4 or 8 cells a side, all of one class; those of 4 and 8 lie
+# in the middle of more of their class. Its cells are contracted along a quadtree, first pairs
+# along rows (levels 1, 3, 5), then pairs of those along columns (levels 2, 4, 6), and until it is
+# whole no other vertex joins it: a block of side 2^p is one vertex from level 2p on. The place of
+# a cell or edge in its block alone decides when and how it goes, so the darts inside a block are
+# never built.
+
+MAX_POWER = 3
+"""The largest block has 2^3 cells a side: larger ones gain no time."""
+
+_PERIOD = 2 << MAX_POWER  # a block's survivor depends on whether its block number is odd
+
+
+class Templates(NamedTuple):
+    """Ends of cells and edges by the power p of their block (side 2^p) and their place in it.
+
+    `vertex_end`, and `parent_rows` and `parent_cols`, the steps to the parent, are indexed by
+    (p, row mod 16, col mod 16). The other arrays hold ends of edges as `Record.edge_end` does:
+    `inside_*` by (p, row mod 8, col mod 8), 0 for an edge that leaves the block; `across_*`, for
+    edges that leave it, by (lesser power, row or column mod 8).
+    """
+
+    vertex_end: ByteArray
+    parent_rows: LongArray
+    parent_cols: LongArray
+    inside_east: ByteArray
+    inside_north: ByteArray
+    across_east: ByteArray
+    across_north: ByteArray
+
+
+def survivor_offset(power: int, number: int) -> int:
+    """Return the row or column of the surviving cell in a block.
+
+    It is near the middle, on the side where the middle of the next larger block is.
+
+    `number` is the row or column of the block among blocks of its size.
+    """
+    if power == 0:
+        return 0
+    if number % 2 == 0:
+        return (1 << power - 1) + survivor_offset(power - 1, 1)
+    return survivor_offset(power - 1, 0)
+
+
+def survivor_at(power: int, position: int) -> int:
+    """Return the row or column of the surviving cell of the block over a row or column."""
+    number = position >> power
+    return (number << power) + survivor_offset(power, number)
+
+
+def _death(position: int) -> int:
+    """Return the least power of a block over a row or column whose surviving one is another."""
+    for power in range(1, MAX_POWER + 1):
+        if survivor_at(power, position) != position:
+            return power
+    return MAX_POWER + 1
+
+
+def _twos(number: int) -> int:
+    """Return how often two divides a positive number."""
+    return (number & -number).bit_length() - 1
+
+
+def _across(power: int, position: int, *, upright: bool) -> int:
+    """Return the end of an edge between two blocks by its place along the border.
+
+    Parallel edges go when the cells beside each other are merged on both sides.
+    """
+    place = position % (1 << power)
+    if place == 0:
+        return SURVIVES
+    level = 2 * _twos(place) + (2 if upright else 1)
+    return 2 * level + 1
+
+
+def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
+    """Return the end of an edge from `along` to the next cell inside a block, at `across`.
+
+    It is the end of an edge between the two halves that it joins; it is contracted where they keep
+    it.
+    """
+    if (along + 1) % (1 << power) == 0:
+        return 0
+    halves = _twos(along + 1)
+    end = _across(halves if upright else halves + 1, across, upright=upright)
+    return 2 * (2 * halves + (1 if upright else 2)) if end == SURVIVES else end
+
+
+def make_templates() -> Templates:
+    """Fill the tables."""
+    powers, width = MAX_POWER + 1, 1 << MAX_POWER
+    vertex_end = np.full((powers, _PERIOD, _PERIOD), SURVIVES, np.uint8)
+    parent_rows = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
+    parent_cols = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
+    inside_east = np.zeros((powers, width, width), np.uint8)
+    inside_north = np.zeros((powers, width, width), np.uint8)
+    for power, row, col in np.ndindex(powers, _PERIOD, _PERIOD):
+        by_row, by_col = _death(row), _death(col)
+        if by_col <= min(power, by_row):
+            vertex_end[power, row, col] = 2 * by_col - 1
+            parent_cols[power, row, col] = survivor_at(by_col, col) - col
+        elif by_row <= power:
+            vertex_end[power, row, col] = 2 * by_row
+            parent_rows[power, row, col] = survivor_at(by_row, row) - row
+    for power, row, col in np.ndindex(powers, width, width):
+        inside_east[power, row, col] = _inside(power, col, row, upright=True)
+        inside_north[power, row, col] = _inside(power, row, col, upright=False)
+    across_east, across_north = (
+        np.array(
+            [[_across(p, i, upright=u) for i in range(width)] for p in range(powers)], np.uint8
+        )
+        for u in (True, False)
+    )
+    return Templates(
+        vertex_end,
+        parent_rows,
+        parent_cols,
+        inside_east,
+        inside_north,
+        across_east,
+        across_north,
+    )
+
+
+TEMPLATES = make_templates()
+
+
+def max_power(limit: int) -> int:
+    """Return the power of the largest blocks: at most half the merge distance a side.
+
+    Every linkage allows blocks of that size, and they leave room for fields of other shapes.
+    `limit` is the squared distance in cells.
+    """
+    return sum(4 << 2 * power <= limit for power in range(1, MAX_POWER + 1))
+
+
+def steps_to_parents(cols: int) -> LongArray:
+    """Return the steps from each cell to the one it is contracted into.
+
+    They are differences of flat cells on a map with `cols` columns: int64, by power and place as
+    `Templates.parent_rows`.
+    """
+    return TEMPLATES.parent_rows * cols + TEMPLATES.parent_cols
+
+
+def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
+    """Return the power of the block of every aligned 2x2 cells, 0 outside blocks.
+
+    Parameters
+    ----------
+    kinds
+        The kind of each cell, (rows, cols), read-only; 0 for no vertex.
+    largest
+        Power of the largest blocks.
+
+    Returns
+    -------
+    ByteArray
+        uint8, with one row and one column more than there are whole squares, for the cells beyond
+        them.
+    """
+    power = np.zeros((kinds.shape[0] // 2 + 1, kinds.shape[1] // 2 + 1), np.uint8)
+    squares = kinds
+    for p in range(1, largest + 1):
+        halves, squares = squares, _base_kernels.uniform_squares(squares)
+        squares.flags.writeable = False  # like the kinds, so that one compilation serves both
+        _base_kernels.raise_powers(power, squares, halves, p)
+    return power

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from hybridnav.pyramid._kernels import ATTRIBUTE_MAX
+from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import IntArray, LongArray
-    from hybridnav.combinatorial.darts import Darts
-    from hybridnav.pyramid._kernels import Vertices
+    from hybridnav._base.typing import IntArray, LongArray
+    from hybridnav.pyramid.darts import Darts
+    from hybridnav.pyramid.kernels.decimation import Vertices
 
 WORST_RANK: int = ATTRIBUTE_MAX
 """Rank of the arcs that are contracted last."""

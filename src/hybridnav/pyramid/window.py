@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.pyramid import _field_kernels
 from hybridnav.pyramid.decimation import contract_within
+from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.record import MAX_LEVELS, Record
 from hybridnav.pyramid.start import Start, start_at_base
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.pyramid.record import Linkage
 
 _FIRST_KIND = 3

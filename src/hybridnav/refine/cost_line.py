@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav._trig import directions
-from hybridnav.poses import wrapped
-from hybridnav.refine import _cost_line_kernels as kernels
-from hybridnav.refine._arc_kernels import round_bends
-from hybridnav.refine.open_cells import open_cells
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.poses import wrapped
+from hybridnav._base.trig import directions
+from hybridnav.refine.kernels import cost_line as kernels
+from hybridnav.refine.kernels.arcs import round_bends
+from hybridnav.refine.line_of_sight import open_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
 
 _TOLERANCE = 0.01
 """Most that arcs may add to the cost of a line, as a part of it."""

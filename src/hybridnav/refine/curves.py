@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._trig import cos, sin, sines_and_cosines
+from hybridnav._base.trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
-from hybridnav.refine._curve_kernels import shortest_word
+from hybridnav.refine.kernels.curves import shortest_word
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
 
 Pose = tuple[float, float, float]
 """`(x, y, yaw)`, metres and radians, map frame."""

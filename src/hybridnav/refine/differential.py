@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._trig import atan2
+from hybridnav._base.trig import atan2
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.refine.curves import Pose
     from hybridnav.refine.motions import MotionCheck
 

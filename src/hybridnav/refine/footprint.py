@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
 
 MAX_CORNERS = 1000
 """Most corners of a footprint."""

@@ -6,14 +6,14 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
-from hybridnav.refine.open_cells import open_cells
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.refine.line_of_sight import open_cells
 from hybridnav.search.grid_search import Cell, GridSearch
-from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
     from hybridnav.route import Corridor
 
 

@@ -1,7 +1,4 @@
-"""Any-angle finish: a cell path pulled taut in its free space.
-
-J. Hershberger, J. Snoeyink: Computing minimum length paths of a given homotopy class, 1994.
-"""
+"""The cells that paths may use, less those that costs or a query close."""
 
 from __future__ import annotations
 
@@ -9,15 +6,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.refine import _line_of_sight_kernels as kernels
-from hybridnav.refine._taut_kernels import marks_of
-from hybridnav.refine.open_cells import open_cells
+from hybridnav.refine.kernels import line_of_sight as kernels
+from hybridnav.refine.kernels.taut import marks_of
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+
+
+def open_cells(grid: OccupancyGrid, *closed: LongArray | None, allow_unexplored: bool) -> BoolArray:
+    """Return which cells may be entered, bool (rows, cols), in an array of its own.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    closed
+        int64 (n,), flat cells that may not be entered; None for none.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+    """
+    free = grid.enterable(allow_unexplored=allow_unexplored)
+    for cells in closed:
+        if cells is not None:
+            free.flat[cells] = False
+    return free
+
+
+# Any-angle finish: a cell path pulled taut in its free space.
+#
+# J. Hershberger, J. Snoeyink: Computing minimum length paths of a given homotopy class, 1994.
 
 
 @copies_alike

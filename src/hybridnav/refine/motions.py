@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, Frame
-from hybridnav.refine import _motion_kernels as kernels
-from hybridnav.refine._sweep_kernels import look_ahead
+from hybridnav.maps import CellClass, Frame
+from hybridnav.refine.kernels import motions as kernels
+from hybridnav.refine.kernels.sweep import look_ahead
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.refine.footprint import Footprint
 
 _FARTHEST_CELLS = 5000

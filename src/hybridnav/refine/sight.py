@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine._sight_kernels import apart, clear_segments, reaches, shared
-from hybridnav.refine._taut_kernels import marks_of
+from hybridnav.refine.kernels.segments import apart, clear_segments, reaches, shared
+from hybridnav.refine.kernels.taut import marks_of
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav._base.typing import BoolArray, FloatArray
 
 
 class Sight:

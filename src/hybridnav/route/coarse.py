@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid import CellClass
-from hybridnav.search.arc_search import ArcSearch
+from hybridnav.maps import CellClass
+from hybridnav.route.arc_search import ArcSearch
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._base.typing import BoolArray, LongArray
     from hybridnav.topology import TopologicalMap
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.topology import TopologicalMap
 
 

@@ -12,17 +12,18 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hybridnav.costs import UNIT_BITS
+from hybridnav._base.moves import STRAIGHT, length_in_cells
+from hybridnav.maps.costs import UNIT_BITS
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
 from hybridnav.route.room_fields import RoomFields
-from hybridnav.search.moves import STRAIGHT, length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.topology import Rooms, TopologicalMap
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.rooms import Rooms
 
 
 @dataclass(frozen=True)

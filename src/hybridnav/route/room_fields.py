@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.grid import CellClass
-from hybridnav.search.fields import field_distances
-from hybridnav.search.moves import DIAGONAL, STRAIGHT
+from hybridnav._base.fields import field_distances
+from hybridnav._base.moves import DIAGONAL, STRAIGHT
+from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.topology import Rooms
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.topology.rooms import Rooms
 
 
 class RoomFields:

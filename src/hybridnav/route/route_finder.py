@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav.result import Route
+from hybridnav._base.copies import copies_alike
+from hybridnav.route.route import Route
 
 if TYPE_CHECKING:
-    from hybridnav._typing import IntArray, LongArray
-    from hybridnav.topology import Rooms, TopologicalMap
+    from hybridnav._base.typing import IntArray, LongArray
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.rooms import Rooms
 
 
 @copies_alike

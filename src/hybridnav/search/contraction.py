@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from hybridnav.search._contract_kernels import (
-    HEAD_SHIFT,
-    contract,
-    have_reverses,
-    pack,
-    renumbered,
-)
-from hybridnav.search._unpack_kernels import NO_ARC, corners_between
+from hybridnav.search.kernels.contract import HEAD_SHIFT, contract, have_reverses, pack, renumbered
+from hybridnav.search.kernels.unpack import NO_ARC, corners_between
 
 __all__ = [
     "HEAD_SHIFT",

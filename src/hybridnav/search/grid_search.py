@@ -15,17 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
-from hybridnav.search import _astar_kernels as _kernels
-from hybridnav.search import _weighted_kernels as _weighted
-from hybridnav.search._move_kernels import legal_moves, trace_cells
-from hybridnav.search._open_kernels import BUCKET_FULL
-from hybridnav.search.pool import Pool
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.moves import BUCKET_FULL, legal_moves, trace_cells
+from hybridnav._base.pool import Pool
+from hybridnav.search.kernels import astar as _kernels
+from hybridnav.search.kernels import weighted as _weighted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 
 Cell = tuple[int, int]
 

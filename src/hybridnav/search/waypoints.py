@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search import _waypoint_kernels
-from hybridnav.search.moves import legal_moves
+from hybridnav._base.moves import legal_moves
+from hybridnav.search.kernels import waypoints as _waypoint_kernels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 
 
 def cheapest_waypoints(

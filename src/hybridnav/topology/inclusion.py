@@ -19,9 +19,10 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from hybridnav.pyramid.dual import FaceKind
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.pyramid import Level
     from hybridnav.pyramid.islands import Islands
+
 
 _EAST = 0
 

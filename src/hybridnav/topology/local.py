@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 
 if TYPE_CHECKING:
     from hybridnav.pyramid import Level
+
 
 Pose = tuple[float, float, float]
 """`(x, y, yaw)` of one frame in another, in metres and radians."""

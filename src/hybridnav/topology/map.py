@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.topology import local
 
 if TYPE_CHECKING:
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
     import networkx as nx
 
-    from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.topology.inclusion import Enclosed, Inclusion
-    from hybridnav.topology.room_level import Rooms
+    from hybridnav.topology.rooms.level import Rooms
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class TopologicalMap:
         InvalidValueError
             When the pyramid was built without rooms.
         """
-        from hybridnav.topology.room_level import Rooms  # noqa: PLC0415 - most maps have none
+        from hybridnav.topology.rooms.level import Rooms  # noqa: PLC0415 - most maps have none
 
         return Rooms(self.pyramid)
 

@@ -12,15 +12,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
-from hybridnav.grid import CellClass
+from hybridnav._base.moves import STEPS
+from hybridnav.maps import CellClass
 from hybridnav.pyramid.dual import FaceKind
-from hybridnav.search.moves import STEPS
 from hybridnav.viz.fields import Field, WalkTree, distance_to_rim, rounded, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.pyramid import Level
 
 Corner = tuple[int, int]

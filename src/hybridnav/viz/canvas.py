@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.style import Sizes
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import AnyArray, ByteArray, FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import AnyArray, ByteArray, FloatArray
+    from hybridnav.maps import OccupancyGrid
 
 MAX_IMAGE_SIDE = 6000
 """Cells per side beyond which an image is averaged first, more than any page resolves."""

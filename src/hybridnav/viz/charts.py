@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.metrics.statistics import TOLERANCE
+from hybridnav.maps.limits import TOLERANCE
 from hybridnav.viz import style
 from hybridnav.viz.canvas import new_figure
 from hybridnav.viz.style import Sizes
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
 
 LEAST_LOSS = 1e-4
 """Where a scale of losses turns from linear to logarithmic: 0.01 %, the least loss worth a look."""

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.metrics.judge import checked_points
+from hybridnav.maps import CellClass
+from hybridnav.maps.checks import checked_points
 from hybridnav.planner.blocked import as_blocked
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray
-    from hybridnav.costs import CostLayer
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav._base.typing import BoolArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner.blocked import Closable
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry

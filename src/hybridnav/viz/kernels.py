@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.lines import Line2D
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, known_view
 from hybridnav.viz.layout import finish
@@ -17,7 +17,7 @@ from hybridnav.viz.topology import Graph, draw_ground, drawable
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.pyramid import DualGraphPyramid
     from hybridnav.viz.layout import Entry
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.viz.canvas import Canvas
 
 _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hybridnav.grid import CellClass
+from hybridnav.maps import CellClass
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import Level
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes

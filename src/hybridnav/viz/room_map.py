@@ -8,14 +8,14 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import NO_ROOM
-from hybridnav.grid.runs import unique_rows
-from hybridnav.topology import Rooms, TopologicalMap
+from hybridnav.maps import NO_ROOM
+from hybridnav.maps.islands import unique_rows
+from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import finish_with_axes
 from hybridnav.viz.maps import ground_entries, swatch
+from hybridnav.viz.places import colour_vertices
 from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import ByteArray, IntArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.topology import Door
+    from hybridnav._base.typing import ByteArray, IntArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
 DOOR_POINTS = 1.2

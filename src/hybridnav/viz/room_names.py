@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from matplotlib.lines import Line2D
 from scipy import ndimage
 
-from hybridnav.grid import NO_ROOM
+from hybridnav.maps import NO_ROOM
 from hybridnav.viz import style
 from hybridnav.viz.labels import LabelPlacer
 from hybridnav.viz.layout import text_width
@@ -17,10 +17,8 @@ from hybridnav.viz.layout import text_width
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from hybridnav._typing import BoolArray, FloatArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.online import OnlineDoor
-    from hybridnav.topology import Door
+    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.viz.canvas import Canvas
 
 _NAME_SIZES = (0.75, 0.65, 0.55)
@@ -35,6 +33,20 @@ _PARTS = 4
 """Parts per side of a room's bounding box, each with a spot for the name."""
 _SAMPLES = 9
 """Points per side of a name's box that are looked up in the map."""
+
+
+class Numbered(Protocol):
+    """A door with a number, of a map or of one that changes."""
+
+    @property
+    def number(self) -> int:
+        """Its number."""
+        ...
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """In metres of the map frame."""
+        ...
 
 
 class RoomWriter:
@@ -59,7 +71,7 @@ class RoomWriter:
         self.unnamed: list[int] = []
         """Rooms whose names did not fit, the largest first."""
 
-    def number_doors(self, doors: Sequence[Door | OnlineDoor], *, always: bool = False) -> None:
+    def number_doors(self, doors: Sequence[Numbered], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
 
         Parameters

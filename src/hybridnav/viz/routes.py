@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
-from hybridnav.result import COST_METRICS
+from hybridnav.planner import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.costs import draw_query
@@ -16,12 +16,7 @@ from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.places import Places
-from hybridnav.viz.room_map import (
-    DOOR_POINTS,
-    draw_doors,
-    draw_room_cells,
-    room_entry,
-)
+from hybridnav.viz.room_map import DOOR_POINTS, draw_doors, draw_room_cells, room_entry
 from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
@@ -29,13 +24,14 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.costs import CostLayer
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Tour
     from hybridnav.planner.alternatives import Alternatives
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.legs import Leg
-    from hybridnav.topology import Door, Rooms, TopologicalMap
+    from hybridnav.planner.guide.legs import Leg
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
 _TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0

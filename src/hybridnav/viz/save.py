@@ -11,13 +11,13 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from hybridnav._files import replace_file
+from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import PathLike
+    from hybridnav._base.typing import PathLike
 
 _METADATA: dict[str, dict[str, Any]] = {
     ".pdf": {"CreationDate": None},

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray
+    from hybridnav._base.typing import ByteArray
 
 OCCUPIED = "#2b2b2b"
 BLOCKED = "#989898"

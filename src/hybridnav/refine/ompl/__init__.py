@@ -4,8 +4,6 @@ I. Sucan, M. Moll, L. Kavraki: The Open Motion Planning Library, 2012. Only the 
 imports `ompl`; this package works without it up to the first query.
 """
 
-from hybridnav.refine.ompl.clearance import Clearance
-from hybridnav.refine.ompl.messages import Query, Reply, Search, Setup
-from hybridnav.refine.ompl.worker import Worker, require_ompl
+import lazy_loader
 
-__all__ = ["Clearance", "Query", "Reply", "Search", "Setup", "Worker", "require_ompl"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

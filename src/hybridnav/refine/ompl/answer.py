@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ompl import base, util
 
 from hybridnav.refine.ompl import chain
 from hybridnav.refine.ompl.attempts import Attempts
-from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
-from hybridnav.refine.ompl.sampler import draw_from
-from hybridnav.refine.ompl.search_area import search_area_of
+from hybridnav.refine.ompl.problem import IMPROVING, Problem, search_area_of, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.messages import Query, Reply
-    from hybridnav.refine.ompl.search_area import Base, SearchArea
+    from hybridnav.refine.ompl.client import Query, Reply
+    from hybridnav.refine.ompl.problem import Base, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
+
 
 _FIRST = 0.7
 """Share of the time left in which a corridor other than the last must yield a path."""
@@ -91,3 +91,41 @@ def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, par
         attempts.finish(whole, found.points)
     else:
         attempts.partial(found.points)
+
+
+# States drawn from the cells of a corridor, for planners with a valid-state sampler.
+
+
+class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the bindings have no types
+    """Points in cells, each cell as likely as any other, with any heading."""
+
+    def __init__(self, information: Any, corridor: SearchArea, space: StateSpace) -> None:
+        super().__init__(information)
+        self._cells = corridor.cells
+        self._frame = corridor.grid.frame
+        self._space = space
+        self._random = util.RNG()
+
+    def sample(self, state: Any) -> bool:
+        """Fill a state and return whether it is valid."""
+        uniform = self._random.uniformReal
+        row, col = self._cells[self._random.uniformInt(0, len(self._cells) - 1)].tolist()
+        x, y = self._frame.points_of_grid((row + uniform(0, 1), col + uniform(0, 1))).tolist()
+        self._space.fill(state, (x, y, uniform(-math.pi, math.pi)))
+        return bool(self._space.state_valid(state))
+
+    def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802, ARG002
+        """Fill a state anywhere: only PRM's expansion asks for near ones, and it is not used."""
+        return self.sample(state)
+
+
+def draw_from(corridor: SearchArea, space: StateSpace) -> None:
+    """Make a space draw its valid states from the cells of a corridor."""
+
+    def allocate(information: Any) -> _CellSampler:
+        sampler = _CellSampler(information, corridor, space)
+        space.keep(sampler)
+        return sampler
+
+    space.information.setValidStateSamplerAllocator(allocate)
+    space.information.setup()

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import sys
 import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ompl import base, geometric
 
-from hybridnav.refine.ompl.budget import Budget
-from hybridnav.refine.ompl.messages import Reply, Search
-from hybridnav.refine.ompl.objectives import Objective
-from hybridnav.refine.ompl.simplify import Simplifier, simplify
+from hybridnav.refine.ompl.client import Reply, Search
+from hybridnav.refine.ompl.settings import ROADMAPS
 from hybridnav.refine.ompl.spaces import StateSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.refine.ompl.messages import Query
-    from hybridnav.refine.ompl.search_area import Base, SearchArea
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.refine.ompl import OmplSettings
+    from hybridnav.refine.ompl.client import Query
+    from hybridnav.refine.ompl.problem import Base, Clearance, SearchArea
+
 
 _KEPT = 0.03
 """Share of the time reserved for the reply."""
@@ -138,3 +141,260 @@ class Attempts:
             is_last=is_last,
             search=self.search if is_last else None,
         )
+
+
+# Shortening and smoothing by OMPL's PathSimplifier.
+
+_SEGMENT_STATES = 16
+"""States of the segments that are simplified one by one: PathSimplifier tries pairs of states
+anywhere on the path, nearly all of which are out of sight of each other on a long path, and some of
+its steps take quadratic time."""
+_STEPS = 8
+"""Steps for each state of a segment."""
+_SNAP = 1e-3
+_LEAST_GAIN = 5e-4
+"""Share that a round must gain to count as fruitful."""
+_FRUITLESS = 3
+_SPLINES, _LEAST_MOVE = 3, 1e-4
+"""Rounds of subdivision, each of which doubles the states, and the least share of the length by
+which a state must move."""
+
+
+def simplify(
+    space: StateSpace,
+    points: FloatArray,
+    budget: Budget,
+    objective: Objective,
+    on_better: Callable[[FloatArray, float], None],
+) -> FloatArray:
+    """Shorten a path by rounds of PathSimplifier, until they gain nothing or the time is up.
+
+    Parameters
+    ----------
+    space
+        State space with the checks of the whole corridor.
+    points
+        float64 (n, 3), a valid path.
+    budget
+        The budget of the query.
+    objective
+        Cost of a path.
+    on_better
+        Called with each better path and its cost.
+    """
+    simplifier = Simplifier(space, objective)
+    cost, fruitless, shift = objective.cost(points), 0, 0
+    while len(points) > 2 and fruitless < _FRUITLESS and budget.left() > 0:  # noqa: PLR2004
+        before = cost
+        points = _round(simplifier, points, budget, shift)
+        cost = objective.cost(points)
+        fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
+        shift = 0 if shift else _SEGMENT_STATES // 2
+        on_better(points, cost)
+    return points
+
+
+def _round(simplifier: Simplifier, points: FloatArray, budget: Budget, shift: int) -> FloatArray:
+    """Simplify segment by segment; segments begin at other states in every other round."""
+    cuts = [0, *range(shift or _SEGMENT_STATES, len(points) - 1, _SEGMENT_STATES), len(points) - 1]
+    done = [points[:1]]
+    for first, last in itertools.pairwise(cuts):
+        segment = points[first : last + 1]
+        if len(segment) > 2 and budget.left() > 0:  # noqa: PLR2004
+            segment = simplifier.shorter(segment)
+            budget.spend(_STEPS * (last - first))
+        done.append(segment[1:])
+    return np.concatenate(done)
+
+
+class Simplifier:
+    """OMPL's PathSimplifier, with checked results.
+
+    OMPL assumes that parts of valid motions are valid, but a point between two others can be
+    rounded to the wrong side of a corner that their line grazes.
+
+    Parameters
+    ----------
+    space
+        State space with the checks.
+    objective
+        Cost of a path.
+    """
+
+    def __init__(self, space: StateSpace, objective: Objective) -> None:
+        self._space = space
+        self._objective = objective
+        self._own = objective.of(space)
+        self._simplifier = geometric.PathSimplifier(space.information, None, self._own)
+
+    def shorter(self, points: FloatArray) -> FloatArray:
+        """Drop states, and join points between them; return the path itself if that is in vain."""
+        path = self._path_of(points)
+        steps = _STEPS * len(points)
+        self._simplifier.reduceVertices(path, steps, steps, 1.0)
+        self._simplifier.partialShortcutPath(path, steps, steps, 0.33, _SNAP)
+        return self._checked(path, points)
+
+    def smoother(self, points: FloatArray) -> FloatArray:
+        """Round the bends of a path of straight motions by B-splines, where there is room.
+
+        Return the path itself if that is in vain. States at the corner of an obstacle stay.
+        """
+        path = self._path_of(points)
+        least_m = _LEAST_MOVE * self._space.length(points)
+        self._simplifier.smoothBSpline(path, _SPLINES, least_m)
+        return self._checked(path, points)
+
+    def _path_of(self, points: FloatArray) -> Any:
+        path = geometric.PathGeometric(self._space.information)
+        state = self._space.information.allocState()
+        for point in points:
+            self._space.fill(state, point)
+            path.append(state)
+        return path
+
+    def _checked(self, path: Any, points: FloatArray) -> FloatArray:
+        found = self._space.driven(self._space.points(path.getStates()))
+        cost_of = self._objective.cost
+        return found if cost_of(found) < cost_of(points) and self._space.is_valid(found) else points
+
+
+# Costs of paths: length, or length weighted by nearness to obstacles.
+
+
+class Objective:
+    """The objective of a query, for OMPL and for this package.
+
+    Parameters
+    ----------
+    whole
+        State space of the whole corridor.
+    settings
+        State space and planner.
+    clearance
+        Weight of the length; None for the length itself.
+    """
+
+    def __init__(
+        self, whole: StateSpace, settings: OmplSettings, clearance: Clearance | None
+    ) -> None:
+        self._whole = whole
+        self._clearance = clearance
+        # PRM waits forever for objectives in Python: it minimises length and turns.
+        turns = settings.space in {"se2", "differential"}
+        self._is_own = turns and settings.planner not in ROADMAPS
+
+    def of(self, space: StateSpace) -> Any:
+        """Return the OMPL object of the objective for one state space of the query."""
+        if self._clearance is not None:
+            return _Line(space, self._clearance.cost)
+        if self._is_own:
+            return _Line(space, _length)
+        return base.PathLengthOptimizationObjective(space.information)
+
+    def cost(self, points: FloatArray) -> float:
+        """Return the cost of a path of states."""
+        if self._clearance is None:
+            return self._whole.length(points)
+        return self._clearance.cost_of(points)
+
+
+def _length(x0: float, y0: float, x1: float, y1: float) -> float:
+    return math.hypot(x1 - x0, y1 - y0)
+
+
+class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings have no types
+    """Cost of the base's straight lines without turns; distances bound it from below.
+
+    OMPL's own path length counts half a metre for each radian of an SE2 path.
+    """
+
+    def __init__(
+        self, space: StateSpace, cost: Callable[[float, float, float, float], float]
+    ) -> None:
+        super().__init__(space.information)
+        self._cost = cost
+        self._flat = space.dimension == 2  # noqa: PLR2004
+
+    def _endpoints(self, first: Any, second: Any) -> tuple[float, float, float, float]:
+        if self._flat:
+            return first[0], first[1], second[0], second[1]
+        return first.getX(), first.getY(), second.getX(), second.getY()
+
+    def motionCost(self, first: Any, second: Any) -> Any:  # noqa: N802 - OMPL's names
+        return base.Cost(self._cost(*self._endpoints(first, second)))
+
+    def motionCostHeuristic(self, first: Any, second: Any) -> Any:  # noqa: N802
+        return base.Cost(_length(*self._endpoints(first, second)))
+
+    def stateCost(self, state: Any) -> Any:  # noqa: ARG002, N802
+        return base.Cost(0.0)
+
+
+# Budgets: the time, or the iterations, that a query has left.
+
+
+class Budget:
+    """The budget of a query, counted in seconds, or in iterations if these are given.
+
+    Only a budget in iterations is repeatable from a seed.
+
+    Parameters
+    ----------
+    began_s, deadline_s
+        Times of `time.monotonic`.
+    iterations
+        None to count seconds.
+    """
+
+    def __init__(self, began_s: float, deadline_s: float, iterations: int | None) -> None:
+        self.began_s = began_s
+        self.iterations = 0
+        self._most = iterations
+        self._deadline_s = deadline_s
+        self._whole_s = max(deadline_s - began_s, 1e-6)
+
+    def left(self) -> float:
+        """Return the share that is left, 1 at the beginning, 0 at the end."""
+        if self._most is not None:
+            return max(1 - self.iterations / self._most, 0.0)
+        return max((self._deadline_s - time.monotonic()) / self._whole_s, 0.0)
+
+    def seconds(self) -> float:
+        """Return the seconds since the beginning."""
+        return time.monotonic() - self.began_s
+
+    def spend(self, iterations: int) -> None:
+        """Count iterations that no stopper saw."""
+        self.iterations += iterations
+
+    def stopper(self, part: float, *, most: int | None = None) -> Callable[[], bool]:
+        """Return a function for planners that states whether a share of the rest is spent.
+
+        Planners call it once an iteration.
+
+        Parameters
+        ----------
+        part
+            Share of the budget left now, in (0, 1].
+        most
+            Most iterations; None for no limit.
+        """
+        until = sys.maxsize if most is None else self.iterations + most
+        if self._most is not None:
+            until = min(until, self.iterations + max(int(part * (self._most - self.iterations)), 1))
+
+            def is_spent() -> bool:
+                self.iterations += 1
+                return self.iterations > until
+
+        else:
+            now = time.monotonic()
+            end = now + part * (self._deadline_s - now)
+            clock = time.monotonic
+
+            def is_spent() -> bool:
+                self.iterations += 1
+                return clock() >= end or self.iterations > until
+
+        return is_spent

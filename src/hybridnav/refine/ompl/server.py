@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import HybridNavError
-from hybridnav.refine.ompl.messages import SEARCH_S, Failure, ended, without_answer
-from hybridnav.refine.ompl.search_area import Base
+from hybridnav.refine.ompl.client import SEARCH_S, Failure, ended, without_answer
+from hybridnav.refine.ompl.problem import Base
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.messages import Query, Reply, Setup
+    from hybridnav.refine.ompl.client import Query, Reply, Setup
 
 GRACE = 0.03
 """Share of the budget after its end at which a fork is killed."""
@@ -60,7 +60,7 @@ def serve(connection: Connection) -> None:
 def _warm_up(base: Base) -> None:
     """Load modules and kernels before the first fork, and let OMPL check the parameters."""
     import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
-    from hybridnav.refine.ompl.planners import make  # noqa: PLC0415
+    from hybridnav.refine.ompl.problem import make  # noqa: PLC0415
     from hybridnav.refine.ompl.spaces import StateSpace  # noqa: PLC0415
 
     inside = np.ones(base.setup.grid.shape, dtype=np.bool_)

@@ -15,9 +15,9 @@ from hybridnav.refine.differential import driven
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from hybridnav._typing import FloatArray
-    from hybridnav.config import OmplSettings
+    from hybridnav._base.typing import FloatArray
     from hybridnav.refine.motions import MotionCheck
+    from hybridnav.refine.ompl import OmplSettings
 
 _STATES = {"r2": 2, "se2": 3, "differential": 3, "dubins": 3, "reeds-shepp": 3}
 FINE = 1e-4

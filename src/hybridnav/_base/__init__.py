@@ -1,0 +1,1 @@
+"""What all layers share: compiled kernels, files, copies, moves, sines."""

@@ -1,5 +1,0 @@
-"""Topological and metric layers of other methods, behind one protocol."""
-
-from hybridnav.baselines.protocol import AnyAngleResult, CostClaim, Method, MethodResult
-
-__all__ = ["AnyAngleResult", "CostClaim", "Method", "MethodResult"]

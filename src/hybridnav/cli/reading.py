@@ -1,0 +1,309 @@
+"""How commands read maps and presets, and the group of options for it."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+import hybridnav as hn
+from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav.cli.common import complain, stage
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import (
+    FreeOption,
+    LeastIslandOption,
+    MaxCellsOption,
+    OccupiedOption,
+    PresetOption,
+    RadiusOption,
+    SeedOption,
+    SetOption,
+)
+from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav.cli.blocked import Closing
+    from hybridnav.planner import Preset
+
+_SMOOTH = ("none", "line-of-sight", "arcs")
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """How a command reads its map, and the preset that it takes for it: one group of options."""
+
+    preset: PresetOption = None
+    overrides: SetOption = None
+    robot_radius_m: RadiusOption = None
+    seed: SeedOption = None
+    free_threshold: FreeOption = None
+    occupied_threshold: OccupiedOption = None
+    least_island_m2: LeastIslandOption = 0.0
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS
+
+    def settings(
+        self,
+        map_file: Path,
+        *,
+        preset: str | None = None,
+        overrides: tuple[str, ...] = (),
+        smooth: str | None = None,
+    ) -> Preset:
+        """Return the preset with the settings of the command line, which win over it.
+
+        Parameters
+        ----------
+        map_file
+            A map, or a model, which holds a preset.
+        preset
+            The preset where the command line names none.
+        overrides
+            Settings beside those of the command line, which win over them.
+        smooth
+            How to shorten the path; None as in the preset.
+        """
+        return read_settings(
+            preset if self.preset is None else self.preset,
+            [*overrides, *(self.overrides or ())],
+            self.robot_radius_m,
+            self.seed,
+            smooth=smooth,
+            map_file=map_file,
+        )
+
+
+def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    """Give a command the options of `MapOptions`, which it takes as its argument `reading`.
+
+    Parameters
+    ----------
+    before
+        The parameter of the command before which the help lists them; they are last if it has none.
+    without
+        Options that the command has itself.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        hints = get_type_hints(command, include_extras=True)
+        group = get_type_hints(MapOptions, include_extras=True)
+        added = [each for each in fields(MapOptions) if each.name not in without]
+
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            taken = {each.name: given.pop(each.name) for each in added}
+            command(**given, reading=MapOptions(**taken))
+
+        own = [
+            each.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+            for name, each in inspect.signature(command).parameters.items()
+            if name != "reading"
+        ]
+        shared = [
+            inspect.Parameter(
+                each.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=each.default,
+                annotation=group[each.name],
+            )
+            for each in added
+        ]
+        names = [each.name for each in own]
+        at = names.index(before) if before in names else len(names)
+        parameters = [*own[:at], *shared, *own[at:]]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        return run
+
+    return decorate
+
+
+def read_preset(source: str) -> Preset:
+    """Read a preset by name or file: an unknown name is wrong usage, a bad file unreadable
+    input."""
+    try:
+        return hn.load_preset(source)
+    except hn.PresetNotFoundError as error:
+        from hybridnav.planner.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
+
+        if is_preset_name(source):
+            raise UsageError(str(error)) from None
+        raise
+
+
+def read_settings(
+    preset: str | None,
+    overrides: list[str] | None,
+    radius_m: float | None,
+    seed: int | None,
+    *,
+    smooth: str | None = None,
+    map_file: Path | None = None,
+) -> Preset:
+    """Return a preset with the settings of the command line, which win over it, and over a model
+    that holds the map's pyramid.
+
+    An error in a preset file is the file's; one in an override is the caller's.
+    """
+    if map_file is not None and is_model_file(map_file):
+        from hybridnav.planner.saved import open_model  # noqa: PLC0415
+
+        load_numba()
+        given = None if preset is None else read_preset(preset)
+        plain = open_model(map_file, max_cells=MAX_CELLS).fitted(given)
+    else:
+        plain = read_preset("shortest" if preset is None else preset)
+    return overridden(plain, overrides, radius_m, seed, smooth=smooth)
+
+
+def overridden(
+    plain: Preset,
+    overrides: list[str] | None,
+    radius_m: float | None,
+    seed: int | None,
+    *,
+    smooth: str | None = None,
+) -> Preset:
+    """Return a preset with the settings of the command line."""
+    settings = list(overrides or ())
+    if radius_m is not None:
+        settings.append(f"pyramid.robot_radius_m={radius_m!r}")
+    if seed is not None:
+        settings.append(f"pyramid.seed={seed}")
+    if smooth is not None:
+        if smooth not in _SMOOTH:
+            raise UsageError(f"--smooth must be one of {', '.join(_SMOOTH)}, got {smooth!r:.80}")
+        settings.append(f"planner.smooth={smooth}")
+    try:
+        return hn.load_preset(plain, overrides=settings)
+    except hn.PresetError as error:
+        raise UsageError(str(error)) from None
+
+
+def load_numba() -> None:
+    """Load numba without the linear algebra of scipy, for which it looks at its first kernel.
+
+    That takes longer than the rest of that kernel, and none of ours multiplies matrices. Whoever
+    does in this process still can: numba looks again when it compiles such a product.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas in sys.modules:
+        return
+    sys.modules[blas] = None  # type: ignore[assignment]
+    try:
+        import numba.np.arraymath  # noqa: F401, PLC0415 - it looks
+    finally:
+        del sys.modules[blas]
+
+
+def load_model(
+    path: Path, preset: Preset, seconds: dict[str, float], reading: MapOptions
+) -> hn.Model:
+    """Load a model or a map, inflated as a preset states, without the islands that the user
+    drops."""
+    with stage(f"reading {path}", seconds, "load"):
+        load_numba()
+        model = hn.load(
+            path,
+            robot_radius_m=preset.pyramid.robot_radius_m,
+            free_threshold=reading.free_threshold,
+            occupied_threshold=reading.occupied_threshold,
+            max_cells=reading.max_cells,
+        )
+        allowed = preset.planner.allow_unexplored
+        whole, model = model, model.remade(least_island_m2=reading.least_island_m2 or None)
+        grid = model.grid
+    if is_model_file(path) and not model.is_filed:
+        complain(f"{printable(path)} was made with other settings: of it the map alone is used")
+    if model is whole:
+        return model
+    before, after = (each.enterable(allow_unexplored=allowed).any() for each in (whole.grid, grid))
+    if before and not after:
+        raise UsageError(
+            f"--least-island {reading.least_island_m2:g} leaves no free cell on "
+            f"{printable(grid.name)}: give a smaller area"
+        )
+    return model
+
+
+def is_model_file(path: Path) -> bool:
+    """Return whether a path names a model, without loading the modules that read it."""
+    return path.suffix.lower() == MODEL_SUFFIX
+
+
+def check_room_to_be(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+    """Refuse a robot radius that leaves no cell of a map free."""
+    was_free = (grid.measured == hn.CellClass.FREE).any()
+    if was_free and not grid.enterable(allow_unexplored=allow_unexplored).any():
+        raise UsageError(
+            f"a robot radius of {grid.robot_radius_m:g} m leaves no free cell on "
+            f"{printable(grid.name)}: give a smaller one with --robot-radius"
+        )
+
+
+def grow_topology(
+    model: hn.Model,
+    preset: Preset,
+    seconds: dict[str, float],
+    *,
+    rooms_file: Path | None = None,
+    find_rooms: bool = False,
+    waypoints: Sequence[str | tuple[float, ...]] = (),
+    closing: Closing | None = None,
+) -> hn.TopologicalMap:
+    """Build the pyramid of a map with the settings of a preset, unless the model has it, and the
+    rooms of a file, of the model or, if asked for, those that are found. Refuse names of waypoints
+    and closed rooms that these lack before, and numbers of closed doors after."""
+    grid, rooms = model.grid, model.rooms
+    if rooms_file is not None:
+        with stage(f"reading {rooms_file}", seconds, "rooms"):
+            rooms = hn.load_rooms(rooms_file, grid)
+    elif find_rooms and rooms is None:
+        with stage("finding rooms", seconds, "rooms"):
+            rooms = hn.find_rooms(grid)
+    if rooms is not None:
+        from hybridnav.planner.named import check_waypoints  # noqa: PLC0415 - loads numba
+
+        check_waypoints(rooms, grid, waypoints)
+        for name in closing.rooms if closing is not None else ():
+            rooms.index(name)
+    with stage("building the pyramid", seconds, "pyramid"):
+        topology = model.grown(preset.pyramid, rooms)
+    for number in closing.doors if closing is not None else ():
+        topology.rooms.listed_door(number)
+    return topology
+
+
+def outside(
+    grid: hn.OccupancyGrid, waypoints: Sequence[str | tuple[float, ...]]
+) -> hn.PlanStatus | None:
+    """Return the status that a planner would return for points outside the map, None if both are on
+    it; no planner is needed."""
+    for number, waypoint in enumerate(waypoints):
+        if isinstance(waypoint, str):
+            continue
+        row, col = grid.frame.cells_of(waypoint[:2]).tolist()
+        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+            return hn.PlanStatus.GOAL_OUTSIDE if number else hn.PlanStatus.START_OUTSIDE
+    return None
+
+
+def refused_result(
+    status: hn.PlanStatus, settings: Preset, waypoints: Sequence[str | tuple[float, ...]]
+) -> hn.PlanResult:
+    """Return the result that a planner would return with a status; no planner is needed."""
+    start, goal = (
+        None if isinstance(waypoint, str) else tuple(waypoint)
+        for waypoint in (waypoints[0], waypoints[-1])
+    )
+    record = {
+        "preset": settings.name,
+        "planner": settings.planner.model_dump(),
+        "pyramid": settings.pyramid.model_dump(),
+    }
+    return hn.PlanResult(status, settings=record, start=start, goal=goal)

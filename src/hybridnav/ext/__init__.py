@@ -1,0 +1,1 @@
+"""The wing: what stands beside the mission. Nothing outside imports it."""

@@ -1,0 +1,31 @@
+from .align import align_floors as align_floors, moved_floor as moved_floor
+from .answers import BuildingAlternatives as BuildingAlternatives
+from .building import Building as Building
+from .floors import Floor as Floor
+from .graph_check import (
+    BuildingGraphCheck as BuildingGraphCheck,
+    check_building_graph as check_building_graph,
+)
+from .graph_judge import (
+    BuildingGraphReport as BuildingGraphReport,
+    RouteCounts as RouteCounts,
+    judge_building_graph as judge_building_graph,
+)
+from .graph_match import (
+    MatchedGraph as MatchedGraph,
+    MatchedLink as MatchedLink,
+    match_graph as match_graph,
+)
+from .link_nodes import (
+    BuildingGraph as BuildingGraph,
+    DoorLine as DoorLine,
+    FloorArea as FloorArea,
+    FloorGraph as FloorGraph,
+    join_links as join_links,
+    to_networkx as to_networkx,
+)
+from .links import Link as Link, LinkEnd as LinkEnd, LinkKind as LinkKind
+from .plan import BuildingPlan as BuildingPlan, Ride as Ride
+from .plot import plot_building as plot_building
+
+__all__: list[str]

@@ -1,0 +1,217 @@
+"""Checks of buildings: their floors fit together, and robots can stand at the ends of links."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet.floors import Floor
+from hybridnav.ext.fleet.links import Link
+from hybridnav.maps import CellClass
+from hybridnav.maps.checks import checked_type
+from hybridnav.maps.names import did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from hybridnav._base.typing import LongArray
+    from hybridnav.ext.fleet.links import LinkEnd
+
+
+_LEAST_PART = 0.05
+"""Share of the largest connected part of a floor that a part with the end of a link has."""
+
+
+def check_floors(floors: Sequence[Floor]) -> None:
+    """Refuse floors that do not make one building for one robot.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is none, a name occurs twice, or their planners plan by different presets, for
+        different robots, or with headings.
+    """
+    if not floors:
+        raise InvalidValueError("a building needs at least one floor, got none")
+    seen: set[str] = set()
+    for floor in floors:
+        checked_type("floors", floor, Floor)
+        if floor.name in seen:
+            raise InvalidValueError(f"floor {floor.name}: the name is given twice")
+        seen.add(floor.name)
+        if floor.planner.needs_headings:
+            raise InvalidValueError(
+                f"floor {floor.name}: preset {floor.planner.preset.name} plans with headings, "
+                "which ends of links do not have: take a preset without"
+            )
+    first = floors[0]
+    radius_m = first.planner.topology.grid.robot_radius_m
+    for floor in floors[1:]:
+        other_m = floor.planner.topology.grid.robot_radius_m
+        if other_m != radius_m:
+            raise InvalidValueError(
+                f"floor {floor.name} is for a robot radius of {other_m:g} m and floor "
+                f"{first.name} for {radius_m:g} m: load all maps with one robot_radius_m"
+            )
+        if floor.planner.preset.planner != first.planner.preset.planner:
+            raise InvalidValueError(
+                f"floor {floor.name} is planned by preset {floor.planner.preset.name} and floor "
+                f"{first.name} by {first.planner.preset.name}: their bounds do not add up, take "
+                "one preset"
+            )
+
+
+def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
+    """Refuse links whose names occur twice, and ends where this robot cannot stand.
+
+    Links that the robot does not fit in need no free ends.
+
+    Raises
+    ------
+    InvalidValueError
+        When a link is refused.
+    """
+    known = {floor.name: floor for floor in floors}
+    seen: set[str] = set()
+    for link in links:
+        checked_type("links", link, Link)
+        if not link.name.strip() or not link.name.isprintable():
+            raise InvalidValueError(
+                f"a link needs a name of one printable line, got {link.name!r:.80}"
+            )
+        if link.name in seen:
+            raise InvalidValueError(f"link {link.name}: the name is given twice")
+        seen.add(link.name)
+        check_ends(link, known)
+
+
+def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
+    """Refuse a link that stops at no floor of a name, or where this robot cannot stand.
+
+    Raises
+    ------
+    InvalidValueError
+        When an end is refused.
+    """
+    for end in link.ends:
+        if end.floor not in floors:
+            raise InvalidValueError(
+                f"link {link.name}: no floor is called {end.floor!r:.80}"
+                f"{did_you_mean(end.floor, tuple(floors))}"
+            )
+        if link.admits(floors[end.floor].planner.topology.grid.robot_radius_m):
+            _check_free(link, end, floors[end.floor])
+
+
+def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
+    planner = floor.planner
+    grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
+    x, y = end.position_m
+    at = f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name}"
+    row, col = grid.frame.cell_of(x, y)
+    if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+        raise InvalidValueError(f"{at} lies outside the map: give a point on it")
+    cell = CellClass(grid.classes[row, col])
+    if cell == CellClass.FREE or (allowed and cell == CellClass.UNEXPLORED):
+        return
+    if grid.measured[row, col] == CellClass.FREE:
+        why = f"is too near to an obstacle for a robot radius of {grid.robot_radius_m:g} m"
+    else:
+        why = f"lies in an {cell.name.lower()} cell"
+    raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
+
+
+class FloorParts(NamedTuple):
+    """The connected parts of a floor that the robot may be in."""
+
+    of_cell: LongArray
+    """int64 (rows, cols), the part that each cell lies in, -1 where the robot may not be."""
+    sizes: LongArray
+    """int64 (n,), cells of each part."""
+
+    @classmethod
+    def of(cls, floor: Floor) -> FloorParts:
+        """Find the parts of a floor."""
+        found = parts_of(floor, allow_unexplored=floor.planner.preset.planner.allow_unexplored)
+        return cls(found, np.bincount(found[found >= 0]))
+
+
+def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, FloorParts]) -> None:
+    """Refuse a link if the robot does not reach the rest of a floor from its end there.
+
+    A floor may consist of several parts, as two wings without a passage do, but an end lies in none
+    that is smaller than a twentieth of the largest.
+
+    Parameters
+    ----------
+    link
+        The link, whose ends have been checked.
+    floors
+        The floors of the building, by their names.
+    parts
+        The parts of each floor.
+
+    Raises
+    ------
+    InvalidValueError
+        When an end lies in such a part.
+    """
+    for end in link.ends:
+        grid = floors[end.floor].planner.topology.grid
+        if not link.admits(grid.robot_radius_m):
+            continue
+        of_cell, sizes = parts[end.floor]
+        cells = sizes[of_cell[grid.frame.cell_of(*end.position_m)]]
+        if cells < _LEAST_PART * sizes.max():
+            x, y = end.position_m
+            here, most = (n * grid.cell_area_m2 for n in (cells, sizes.max()))
+            raise InvalidValueError(
+                f"link {link.name}: its end ({x:g}, {y:g}) on floor {end.floor} lies in a "
+                f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "
+                "point from which the robot can drive away"
+            )
+
+
+def parts_of(
+    floor: Floor, *, allow_unexplored: bool = False, closed: LongArray | None = None
+) -> LongArray:
+    """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
+    robot may not be.
+
+    Parameters
+    ----------
+    floor
+        The floor.
+    allow_unexplored
+        Whether the robot enters unexplored cells.
+    closed
+        int64 (n,), flat cells that are closed besides.
+    """
+    from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
+
+    grid = floor.planner.topology.grid
+    is_open = grid.enterable(allow_unexplored=allow_unexplored).copy()
+    if closed is not None:
+        is_open.ravel()[closed] = False
+    around = ndimage.generate_binary_structure(2, 2 if grid.corner_cutting else 1)
+    labels, _ = ndimage.label(is_open, structure=around)
+    found: LongArray = labels.astype(np.int64) - 1
+    return found
+
+
+def check_speed(speed_m_s: float) -> float:
+    """Return a speed, refuse what is none.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not a finite number above 0.
+    """
+    if not (math.isfinite(speed_m_s) and speed_m_s > 0):
+        raise InvalidValueError(
+            f"speed_m_s is {speed_m_s!r:.40}, expected a finite number of metres per second above 0"
+        )
+    return float(speed_m_s)

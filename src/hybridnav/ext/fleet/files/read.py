@@ -1,0 +1,259 @@
+"""Buildings from files: floors with their maps, and links by points, rooms and doors."""
+
+from __future__ import annotations
+
+import math
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, PresetError
+from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
+from hybridnav.ext.fleet.checks import FloorParts, check_ends, check_reach
+from hybridnav.ext.fleet.files.entries import read_building_entries
+from hybridnav.ext.fleet.files.model import open_building
+from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps.checks import checked_radius
+from hybridnav.maps.files.movingai import check_max_cells
+from hybridnav.maps.names import place_of_name
+from hybridnav.planner import load_preset
+from hybridnav.planner.guide.landmarks import Landmarks
+from hybridnav.planner.saved import is_model, load
+from hybridnav.topology.rooms import find_rooms
+from hybridnav.topology.rooms.files.read import load_rooms
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hybridnav._base.typing import PathLike
+    from hybridnav.ext.fleet.files.entries import EndEntry, Entries, FloorEntry, LinkEntry
+    from hybridnav.planner import HybridPlanner, Preset
+    from hybridnav.planner.saved import Model
+    from hybridnav.topology.rooms import Rooms
+
+
+def load_building(
+    path: PathLike,
+    *,
+    robot_radius_m: float | None = None,
+    preset: PathLike | Preset | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Building:
+    r"""Load a building from its description, or from its model.
+
+    Parameters
+    ----------
+    path
+        A YAML file, or a model (.hnm) that `save` has written of a building. The file has a list
+        `floors`, from the lowest to the highest, each with its `name`, its `map` (a map or a model,
+        relative to the file), and optionally `elevation_m`, a file of `rooms`, or `find_rooms:
+        true`; a list `links`, each with its `name`, its `kind` (lift, stairs or ramp), two or more
+        `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`; and optionally
+        `speed_m_s`. An end has its `floor` and a place: `at: [x, y]`, a `room`, or the number of a
+        `door`, with the `room` on whose side of it the robot stands; and optionally `yaw_rad`.
+    robot_radius_m
+        Radius of the robot in metres on all floors; None for that of the models, or of the preset.
+    preset
+        Preset of all planners; None for that of the models, or `shortest`.
+    max_cells
+        Most cells of the map of a floor.
+
+    Returns
+    -------
+    Building
+        The building, whose links have been checked: the robot can stand at each end, and drive from
+        it to the rest of the floor.
+
+    Raises
+    ------
+    MapNotFoundError
+        When a file does not exist.
+    MapError
+        When a file cannot be read, or a floor, a room, a door or the place of an end is not as it
+        is written, or does not suit the robot; one line that names the file and the line.
+    PresetError
+        When the preset does not exist or is not valid.
+    InvalidValueError
+        When the radius or the limit is out of range.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
+    >>> ends = "[{floor: 1, at: [0.5, 0.5]}, {floor: 2, at: [0.5, 2.5]}]"
+    >>> _ = Path("building.yaml").write_text(
+    ...     "floors: [{name: 1, map: figure1.hnm}, {name: 2, map: figure1.hnm}]\n"
+    ...     f"links: [{{name: lift, kind: lift, wait_s: 20, ends: {ends}}}]\n"
+    ... )
+    >>> building = hn.load_building("building.yaml")
+    >>> round(building.plan(("1", (1.5, 0.5)), ("2", (0.5, 0.5))).length_m, 3)
+    3.0
+    """
+    check_max_cells(max_cells)
+    if robot_radius_m is not None:
+        checked_radius(robot_radius_m)
+    if is_model(path):
+        return open_building(
+            path, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
+        )
+    entries = read_building_entries(path)
+    folder = Path(path).parent
+    planners: dict[tuple[str, str | None, bool], HybridPlanner] = {}
+    floors = []
+    for entry in entries.floors:
+        # One map on several floors is read once.
+        key = entry.map_file, entry.rooms_file, entry.find_rooms
+        if key not in planners:
+            planners[key] = _planner(entry, folder, robot_radius_m, preset, max_cells)
+        with _at(entry.at):
+            floors.append(Floor(entry.name, planners[key], entry.elevation_m))
+    return _joined(entries, floors)
+
+
+def load_floor(
+    entry: FloorEntry,
+    folder: Path,
+    *,
+    robot_radius_m: float | None = None,
+    preset: PathLike | Preset | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Model:
+    """Load the map or model of one floor, as `load_building` does.
+
+    Parameters
+    ----------
+    entry
+        The floor.
+    folder
+        The folder of the file that describes the building.
+    robot_radius_m, preset, max_cells
+        As `load_building` takes them.
+
+    Raises
+    ------
+    HybridNavError
+        When it cannot be read; the message names the floor and the line.
+    """
+    map_file = folder / entry.map_file
+    if robot_radius_m is None and not is_model(map_file):
+        chosen = load_preset("shortest" if preset is None else preset)
+        robot_radius_m = chosen.pyramid.robot_radius_m
+    with _at(f"{entry.at}: floor {entry.name}"):
+        return load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells)
+
+
+def _planner(
+    entry: FloorEntry,
+    folder: Path,
+    robot_radius_m: float | None,
+    preset: PathLike | Preset | None,
+    max_cells: int,
+) -> HybridPlanner:
+    """Make the planner of a floor, with the rooms that the file names."""
+    model = load_floor(
+        entry, folder, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
+    )
+    with _at(f"{entry.at}: floor {entry.name}"):
+        rooms = model.rooms
+        if entry.rooms_file is not None:
+            rooms = load_rooms(folder / entry.rooms_file, model.grid)
+        elif entry.find_rooms and rooms is None:
+            rooms = find_rooms(model.grid)
+        fitted = model.fitted(None if preset is None else load_preset(preset))
+        return model.planner(preset, topology=model.grown(fitted.pyramid, rooms))
+
+
+@contextmanager
+def _at(where: str) -> Iterator[None]:
+    """Put a place in the file before the errors of what is built of it."""
+    try:
+        yield
+    except PresetError:
+        raise
+    except MapNotFoundError as error:
+        raise MapNotFoundError(f"{where}: {error}") from None
+    except HybridNavError as error:
+        raise MapError(f"{where}: {error}") from None
+
+
+def _joined(entries: Entries, floors: list[Floor]) -> Building:
+    """Return the building of floors and links."""
+    by_name = {floor.name: floor for floor in floors}
+    links = [_link(entry, by_name) for entry in entries.links]
+    stops = {end.floor for link in links for end in link.ends}
+    parts = {name: FloorParts.of(floor) for name, floor in by_name.items() if name in stops}
+    for entry, link in zip(entries.links, links, strict=True):
+        with _at(entry.at):
+            check_ends(link, by_name)
+            check_reach(link, by_name, parts)
+    speed = {} if entries.speed_m_s is None else {"speed_m_s": entries.speed_m_s}
+    with _at(entries.where):
+        return Building(floors, links, **speed)
+
+
+def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
+    most_m = entry.numbers.get("max_radius_m", math.inf)
+    ends = tuple(_end(end, floors, most_m) for end in entry.ends)
+    with _at(entry.at):
+        return Link(name=entry.name, kind=entry.kind, ends=ends, **entry.numbers)
+
+
+def _end(entry: EndEntry, floors: dict[str, Floor], max_radius_m: float) -> LinkEnd:
+    """Return the end of a link at its point, in its room, or at its door."""
+    yaw_rad = entry.yaw_rad
+    with _at(entry.at):
+        place_of_name(entry.floor, tuple(floors), "floor")
+        floor = floors[entry.floor]
+        if entry.point is not None:
+            if entry.room is not None:
+                _check_in_room(entry.point, entry.room, floor)
+            return LinkEnd(entry.floor, entry.point, yaw_rad)
+        rooms = floor.planner.topology.rooms
+        if entry.door is None:
+            assert entry.room is not None  # noqa: S101 - an end has a place
+            if entry.room not in rooms.labels.points:
+                rooms.labels.index(entry.room)
+            return LinkEnd(entry.floor, rooms.point_of(entry.room), yaw_rad)
+        point, out_rad = _at_door(rooms, entry.door, entry.room, max_radius_m)
+        return LinkEnd(entry.floor, point, out_rad if yaw_rad is None else yaw_rad)
+
+
+def _check_in_room(point: tuple[float, float], room: str, floor: Floor) -> None:
+    rooms = floor.planner.topology.rooms
+    rooms.labels.index(room)
+    found = rooms.at(point)
+    if found != room:
+        where = "in no room" if found is None else f"in room {found}"
+        raise MapError(f"the point {list(point)} lies {where}, expected {room}")
+
+
+def _at_door(
+    rooms: Rooms, number: int, room: str | None, max_radius_m: float
+) -> tuple[tuple[float, float], float | None]:
+    """Return the free point nearest to the middle of a door, on the side of a room if one is named,
+    and the direction in which one enters that room; the middle where the robot does not fit in the
+    link, and finds no free point."""
+    door, grid = rooms.door(number), rooms.grid
+    rows, cols = np.divmod(rooms.cells_beside(number), grid.shape[1])
+    kept = grid.enterable()[rows, cols]
+    yaw_rad = None
+    if room is not None:
+        kept &= rooms.labels.label_of[rows, cols] == rooms.labels.index(room)
+        if room not in door.rooms:
+            joined = " and ".join(name or "a space without a name" for name in door.rooms)
+            raise MapError(f"door {number} joins {joined}, not {room}")
+        way_rad = Landmarks(rooms).way_out_rad(door, is_forward=door.rooms[1] == room)
+        yaw_rad = math.remainder(way_rad, math.tau) if math.isfinite(way_rad) else None
+    if not kept.any() and grid.robot_radius_m > max_radius_m:
+        return door.position, yaw_rad
+    if not kept.any():
+        raise MapError(
+            f"door {number} has no free cell for a robot radius of {grid.robot_radius_m:g} m: give "
+            "the end a point"
+        )
+    points = grid.frame.points_of(np.stack([rows[kept], cols[kept]], axis=1))
+    away = points - np.array(door.position)
+    x, y = points[int(np.argmin(np.hypot(away[:, 0], away[:, 1])))].tolist()
+    return (x, y), yaw_rad

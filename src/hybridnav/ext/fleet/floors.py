@@ -1,0 +1,232 @@
+"""Floors of a building, and what is known of the costs between the ends of links on one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.planner.follow import is_stale
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import RoomLabels
+    from hybridnav.planner import HybridPlanner, PlanResult
+
+ROUNDED = 1.0 - 1e-12
+"""Factor on sums and differences of lengths that serve as bounds, because they are rounded."""
+_KEPT = 256
+"""Number of plans between ends of links that a floor keeps."""
+_MOST_FILLED = 128
+"""Number of ends on a floor up to which `fill` computes the costs between all: their square counts,
+and queries need few of them."""
+_MAX_NAME = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """One floor of a building: a map of its own frame, with its planner.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> hn.Floor("3", hn.HybridPlanner(topology), elevation_m=7.2).name
+    '3'
+    """
+
+    name: str
+    """Name, unlike those of other floors of the building."""
+    planner: HybridPlanner
+    """Planner of the map of this floor."""
+    elevation_m: float = 0.0
+    """Height in metres: it orders the floors of a picture, the highest one on top."""
+
+    def __post_init__(self) -> None:
+        """Refuse names that no line can hold, and heights that are not numbers."""
+        name = self.name
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+            raise InvalidValueError(f"a floor needs a name of one printable line, got {name!r:.80}")
+        if len(name) > _MAX_NAME:
+            raise InvalidValueError(
+                f"the name of a floor has at most {_MAX_NAME} characters, got {name!r:.80}"
+            )
+        if not math.isfinite(self.elevation_m):
+            raise InvalidValueError(
+                f"floor {name}: elevation_m is {self.elevation_m}, expected a finite number"
+            )
+
+    @property
+    def rooms(self) -> RoomLabels | None:
+        """The rooms of its map; None without rooms, or while its places are stale."""
+        topology = self.planner.topology
+        return None if is_stale(topology) else topology.pyramid.rooms
+
+
+class Known(NamedTuple):
+    """What is known of the plans between the ends of links on a floor."""
+
+    lower: FloatArray
+    """float64 (n, n), proved lower bounds in metres, from each end to each other one."""
+    cost: FloatArray
+    """float64 (n, n), the costs of plans in metres, NaN where none was made, infinite where there
+    is no path."""
+
+
+class FloorTable:
+    """Costs and bounds between the ends of links on a floor, filled in as plans are made.
+
+    It belongs to the map and the costs that its floor's planner had when it was made; after an
+    update of the planner it is not `current` any more.
+
+    Parameters
+    ----------
+    floor
+        The floor.
+    positions_m
+        float64 (n, 2), the ends of links on it, `(x, y)` in metres.
+    known
+        Costs and bounds that were computed before, of the same map; None for none.
+    """
+
+    def __init__(self, floor: Floor, positions_m: FloatArray, known: Known | None = None) -> None:
+        self.floor = floor
+        self.positions_m = positions_m
+        self._positions: list[tuple[float, float]] = positions_m.tolist()
+        planner = floor.planner
+        self._of = planner.topology, planner.costs
+        is_any_angle = planner.preset.planner.coarse == "mesh"
+        self._slack_m = 0.0 if is_any_angle else math.sqrt(2) * planner.topology.grid.resolution_m
+        """Metres by which a path between two points may be shorter than the line between them:
+        paths of cells lead from centre to centre."""
+        n = len(positions_m)
+        if known is None:
+            across = positions_m[:, None] - positions_m[None]
+            straight = self._safe(np.hypot(across[..., 0], across[..., 1]))
+            known = Known(straight, np.full((n, n), np.nan))
+        self.lower: FloatArray = known.lower.copy()
+        """float64 (n, n), proved lower bounds, as in `Known`."""
+        self.cost: FloatArray = known.cost.copy()
+        """float64 (n, n), the costs of plans."""
+        self.expected: FloatArray = np.where(np.isnan(self.cost), self.lower, self.cost)
+        """float64 (n, n), the costs where they are known, else the bounds."""
+        self._results: dict[tuple[int, int], PlanResult] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without kept plans, which are made anew."""
+        return vars(self) | {"_results": {}}
+
+    @property
+    def known(self) -> Known:
+        """What is known now, in arrays."""
+        return Known(self.lower.copy(), self.cost.copy())
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the planner still has the map and the costs of the table."""
+        planner = self.floor.planner
+        return planner.topology is self._of[0] and planner.costs is self._of[1]
+
+    def renewed(self) -> FloorTable:
+        """Return the table itself while it is current, else an empty one of the map now."""
+        return self if self.is_current else FloorTable(self.floor, self.positions_m)
+
+    def between(self, start: int, goal: int) -> tuple[PlanResult, bool]:
+        """Return the plan from one end of a link to another one, and whether it was kept."""
+        kept = self._results.get((start, goal))
+        if kept is not None:
+            return kept, True
+        found = self.floor.planner.plan(self.positions_m[start], self.positions_m[goal])
+        self._learn(start, goal, found.cost, found.lower_bound)
+        self._results[start, goal] = found
+        for old in list(self._results)[:-_KEPT]:
+            self._results.pop(old, None)
+        return found, False
+
+    def fill(self) -> None:
+        """Compute all costs that are not known yet, if the ends are at most 128."""
+        if len(self.cost) > _MOST_FILLED:
+            return
+        is_missing = np.isnan(self.cost) & ~np.eye(len(self.cost), dtype=np.bool_)
+        missing = np.argwhere(is_missing)
+        if len(missing):
+            found = self.floor.planner.plan_many(*self.positions_m[missing.T])
+            costs, bounds = found.cost.tolist(), found.lower_bound.tolist()
+            for (start, goal), cost, bound in zip(missing.tolist(), costs, bounds, strict=True):
+                self._learn(start, goal, cost, bound)
+
+    def _learn(self, start: int, goal: int, cost: float, bound: float) -> None:
+        """Take over the cost and the bound of a plan between two ends.
+
+        The optimum is the same in both directions: planners with headings make no floors.
+        """
+        for pair in ((start, goal), (goal, start)):
+            self.lower[pair] = max(self.lower[pair], bound)
+            if math.isnan(self.cost[pair]):
+                self.expected[pair] = self.lower[pair]
+        self.cost[start, goal] = self.expected[start, goal] = cost
+
+    def straight_m(self, waypoint: ArrayLike | str) -> FloatArray:
+        """Return lower bounds on the costs between a waypoint and each end, float64 (n,), metres.
+
+        Parameters
+        ----------
+        waypoint
+            A point `(x, y)` in metres, or a name of the floor.
+        """
+        return self._safe(self._distance_m(waypoint, self.positions_m))
+
+    def straight_between_m(self, start: ArrayLike | str, goal: ArrayLike | str) -> float:
+        """Return a lower bound on the cost between two waypoints in metres; 0 if both are names."""
+        if isinstance(start, str):
+            start, goal = goal, start
+        if isinstance(start, str):
+            return 0.0
+        point = np.asarray(start, dtype=np.float64)[None, :2]
+        return float(self._safe(self._distance_m(goal, point))[0])
+
+    def _safe(self, straight_m: FloatArray) -> FloatArray:
+        """Return lengths of straight lines as lower bounds on costs."""
+        safe: FloatArray = np.maximum(straight_m - self._slack_m, 0.0) * ROUNDED
+        return safe
+
+    def _distance_m(self, waypoint: ArrayLike | str, positions_m: FloatArray) -> FloatArray:
+        """Return the distances of points from a waypoint, from the box round a named one."""
+        if not isinstance(waypoint, str):
+            away = positions_m - np.asarray(waypoint, dtype=np.float64)[:2]
+            return np.hypot(away[:, 0], away[:, 1])
+        grid = self.floor.planner.topology.grid
+        at = grid.frame.positions_of(positions_m)
+        low, high = self._box_of(waypoint)
+        away = np.maximum(np.maximum(low - at, at - high), 0.0)
+        return np.hypot(away[:, 0], away[:, 1]) * grid.resolution_m
+
+    def _box_of(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest row and column of a named waypoint, with a margin."""
+        rooms = self.floor.rooms
+        assert rooms is not None  # noqa: S101 - names have been checked
+        corners = []
+        if name in rooms.points:
+            frame = self.floor.planner.topology.grid.frame
+            corners.append(frame.positions_of(np.array([rooms.points[name]])))
+        box = self._boxes[rooms.index(name)] if name in rooms.names else None
+        if box is not None:
+            corners.append(np.array([[part.start for part in box], [part.stop for part in box]]))
+        both = np.concatenate(corners)
+        return both.min(axis=0) - 1.0, both.max(axis=0) + 1.0
+
+    @cached_property
+    def _boxes(self) -> Sequence[tuple[slice, ...] | None]:
+        """The rows and columns of each room."""
+        from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
+
+        rooms = self.floor.rooms
+        assert rooms is not None  # noqa: S101 - names have been checked
+        return ndimage.find_objects(rooms.label_of + 1, max_label=len(rooms.names))

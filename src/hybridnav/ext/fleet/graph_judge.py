@@ -1,0 +1,297 @@
+"""How the routes on the graph of a building compare with its shortest ones, over all floors."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet.checks import parts_of
+from hybridnav.ext.fleet.graph_match import MatchedGraph
+from hybridnav.ext.fleet.graph_network import BuildingNetwork
+from hybridnav.ext.graphs.judge import LEAST_AREA_M2, excess_of
+from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.topology.rooms.find import outside_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.ext.fleet.building import Building
+    from hybridnav.ext.fleet.graph_network import GraphRoute, Position
+    from hybridnav.ext.fleet.plan import BuildingPlan
+    from hybridnav.ext.graphs.judge import Excess
+
+Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
+_MOST_EXAMPLES = 100
+_ROUNDED = 1.0 - 1e-9
+"""Factor on the optimum below which no route costs, sums being rounded."""
+
+
+@dataclass(frozen=True)
+class RouteCounts:
+    """Routes between some pairs of points, beside the optimum of the building.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import RouteCounts
+    >>> counts = RouteCounts({"solved": 3, "no path, wrong": 1}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> counts.pairs, counts.inconsistent
+    (4, 1)
+    """
+
+    answers: dict[Answer, int]
+    """Number of pairs by the answer of the graph."""
+    loss: Excess | None
+    """Cost of the solved routes over the optimum, less 1; None if none is solved."""
+    steps: float
+    """Mean number of straight lines and rides of the solved routes."""
+    expanded: float
+    """Mean number of nodes that the searches of the solved routes have expanded."""
+    seconds: tuple[float, float]
+    """Median of the wall-clock seconds for a route on the graph, and for one by the building."""
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs."""
+        return sum(self.answers.values())
+
+    @property
+    def inconsistent(self) -> int:
+        """Number of pairs whose answer the building contradicts."""
+        return self.answers.get("contradicted", 0) + self.answers.get("no path, wrong", 0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        loss = None if self.loss is None else vars(self.loss) | {}
+        return {
+            "pairs": self.pairs,
+            "answers": dict(self.answers),
+            "loss": loss,
+            "steps": self.steps,
+            "expanded": self.expanded,
+            "seconds": {"graph": self.seconds[0], "building": self.seconds[1]},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingGraphReport:
+    """Consistency, loss and efficiency of the routes on the graph of a building. Made by
+    `judge_building_graph`.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import BuildingGraphReport, RouteCounts
+    >>> counts = RouteCounts({"solved": 3}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> BuildingGraphReport({"one floor": counts}, ()).counts["one floor"].inconsistent
+    0
+    """
+
+    counts: dict[str, RouteCounts]
+    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; without those
+    of which there are none."""
+    contradictions: tuple[str, ...]
+    """The first 100 pairs whose answer the building contradicts, and why, one line each."""
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """One pair, and the answer to it."""
+
+    answer: Answer
+    cost: float
+    optimum: float
+    steps: int
+    expanded: int
+    seconds: tuple[float, float]
+    is_same_floor: bool
+
+
+def judge_building_graph(
+    matched: MatchedGraph,
+    *,
+    pairs: int = 400,
+    seed: int = 0,
+    stairs: bool = True,
+    clear_edges_only: bool = False,
+) -> BuildingGraphReport:
+    """Compare routes on the graph of a building with its own, over all floors.
+
+    Half of the pairs have both ends on one floor, half on two. A route runs straight from the start
+    to the nearest node in sight of it, over the edges and rides that cost least to the nearest node
+    in sight of the goal, and straight to the goal, as `evaluate --graph` has it on one map. Rides
+    cost what the building charges, whatever the graph states, and the way from the nodes of the
+    graph to the ends of the building's link. The optimum is that of `Building.plan`.
+
+    An answer is `solved`; `contradicted` where the route leads through a wall, takes a ride that
+    the building does not have, or costs less than the optimum; `no path, wrong` where the building
+    has a route and the graph has none; `no path, right` where neither has; or `no node in sight` of
+    an end, which the graph does not answer.
+
+    Parameters
+    ----------
+    matched
+        The graph, matched to the building.
+    pairs
+        Number of random pairs of free cells, in parts of 1 m² or more.
+    seed
+        Seed of the pairs.
+    stairs
+        Whether the robot takes stairs.
+    clear_edges_only
+        Whether edges and rides that the robot cannot follow are left out; else the graph is taken
+        as it is.
+
+    Returns
+    -------
+    BuildingGraphReport
+        The figures.
+
+    Raises
+    ------
+    InvalidValueError
+        When the planners of the building do not find shortest paths in free space, or there is no
+        pair.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import judge_building_graph, match_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
+    >>> house = hn.Building(floors, [hn.Link(name="lift", kind="lift", ends=ends)])
+    >>> matched = match_graph(house, hn.building_graph(house, nodes=20))
+    >>> judge_building_graph(matched, pairs=20).counts["all"].answers
+    {'solved': 20}
+    """
+    checked_type("matched", matched, MatchedGraph)
+    checked_between("pairs", pairs, 1, 1e6)
+    building = matched.building
+    _check_planners(building)
+    network = BuildingNetwork(matched, stairs=stairs, clear_edges_only=clear_edges_only)
+    judged: list[_Judged] = []
+    contradictions: list[str] = []
+    for start, goal in drawn_pairs(building, pairs, np.random.default_rng(seed)):
+        one, why = _judged(network, start, goal, stairs=stairs)
+        judged.append(one)
+        if why and len(contradictions) < _MOST_EXAMPLES:
+            ends = " to ".join(_text(building, end) for end in (start, goal))
+            contradictions.append(f"{ends}: {why}")
+    groups = {
+        "one floor": [one for one in judged if one.is_same_floor],
+        "two floors": [one for one in judged if not one.is_same_floor],
+        "all": judged,
+    }
+    return BuildingGraphReport(
+        {name: _counts(group) for name, group in groups.items() if group}, tuple(contradictions)
+    )
+
+
+def _check_planners(building: Building) -> None:
+    preset = building.floors[0].planner.preset
+    settings = preset.planner
+    limits = settings.allow_unexplored, settings.epsilon, settings.budget_s
+    if settings.coarse != "mesh" or any(limits):
+        raise InvalidValueError(
+            f"the building is planned by preset {preset.name}, and routes are compared with "
+            "shortest paths in free space: load it with preset shortest"
+        )
+
+
+def drawn_pairs(
+    building: Building, count: int, rng: np.random.Generator
+) -> list[tuple[Position, Position]]:
+    """Draw pairs of centres of free cells, every second one on two floors if there are several."""
+    cells_of: dict[int, FloatArray] = {}
+    for index, floor in enumerate(building.floors):
+        labels = parts_of(floor)
+        area_m2 = np.bincount(labels[labels >= 0], minlength=1).astype(np.float64)
+        area_m2 *= floor.planner.topology.grid.cell_area_m2
+        is_inside = (labels >= 0) & ~outside_of(floor.planner.topology.grid)
+        large = np.argwhere(is_inside & (area_m2[labels] >= LEAST_AREA_M2))
+        if len(large):
+            cells_of[index] = large.astype(np.float64) + 0.5
+    if not cells_of:
+        raise InvalidValueError(
+            f"no floor has a part of {LEAST_AREA_M2:g} m² of free space for a robot radius of "
+            f"{building.robot_radius_m:g} m: lower the radius"
+        )
+    floors = list(cells_of)
+    found = []
+    for number in range(count):
+        first = int(rng.choice(floors))
+        others = [floor for floor in floors if floor != first] if number % 2 else []
+        last = int(rng.choice(others)) if others else first
+        start, goal = (cells_of[at][rng.integers(len(cells_of[at]))] for at in (first, last))
+        found.append(((first, start), (last, goal)))
+    return found
+
+
+def _judged(
+    network: BuildingNetwork, start: Position, goal: Position, *, stairs: bool
+) -> tuple[_Judged, str]:
+    """Return the answer of a graph to one pair, and why the building contradicts it."""
+    began = time.perf_counter()
+    route = network.route(start, goal)
+    graph_s = time.perf_counter() - began
+    building = network.building
+    ends = [
+        (floor.name, floor.planner.topology.grid.frame.points_of_grid(at[None])[0])
+        for floor, at in ((building.floors[index], at) for index, at in (start, goal))
+    ]
+    began = time.perf_counter()
+    plan = building.plan(ends[0], ends[1], stairs=stairs)
+    seconds = graph_s, time.perf_counter() - began
+    answer, why = _answer(route, plan)
+    cost, steps, expanded = math.inf, 0, 0
+    if not isinstance(route, str):
+        cost, expanded = route.cost, route.expanded
+        steps = sum(len(line) - 1 for line in route.lines) + len(route.rides)
+    is_same_floor = start[0] == goal[0]
+    return _Judged(answer, cost, plan.cost, steps, expanded, seconds, is_same_floor), why
+
+
+def _answer(route: GraphRoute | str, plan: BuildingPlan) -> tuple[Answer, str]:
+    """Return the answer of a graph, and why the plan of the building contradicts it."""
+    if isinstance(route, str):
+        if route:
+            return "no node in sight", ""
+        if not plan.solved:
+            return "no path, right", ""
+        by = ", ".join(ride.link.name for ride in plan.rides)
+        way = f" by {by}" if by else ""
+        return "no path, wrong", f"the graph has no route, and the building has one{way}"
+    if route.fault:
+        return "contradicted", route.fault
+    if route.cost < plan.lower_bound * _ROUNDED:
+        return "contradicted", f"it costs {route.cost:.3f} m, below {plan.lower_bound:.3f} m"
+    return "solved", ""
+
+
+def _counts(judged: Sequence[_Judged]) -> RouteCounts:
+    counted = Counter(one.answer for one in judged)
+    answers = {answer: counted[answer] for answer in get_args(Answer) if counted[answer]}
+    solved = [one for one in judged if one.answer == "solved"]
+    compared = [one for one in solved if one.optimum > 0]
+    costs, optimum = (
+        np.array(figures, dtype=np.float64)
+        for figures in ([one.cost for one in compared], [one.optimum for one in compared])
+    )
+    return RouteCounts(
+        answers,
+        excess_of(costs, optimum) if compared else None,
+        float(np.mean([one.steps for one in solved])) if solved else 0.0,
+        float(np.mean([one.expanded for one in solved])) if solved else 0.0,
+        tuple(np.median([one.seconds for one in judged], axis=0).tolist()),
+    )
+
+
+def _text(building: Building, end: Position) -> str:
+    floor = building.floors[end[0]]
+    x, y = floor.planner.topology.grid.frame.points_of_grid(end[1][None])[0].tolist()
+    return f"{floor.name}:{x:.2f},{y:.2f}"

@@ -1,0 +1,320 @@
+"""Nodes at the ends of links: found, or added and joined to the graph of the floor."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike, frozen
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet.links import Link
+from hybridnav.maps.checks import checked_type
+from hybridnav.maps.names import place_of_name
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import networkx as nx
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.ext.graphs import WaypointGraph
+
+
+# Graphs of several floors, joined by links, as fleets and map editors exchange them.
+
+Point = tuple[float, float]
+
+SAME_POINT_M = 0.01
+"""Distance in metres up to which a node of a graph counts as lying at the end of a link."""
+
+
+@dataclass(frozen=True)
+class DoorLine:
+    """A door or opening of a floor: the line that a robot crosses.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import DoorLine
+    >>> DoorLine("1/7", ((2.0, 0.0), (2.0, 0.9)), ("kitchen", "hall")).name
+    '1/7'
+    """
+
+    name: str
+    """Name, unlike those of other doors of the building."""
+    ends: tuple[Point, Point]
+    """Two points `(x, y)` in metres, in the frame of the floor."""
+    rooms: tuple[str | None, str | None] = (None, None)
+    """The rooms on both sides; None for what lies in no room, or where the file does not say."""
+    is_opening: bool = False
+    """Whether it is no door that could be shut."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloorArea:
+    """A room or corridor of a floor: one closed outline.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import FloorArea
+    >>> FloorArea("hall", "corridor", np.array([[0, 0], [4, 0], [4, 1], [0, 1.0]])).kind
+    'corridor'
+    """
+
+    name: str
+    """Name."""
+    kind: Literal["room", "corridor"]
+    """What it is."""
+    outline: FloatArray
+    """float64 (k, 2), corners `(x, y)` in metres, each once."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FloorGraph:
+    """The graph of one floor, with its doors and areas where these are known.
+
+    Made by `floor_graph` from a map, and by `load_building_graph` from a file.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.ext.fleet import FloorGraph
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=0.5, y=1.0)
+    >>> floor = FloorGraph(name="2", graph=hn.WaypointGraph.from_networkx(plain), elevation_m=3.5)
+    >>> floor.name, floor.graph.n_nodes
+    ('2', 1)
+    """
+
+    name: str
+    """Name of the floor."""
+    graph: WaypointGraph
+    """Nodes and edges, in the frame of the floor. Facts that writers know: of nodes `name`, of
+    edges `door_name` and `speed_limit` in m/s."""
+    elevation_m: float | None = None
+    """Height of the floor in metres over any common zero; None if it is not known."""
+    doors: tuple[DoorLine, ...] = ()
+    """Doors and openings."""
+    areas: tuple[FloorArea, ...] = ()
+    """Rooms and corridors."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BuildingGraph:
+    """The graphs of the floors of a building, and the links between them.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=0.5, y=1.0)
+    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> floors = [FloorGraph(name=name, graph=graph) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 1.0)), LinkEnd("2", (0.5, 1.0))
+    >>> lift = Link(name="lift", kind="lift", ends=ends, ride_s=5)
+    >>> building = BuildingGraph(name="house", floors=tuple(floors), links=(lift,))
+    >>> building.floor("2").graph.n_nodes
+    1
+    """
+
+    name: str
+    """Name of the building."""
+    floors: tuple[FloorGraph, ...]
+    """One or more, from the lowest to the highest where that is known."""
+    links: tuple[Link, ...] = ()
+    """Lifts, stairs and ramps."""
+
+    def __post_init__(self) -> None:
+        """Refuse floors and links that do not fit together."""
+        names = [checked_type("floors", floor, FloorGraph).name for floor in self.floors]
+        if not names or len(set(names)) < len(names):
+            raise InvalidValueError(
+                f"building {self.name!r:.60} has the floors {', '.join(names)[:200] or 'none'}, "
+                "expected one or more of different names"
+            )
+        known = set(names)
+        links = [checked_type("links", link, Link) for link in self.links]
+        if len({link.name for link in links}) < len(links):
+            raise InvalidValueError(
+                f"building {self.name!r:.60} has two links of one name, expected different names"
+            )
+        for link in links:
+            for end in link.ends:
+                if end.floor not in known:
+                    raise InvalidValueError(
+                        f"link {link.name!r:.60} has an end on floor {end.floor!r:.60}, expected "
+                        f"one of {', '.join(names)[:200]}"
+                    )
+
+    def floor(self, name: str) -> FloorGraph:
+        """Return the floor with a name.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is none; the message suggests the nearest ones.
+        """
+        known = tuple(floor.name for floor in self.floors)
+        return self.floors[place_of_name(name, known, "floor")]
+
+
+Stub = tuple[str, tuple[float, float], int]
+"""Name of a link, its end in metres, and the node that it is joined to."""
+
+
+def join_links(building: BuildingGraph) -> BuildingGraph:
+    """Return a building with a node at every end of every link.
+
+    Where no node lies within 1 cm of an end, one is added there, named "link NAME", with an edge to
+    the nearest node and one back. Nothing is known about walls here: `floor_graph` joins ends to
+    nodes in sight.
+
+    Parameters
+    ----------
+    building
+        The building.
+
+    Returns
+    -------
+    BuildingGraph
+        The same if no node is missing.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=0.0, y=0.0)
+    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
+    >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (3, 4)), LinkEnd("2", (3, 4))))
+    >>> joined = join_links(BuildingGraph(name="house", floors=floors, links=(lift,)))
+    >>> joined.floors[1].graph.names, joined.floors[1].graph.lengths_m.tolist()
+    (('dock', 'link lift'), [5.0, 5.0])
+    """
+    checked_type("building", building, BuildingGraph)
+    floors = []
+    for floor in building.floors:
+        stubs: list[Stub] = []
+        for link in building.links:
+            end = link.end_on(floor.name)
+            if end is None or node_at(floor.graph, end.position_m) is not None:
+                continue
+            away = np.hypot(*(floor.graph.points - end.position_m).T)
+            stubs.append((link.name, end.position_m, int(np.argmin(away))))
+        floors.append(replace(floor, graph=with_stubs(floor.graph, stubs)) if stubs else floor)
+    same = all(one is other for one, other in zip(floors, building.floors, strict=True))
+    return building if same else replace(building, floors=tuple(floors))
+
+
+def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
+    """Return one graph of all floors of a building, with nodes `(floor, id)`.
+
+    Floors are as `WaypointGraph.to_networkx` returns them. The nodes at the ends of a link are
+    joined from floor to floor, in both directions, with its name as `link`, `kind`, `ride_s` and
+    `cost_m`.
+
+    Parameters
+    ----------
+    building
+        The building; ends of links without a node are joined as `join_links` does it.
+
+    Returns
+    -------
+    networkx.MultiDiGraph
+        Edges of floors have `length_m`; those of links do not.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, to_networkx
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=0.0, y=0.0)
+    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
+    >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (0, 0)), LinkEnd("2", (0, 0))))
+    >>> whole = to_networkx(BuildingGraph(name="house", floors=floors, links=(lift,)))
+    >>> sorted(whole.edges())
+    [(('1', 'dock'), ('2', 'dock')), (('2', 'dock'), ('1', 'dock'))]
+    """
+    import networkx as nx  # noqa: PLC0415 - on demand
+
+    joined = join_links(building)
+    whole: nx.MultiDiGraph[Any] = nx.MultiDiGraph(name=joined.name)
+    for floor in joined.floors:
+        plain = floor.graph.to_networkx()
+        whole.add_nodes_from(((floor.name, node), facts) for node, facts in plain.nodes.items())
+        for tail, head, facts in plain.edges(data=True):
+            whole.add_edge((floor.name, tail), (floor.name, head), **facts)
+    for link in joined.links:
+        at = [(floor.name, floor.graph.names[node]) for floor, node in nodes_of_link(joined, link)]
+        facts = {"link": link.name, "kind": link.kind, "ride_s": link.ride_s, "cost_m": link.cost_m}
+        for pair in itertools.pairwise(at):
+            whole.add_edge(*pair, **facts)
+            whole.add_edge(*pair[::-1], **facts)
+    return whole
+
+
+def node_at(graph: WaypointGraph, point: tuple[float, float]) -> int | None:
+    """Return the node nearest to a point, None if it lies farther than 1 cm away."""
+    away = np.hypot(*(graph.points - point).T)
+    nearest = int(np.argmin(away))
+    return nearest if away[nearest] <= SAME_POINT_M else None
+
+
+def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph, int]]:
+    """Return the floors that a link stops at, and the node at its end on each.
+
+    Parameters
+    ----------
+    building
+        A building with nodes at all ends, as `join_links` returns it.
+    link
+        One of its links.
+    """
+    found = []
+    for end in link.ends:
+        floor = building.floor(end.floor)
+        node = node_at(floor.graph, end.position_m)
+        assert node is not None  # noqa: S101 - links are joined
+        found.append((floor, node))
+    return found
+
+
+def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
+    """Return a graph with a node at the end of each of some links, joined in both directions.
+
+    Parameters
+    ----------
+    graph
+        The graph.
+    stubs
+        The ends, and the nodes that they are joined to.
+    """
+    n = graph.n_nodes
+    points = np.concatenate([graph.points, [end for _, end, _ in stubs]])
+    pairs = [pair for at, (_, _, to) in enumerate(stubs) for pair in ((to, n + at), (n + at, to))]
+    edges = np.concatenate([graph.edges, np.array(pairs, dtype=np.int64)])
+    taken = set(graph.names)
+    names: list[int | str] = list(graph.names)
+    for link, _, _ in stubs:
+        wanted = f"link {link}"
+        numbered = (f"{wanted} ({number})" for number in itertools.count(2))
+        name = next(name for name in itertools.chain([wanted], numbered) if name not in taken)
+        taken.add(name)
+        names.append(name)
+    facts = {n + at: {"link": link} for at, (link, _, _) in enumerate(stubs)}
+    return replace(
+        graph,
+        names=tuple(names),
+        points=frozen(points),
+        edge_names=(*graph.edge_names, *[None] * len(pairs)),
+        edges=frozen(edges),
+        costs=frozen(np.concatenate([graph.costs, np.full(len(pairs), np.nan)])),
+        node_facts=graph.node_facts | facts,
+    )

@@ -1,0 +1,371 @@
+"""The search of routes over floors, which plans on a floor only where the best route may lead."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.ext.fleet.floors import ROUNDED
+from hybridnav.ext.fleet.network import GOAL, START, ChosenParts
+from hybridnav.planner import PlanStatus
+from hybridnav.planner.drafts import PlanDraft
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray, IntArray
+    from hybridnav.ext.fleet.floors import FloorTable
+    from hybridnav.ext.fleet.network import LinkNetwork, Part
+    from hybridnav.planner import HybridPlanner
+    from hybridnav.planner.closed import ClosedCells
+    from hybridnav.planner.named import At
+
+_MOST_LABELS = 20_000
+"""Labels after which the search for one more route ends."""
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Start or goal of a query: the index of its floor, and a point or a name on it."""
+
+    floor: int
+    waypoint: ArrayLike | str
+
+
+@dataclass(frozen=True)
+class _Costs:
+    """Lower bounds on the costs of parts, and the costs of those that were planned, else NaN."""
+
+    lower: FloatArray
+    known: FloatArray
+
+    @property
+    def expected(self) -> FloatArray:
+        """The costs where they are known, else the bounds."""
+        return np.where(np.isnan(self.known), self.lower, self.known)
+
+
+def _parts(planner: HybridPlanner, closed: ClosedCells | None) -> IntArray:
+    """Return the part that each open cell lies in, int32 (rows, cols), 0 for other cells. Cells
+    that touch are in one part, for a point on a corner may lie in both."""
+    from scipy import ndimage  # noqa: PLC0415 - most queries need none
+
+    allowed = planner.preset.planner.allow_unexplored
+    is_open = planner.topology.grid.enterable(allow_unexplored=allowed).copy()
+    if closed is not None:
+        is_open.ravel()[closed.flat] = False
+    labels, _ = ndimage.label(is_open, np.ones((3, 3)))
+    return labels.astype(np.int32, copy=False)
+
+
+class LinkSearch:
+    """One query over floors.
+
+    A part of a route costs at least its lower bound, a straight line or better, until it is
+    planned. Routes are searched by these numbers, and the first part of the best one that is not
+    planned yet is planned, until all parts of the best one are.
+
+    Parameters
+    ----------
+    network
+        The links that may be used.
+    tables
+        The table of each floor.
+    endpoints
+        Start and goal.
+    closed
+        Closed cells of floors, by index.
+    at
+        Where in a room a path starts or ends.
+
+    Notes
+    -----
+    C. Dellin, S. Srinivasa: A unifying formalism for shortest path problems with expensive edge
+    evaluations via lazy best-first search over paths with edge selectors (LazySP), 2016.
+    """
+
+    def __init__(
+        self,
+        network: LinkNetwork,
+        tables: Sequence[FloorTable],
+        endpoints: tuple[Endpoint, Endpoint],
+        closed: dict[int, ClosedCells],
+        at: At,
+    ) -> None:
+        self._network, self._tables, self._closed, self._at = network, tables, closed, at
+        self._start, self._goal = endpoints
+        self.drafts: dict[Part, PlanDraft] = {}
+        """The plans of parts that were asked for."""
+        self.planned: list[PlanDraft] = []
+        """Those made for this query."""
+        self.is_complete = True
+        """Whether `ranked` has looked at all routes that keep to the limit."""
+        self._of_floor: dict[int, _Costs] = {}
+        self._divided: set[int] = set()
+        start, goal = endpoints
+        n = len(network.ends)
+        self._first, self._last = (
+            _Costs(np.full(n, np.inf), np.full(n, np.nan)) for _ in endpoints
+        )
+        for end, costs in ((start, self._first), (goal, self._last)):
+            on_floor = network.on_floor[end.floor]
+            rows = [network.ends[number].at for number in on_floor]
+            costs.lower[on_floor] = tables[end.floor].straight_m(end.waypoint)[rows]
+        direct_m = math.inf
+        if start.floor == goal.floor:
+            direct_m = tables[start.floor].straight_between_m(start.waypoint, goal.waypoint)
+        self._direct = _Costs(np.array([direct_m]), np.array([math.nan]))
+
+    def best(self) -> ChosenParts | None:
+        """Return the cheapest route, all of whose parts are planned; None if there is none."""
+        while True:
+            found = self._least(lower=False)
+            if found is None or self._has_planned(found.parts):
+                return found
+
+    def bound(self) -> float:
+        """Return the least sum of lower bounds and charges over all routes, infinite for none."""
+        found = self._least(lower=True)
+        return math.inf if found is None else found.cost
+
+    def reason(self) -> PlanStatus:
+        """Return why there is no route, after one was searched."""
+        statuses = []
+        for (start, goal), draft in self.drafts.items():
+            status = draft.status
+            if status.name.startswith("START") and start == START:
+                return status
+            if status.name.startswith("GOAL") and goal == GOAL:
+                return status
+            statuses.append(status)
+        late = {PlanStatus.TIMEOUT, PlanStatus.APPROXIMATE}
+        return PlanStatus.TIMEOUT if late.intersection(statuses) else PlanStatus.NO_PATH
+
+    def ranked(self, max_cost: Callable[[float], float]) -> Iterator[ChosenParts]:
+        """Yield the cheapest route of each sequence of links, by cost; no link occurs twice.
+
+        Parameters
+        ----------
+        max_cost
+            Cost that no route exceeds, by that of the first one.
+        """
+        known: set[tuple[int, ...]] = set()
+        most = math.inf
+        while True:
+            found = self._least_other(known, most)
+            if found is None:
+                return
+            if self._has_planned(found.parts):
+                if not known:
+                    most = max_cost(found.cost)
+                known.add(self._links_of(found.parts))
+                yield found
+
+    def _has_planned(self, parts: Sequence[Part]) -> bool:
+        """Plan the parts that were not, until one costs more than expected; return whether none
+        does. Those come first whose cost is not known, as they may rule the route out."""
+        for part in sorted(parts, key=self._is_known):
+            if part not in self.drafts:
+                before = self._expected(part)
+                self._plan(part)
+                if self.drafts[part].status is PlanStatus.NO_PATH:
+                    self._divide(self._floor_of(part))
+                if not self._expected(part) <= before / ROUNDED:
+                    return False
+        return True
+
+    def _is_known(self, part: Part) -> bool:
+        """Return whether the cost of a part is known."""
+        return self._cost_of(part) is not None
+
+    def _plan(self, part: Part) -> None:
+        """Plan one part, and take over its cost and its bound."""
+        start, goal = part
+        floor = self._floor_of(part)
+        table, closed = self._tables[floor], self._closed.get(floor)
+        if start != START and goal != GOAL and closed is None:
+            rows = self._network.ends[start].at, self._network.ends[goal].at
+            result, was_kept = table.between(*rows)
+            found = PlanDraft.of(result)
+        else:
+            found, was_kept = self._between(table, part, closed), False
+            costs, key = self._slot(part)
+            costs.known[key] = found.cost
+            costs.lower[key] = max(costs.lower[key], found.lower_bound)
+            if closed is None and (start == START) != (goal == GOAL):
+                self._compare(table, part, found)
+        self.drafts[part] = found
+        if not was_kept:
+            self.planned.append(found)
+
+    def _floor_of(self, part: Part) -> int:
+        """Return the floor that a part lies on."""
+        return self._start.floor if part[0] == START else self._network.ends[part[0]].floor
+
+    def _divide(self, floor: int) -> None:
+        """Rule out all paths between connected parts of a floor, once one path was not found: the
+        search would ask for each, and behind a shut door there are as many as ends."""
+        if floor in self._divided:
+            return
+        self._divided.add(floor)
+        table, closed = self._tables[floor], self._closed.get(floor)
+        part_of = _parts(table.floor.planner, closed)
+        frame = table.floor.planner.topology.grid.frame
+        own = part_of[tuple(frame.cells_of(table.positions_m).T)]
+        costs = self._costs_on(floor)
+        for known in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:
+            known[own[:, None] != own] = np.inf
+        on_floor = np.array(self._network.on_floor[floor], dtype=np.int64)
+        rows = [self._network.ends[number].at for number in on_floor]
+        for end, outer in ((self._start, self._first), (self._goal, self._last)):
+            if end.floor == floor and not isinstance(end.waypoint, str):
+                x, y = np.asarray(end.waypoint, dtype=np.float64)[:2].tolist()
+                outer.lower[on_floor[own[rows] != part_of[frame.cell_of(x, y)]]] = np.inf
+
+    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanDraft:
+        start, goal = (
+            end.waypoint if number == of else table.positions_m[self._network.ends[number].at]
+            for number, of, end in zip(part, (START, GOAL), (self._start, self._goal), strict=True)
+        )
+        return table.floor.planner.draft(start, goal, blocked=closed, at=self._at)
+
+    def _compare(self, table: FloorTable, part: Part, found: PlanDraft) -> None:
+        """Raise the bounds of other parts from the start, or to the goal, by the triangle
+        inequality; a name is not one point, and has none."""
+        end = self._start if part[0] == START else self._goal
+        if isinstance(end.waypoint, str):
+            return
+        is_first = part[0] == START
+        number = part[1] if is_first else part[0]
+        others = [other for other in self._network.on_floor[end.floor] if other != number]
+        row, rows = (self._network.ends[number].at, [self._network.ends[o].at for o in others])
+        away = np.fmin(table.cost[row, rows], table.cost[rows, row])
+        least = np.zeros(len(others))
+        is_near = away < np.inf
+        least[is_near] = found.lower_bound - away[is_near]
+        if found.cost < math.inf:
+            least = np.maximum(least, table.lower[row, rows] - found.cost)
+        lower = (self._first if is_first else self._last).lower
+        lower[others] = np.maximum(lower[others], least * ROUNDED)
+
+    def _slot(self, part: Part) -> tuple[_Costs, int | tuple[int, int]]:
+        """Return where the cost and the bound of a part are kept."""
+        start, goal = part
+        if start == START:
+            return (self._direct, 0) if goal == GOAL else (self._first, goal)
+        if goal == GOAL:
+            return self._last, start
+        one, other = self._network.ends[start], self._network.ends[goal]
+        return self._costs_on(one.floor), (one.at, other.at)
+
+    def _costs_on(self, floor: int) -> _Costs:
+        """Return the costs between the ends on a floor: those of its table, or, where cells are
+        closed, its bounds, and the costs of this query."""
+        if floor not in self._of_floor:
+            table = self._tables[floor]
+            is_closed = floor in self._closed
+            cost = np.full_like(table.cost, np.nan) if is_closed else table.cost
+            self._of_floor[floor] = _Costs(table.lower.copy() if is_closed else table.lower, cost)
+        return self._of_floor[floor]
+
+    def _cost_of(self, part: Part) -> float | None:
+        """Return the cost of a part that was planned, now or for a query before; else None."""
+        costs, key = self._slot(part)
+        cost = float(costs.known[key])
+        return None if math.isnan(cost) else cost
+
+    def _expected(self, part: Part) -> float:
+        """Return the cost of a part if it is known, else its lower bound."""
+        cost = self._cost_of(part)
+        costs, key = self._slot(part)
+        return float(costs.lower[key]) if cost is None else cost
+
+    def _expected_on(self, floor: int) -> FloatArray:
+        """Return the costs between the ends on a floor where they are known, else the bounds."""
+        if floor not in self._closed:
+            return self._tables[floor].expected
+        return self._costs_on(floor).expected
+
+    def _parts_from(self, start: int) -> list[Part]:
+        """Return the parts that leave the start, or an end at which a ride has ended."""
+        floor = self._start.floor if start == START else self._network.ends[start].floor
+        parts = [(start, end) for end in self._network.on_floor[floor] if end != start]
+        if floor == self._goal.floor:
+            parts.append((start, GOAL))
+        return parts
+
+    def _least(self, *, lower: bool) -> ChosenParts | None:
+        """Return the cheapest route, by the costs of parts where they are known and not `lower`,
+        else by lower bounds."""
+        outer = self._first, self._last, self._direct
+        first, last, direct = (costs.lower if lower else costs.expected for costs in outer)
+        on = (lambda floor: self._costs_on(floor).lower) if lower else self._expected_on
+        found = self._network.cheapest(first, last, on)
+        direct_m = float(direct[0])
+        if direct_m < math.inf and (found is None or direct_m <= found.cost):
+            return ChosenParts(direct_m, ((START, GOAL),))
+        return found
+
+    def _least_other(self, known: set[tuple[int, ...]], most: float) -> ChosenParts | None:
+        """Return the cheapest route with a sequence of links that is not known."""
+        ahead = self._to_goal()
+        ends, rides = self._network.ends, self._network.rides
+        done: set[tuple[int, tuple[int, ...]]] = set()
+        heap: list[tuple[float, float, int, tuple[int, ...], tuple[Part, ...]]]
+        heap = [(0.0, 0.0, START, (), ())]
+        while heap and len(done) < _MOST_LABELS:
+            least, cost, node, links, parts = heapq.heappop(heap)
+            if least > most:
+                return None
+            if node == GOAL and links not in known:
+                return ChosenParts(cost, parts)
+            if node == GOAL or (node, links) in done:
+                continue
+            done.add((node, links))
+            for part in self._parts_from(node):
+                arrived = cost + self._expected(part)
+                if not arrived < math.inf:
+                    continue
+                if part[1] == GOAL:
+                    heapq.heappush(heap, (arrived, arrived, GOAL, links, (*parts, part)))
+                    continue
+                link = ends[part[1]].link
+                for other, charge in rides[part[1]] if link not in links else ():
+                    total = arrived + charge
+                    if total + ahead.get(other, math.inf) < math.inf:
+                        passed = (*parts, part)
+                        label = total + ahead[other], total, other, (*links, link), passed
+                        heapq.heappush(heap, label)
+        self.is_complete = not heap
+        return None
+
+    def _to_goal(self) -> dict[int, float]:
+        """Return the least cost to the goal from each end at which a ride has ended."""
+        backward: dict[int, list[tuple[int, float]]] = {}
+        for node in range(len(self._network.ends)):
+            for part in self._parts_from(node):
+                cost = self._expected(part)
+                if part[1] == GOAL:
+                    backward.setdefault(GOAL, []).append((node, cost))
+                    continue
+                for other, charge in self._network.rides[part[1]]:
+                    backward.setdefault(other, []).append((node, cost + charge))
+        least, heap = {GOAL: 0.0}, [(0.0, GOAL)]
+        while heap:
+            cost, node = heapq.heappop(heap)
+            if cost > least[node]:
+                continue
+            for other, step in backward.get(node, ()):
+                if cost + step < least.get(other, math.inf):
+                    least[other] = cost + step
+                    heapq.heappush(heap, (cost + step, other))
+        return least
+
+    def _links_of(self, parts: Sequence[Part]) -> tuple[int, ...]:
+        return tuple(self._network.ends[part[1]].link for part in parts if part[1] != GOAL)

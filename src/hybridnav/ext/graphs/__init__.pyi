@@ -1,0 +1,21 @@
+from .build import build_route_graph as build_route_graph
+from .check import GraphCheck as GraphCheck, check_graph as check_graph
+from .findings import (
+    BUILDING_KINDS as BUILDING_KINDS,
+    Example as Example,
+    Finding as Finding,
+    KINDS as KINDS,
+    SEVERITIES as SEVERITIES,
+)
+from .judge import (
+    Excess as Excess,
+    GraphReport as GraphReport,
+    judge_route_graph as judge_route_graph,
+)
+from .lanes import keep_right as keep_right
+from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
+from .polylines import merge_bends as merge_bends
+from .route_messages import route_messages as route_messages
+from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
+
+__all__: list[str]

@@ -1,0 +1,332 @@
+"""`hybridnav export`: a route graph of a map, its rooms or its places, for other programs."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybridnav as hn
+from hybridnav._base.files import printable
+from hybridnav.cli.common import answer, check_output, check_picture, progress_bar, stage, timings
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import JsonOption, MapOrBuildingArgument, PlotOption, RoomsOption
+from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
+from hybridnav.ext.fleet.command import check_options, is_building_file, refused_options
+from hybridnav.ext.fleet.export_command import EXPORT_OPTIONS, export_building
+from hybridnav.ext.graphs.fleet_options import (
+    ENDINGS,
+    AnchorOption,
+    Fleet,
+    FloorOption,
+    NoDoorsOption,
+    VehiclesOption,
+)
+
+if TYPE_CHECKING:
+    from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
+
+_ENDINGS = {
+    "nav2": (".geojson", ".json"),
+    **ENDINGS,
+    "rooms": (".csv", ".geojson"),
+    "places": (".csv", ".geojson"),
+}
+"""Endings of the file of each format."""
+_PARTS = ("rooms", "places")
+"""Formats without a graph."""
+_STRETCH = 1.05
+_NEAR_M, _FAR_M = 1.0, 2.0
+"""Spacing of graphs for Nav2, which joins them at the nearest node, and of all others: lanes need
+long edges."""
+_MOST_PAIRS = 1_000_000
+
+OutOption = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--out",
+        metavar="FILE",
+        help="The file: .geojson; for rmf .yaml, for osm .osm, for lif .json; of rooms and places "
+        "also .csv.",
+    ),
+]
+FormatOption = Annotated[
+    str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
+]
+NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes", metavar="N", min=1, help="Nodes to aim at: fewer nodes, longer routes."
+    ),
+]
+SpacingOption = Annotated[
+    float | None,
+    typer.Option(
+        "--spacing",
+        metavar="D",
+        help=f"Distance in metres within which points see a node; by default {_NEAR_M:g}, with "
+        f"--lanes and in formats other than nav2 {_FAR_M:g}.",
+    ),
+]
+StretchOption = Annotated[
+    float,
+    typer.Option(
+        "--stretch",
+        metavar="S",
+        help="Most by which routes between nodes in sight are longer, as a factor.",
+    ),
+]
+LanesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lanes",
+        metavar="APART",
+        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
+        "the distance in metres between the robots.",
+    ),
+]
+PolylinesOption = Annotated[
+    bool,
+    typer.Option(
+        "--polylines",
+        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
+    ),
+]
+FrameOption = Annotated[
+    str, typer.Option("--frame", metavar="NAME", help="Name of the map frame in the file.")
+]
+ReportOption = Annotated[
+    int | None,
+    typer.Option(
+        "--report",
+        metavar="N",
+        min=1,
+        max=_MOST_PAIRS,
+        help="Compare the routes of N random pairs with shortest paths.",
+    ),
+]
+
+
+@with_map(before="as_json")
+def export(
+    ctx: typer.Context,
+    map_file: MapOrBuildingArgument,
+    out: OutOption,
+    kind: FormatOption = "nav2",
+    nodes: NodesOption = None,
+    spacing_m: SpacingOption = None,
+    stretch: StretchOption = _STRETCH,
+    lanes_m: LanesOption = None,
+    polylines: PolylinesOption = False,
+    frame: FrameOption = "map",
+    floor: FloorOption = None,
+    anchor: AnchorOption = None,
+    vehicles: VehiclesOption = None,
+    no_doors: NoDoorsOption = False,
+    report: ReportOption = None,
+    rooms_file: RoomsOption = None,
+    as_json: JsonOption = False,
+    plot: PlotOption = None,
+    *,
+    reading: MapOptions,
+) -> None:
+    """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
+    5050, or its rooms or places.
+
+    MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
+    """
+    if kind not in _ENDINGS:
+        raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    if polylines and (report is not None or plot is not None or lanes_m is not None):
+        raise UsageError(
+            "--polylines does not go with --report, --plot and --lanes, which are for straight "
+            "edges: leave them out"
+        )
+    check_output(out, "--out", _ENDINGS[kind])
+    check_picture(plot)
+    fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    if is_building_file(map_file):
+        check_options(refused_options(ctx, EXPORT_OPTIONS))
+        export_building(fleet, ctx.params | {"spacing_m": _spacing(ctx.params)})
+        return
+    if fleet is not None and polylines:
+        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
+    if kind in _PARTS:
+        given = {
+            "--nodes": nodes is not None,
+            "--spacing": spacing_m is not None,
+            "--stretch": stretch != _STRETCH,
+            "--lanes": lanes_m is not None,
+            "--polylines": polylines,
+            "--report": report is not None,
+            "--plot": plot is not None,
+        }
+        _check_plain(kind, given)
+    settings = reading.settings(map_file)
+    seconds: dict[str, float] = {}
+    model = load_model(map_file, settings, seconds, reading)
+    check_room_to_be(model.grid)
+    find_rooms = kind != "places"
+    topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=find_rooms)
+    if kind in _PARTS:
+        with stage(f"writing {out}", seconds, "write"):
+            _write_parts(topology, kind, out, frame)
+        answer(_parts_answer(topology, kind, (out, map_file), seconds, as_json=as_json))
+        return
+    began = time.perf_counter()
+    with progress_bar("building the graph") as advance:
+        graph = hn.build_route_graph(
+            topology,
+            nodes=nodes,
+            spacing_m=_spacing(ctx.params),
+            stretch=stretch,
+            seed=settings.pyramid.seed,
+            progress=advance,
+        )
+        if lanes_m is not None:
+            graph = hn.keep_right(topology, graph, apart_m=lanes_m)
+    seconds["graph"] = round(time.perf_counter() - began, 6)
+    with stage(f"writing {out}", seconds, "write"):
+        written = hn.merge_bends(graph, stretch=stretch) if polylines else graph
+        left_out = _write_graph(topology, (graph, written), fleet, out, frame)
+    judged = None
+    if report is not None:
+        with stage("comparing routes", seconds, "report"):
+            judged = hn.judge_route_graph(graph, pairs=report)
+    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    figures |= {} if fleet is None else {"left_out": list(left_out)}
+    text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    lines = _summary(out, written, graph.grid, judged)
+    lines += [f"left out   {printable(each)}" for each in left_out]
+    lines += [*(_ids_line(written) if fleet is None else []), f"seconds    {timings(seconds)}"]
+    answer((text if as_json else "\n".join(lines)) + "\n")
+    if plot is not None:
+        from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
+        from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
+
+        save_figure(plot_route_graph(graph), plot)
+
+
+def _spacing(given: dict[str, Any]) -> float:
+    """Return the spacing that is given, or that of the format."""
+    is_near = given["kind"] == "nav2" and given["lanes_m"] is None
+    spacing_m: float | None = given["spacing_m"]
+    return spacing_m if spacing_m is not None else _NEAR_M if is_near else _FAR_M
+
+
+def _check_plain(kind: str, given: dict[str, bool]) -> None:
+    """Refuse options of graphs for a format that has none."""
+    for option, is_given in given.items():
+        if is_given:
+            known = ", ".join(each for each in _ENDINGS if each not in _PARTS)
+            raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+
+
+def _write_graph(
+    topology: hn.TopologicalMap,
+    graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
+    fleet: Fleet | None,
+    out: Path,
+    frame: str,
+) -> tuple[str, ...]:
+    """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
+    if fleet is None:
+        hn.export_nav2(graphs[1], out, frame=frame)
+        return ()
+    return fleet.write(topology, graphs[0], out)
+
+
+def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:
+    if kind == "rooms":
+        hn.export_rooms(topology.rooms, out, frame=frame)
+    else:
+        hn.export_places(topology, out, frame=frame)
+
+
+def _parts_answer(
+    topology: hn.TopologicalMap,
+    kind: str,
+    files: tuple[Path, Path],
+    seconds: dict[str, float],
+    *,
+    as_json: bool,
+) -> str:
+    """Return what is printed of rooms or places that were written."""
+    out, map_file = files
+    counts = {"places": topology.n_places, "arcs": topology.n_arcs}
+    if kind == "rooms":
+        doors = len(topology.rooms.listed_doors)
+        counts = {"rooms": int(topology.rooms.is_listed.sum()), "doors": doors}
+    if as_json:
+        figures = counts | {"file": str(out), "map": str(map_file), "seconds": seconds}
+        return json.dumps(figures, allow_nan=False) + "\n"
+    grid = topology.grid
+    counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    lines = [
+        f"file       {printable(out)}, {counted}",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+        f"seconds    {timings(seconds)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _summary(
+    out: Path,
+    graph: RouteGraph | WaypointGraph,
+    grid: hn.OccupancyGrid,
+    judged: GraphReport | None,
+) -> list[str]:
+    counts = _counts(graph)
+    lines = [
+        f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+        f"nodes      {', '.join(f'{count:,} {kind}' for kind, count in counts.items())}",
+    ]
+    if judged is not None:
+        lines += [
+            f"pairs      {judged.pairs:,}, {judged.in_sight:.1%} of them in sight of each other",
+            f"best       {_line(judged.best)}",
+            f"nearest    {_line(judged.nearest)}",
+        ]
+    return lines
+
+
+def _ids_line(graph: RouteGraph | WaypointGraph) -> list[str]:
+    """Return a line if Nav2's messages cannot hold all ids of a graph."""
+    from hybridnav._base.messages import MOST_ID  # noqa: PLC0415 - on demand
+
+    most = graph.n_nodes + graph.n_edges - 1
+    if most <= MOST_ID:
+        return []
+    held = f"messages of ComputeRoute hold {MOST_ID:,}"
+    return [f"ids        up to {most:,}; {held}: for these, give fewer --nodes"]
+
+
+def _line(excess: Excess) -> str:
+    return (
+        f"routes longer by {excess.mean:.2%} on average, {excess.p95:.1%} at the 95th percentile, "
+        f"{excess.greatest:.1%} at most; {excess.solved:.1%} solved"
+    )
+
+
+def _counts(graph: RouteGraph | WaypointGraph) -> dict[str, int]:
+    if isinstance(graph, hn.WaypointGraph):
+        kinds = [facts["metadata"]["class"] for facts in graph.node_facts.values()]
+    else:
+        kinds = list(graph.kinds)
+    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+
+
+def _figures(graph: RouteGraph | WaypointGraph, judged: GraphReport | None) -> dict[str, Any]:
+    report = None if judged is None else asdict(judged)
+    return {
+        "nodes": graph.n_nodes,
+        "edges": graph.n_edges,
+        "kinds": _counts(graph),
+        "report": report,
+    }

@@ -1,0 +1,8 @@
+from .anchors import Anchor as Anchor
+from .lif import export_lif as export_lif
+from .load import load_graph as load_graph
+from .nav2 import export_nav2 as export_nav2
+from .osm_write import export_osm as export_osm
+from .rmf_write import export_rmf as export_rmf
+
+__all__: list[str]

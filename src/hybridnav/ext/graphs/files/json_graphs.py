@@ -1,0 +1,328 @@
+"""Readers of graphs in JSON: GeoJSON of Nav2's route server, and networkx's node-link form."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.errors import MapError
+from hybridnav.ext.graphs.gather import Gathered, edge_text, name_of, pair_of, point_of, shown
+from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+
+MOST_ID = 2**32 - 1
+"""Nav2 holds ids as unsigned integers of 32 bits."""
+_LINES = ("LineString", "MultiLineString")
+_OF_NODE = ("id",)
+_OF_EDGE = ("id", "startid", "endid", "cost")
+_READ = ("frame", "metadata", "operations", "cost", "overridable")
+"""What Nav2 reads beside ids; all else may be null."""
+_LINKS = ("links", "edges")
+
+
+def read_json_graph(text: str, where: str, name: str) -> WaypointGraph:
+    """Read a graph in one of the two forms, told apart by their keys.
+
+    Parameters
+    ----------
+    text
+        The file.
+    where
+        What messages begin with.
+    name
+        Name of a graph that has none.
+
+    Raises
+    ------
+    MapError
+        When it is in neither form.
+    """
+    features, plain = Features(where), NodeLink(where)
+    has: set[str] = set()
+    for key, index, value in members_of(text, where):
+        has.add(key)
+        if index == -1:
+            continue
+        if key == "features":
+            _check_object(value, index, where, "feature")
+            features.add(value, f"{where}, feature {index}")
+        elif key == "nodes" or key in _LINKS:
+            _check_object(value, index, where, key)
+            plain.add(key, value)
+        elif index is None:
+            name = value if key == "name" and isinstance(value, str) and value else name
+            plain.set(key, value)
+    if "features" in has:
+        return WaypointGraph(**features.fields(name))
+    if "nodes" in has and has & set(_LINKS):
+        return WaypointGraph(**plain.fields(plain.name or name))
+    raise MapError(
+        f"{where}: expected a graph of Nav2 (GeoJSON with 'features') or in node-link form "
+        "('nodes' and 'links' or 'edges')"
+    )
+
+
+def _check_object(value: Any, index: int | None, where: str, what: str) -> None:
+    if index is None or not isinstance(value, dict):
+        raise MapError(f"{where}: expected a list of objects for each {what}, got {value!r:.60}")
+
+
+class Features:
+    """Features of a route graph as Nav2's loader takes them: points are nodes, lines are edges."""
+
+    def __init__(self, where: str) -> None:
+        self._gathered = Gathered(where)
+        self._frame = ""
+        self._node_ids: set[Any] = set()
+        self._others: list[dict[str, Any]] = []
+
+    def add(self, feature: dict[str, Any], where: str) -> None:
+        """Add one feature."""
+        geometry, facts = feature.get("geometry"), feature.get("properties")
+        geometry = geometry if isinstance(geometry, dict) else {}
+        facts = facts if isinstance(facts, dict) else {}
+        kind = geometry.get("type")
+        # Tables of drawing programs give every feature all columns, null where it has none.
+        has_endpoints = facts.get("startid") is not None or facts.get("endid") is not None
+        if kind in _LINES or (kind is None and has_endpoints):
+            self._add_edge(facts, geometry, where)
+        elif kind == "Point" or (kind is None and "id" in facts):
+            self._add_node(facts, geometry, where)
+        else:
+            self._others.append(feature)
+
+    def _add_node(self, facts: dict[str, Any], geometry: Mapping[str, Any], where: str) -> None:
+        if "id" not in facts:
+            raise MapError(f"{where}: a node has no id")
+        point = pair_of(geometry.get("coordinates"))
+        text = f"node {shown(name_of(facts['id']))}"
+        self._check(facts, text, _OF_NODE, (facts["id"],))
+        self._gathered.add_node(facts["id"], point, _without(facts, _OF_NODE))
+        self._node_ids.add(name_of(facts["id"]))
+        if not self._frame and isinstance(facts.get("frame"), str):
+            self._frame = facts["frame"]
+
+    def _add_edge(self, facts: dict[str, Any], geometry: Mapping[str, Any], where: str) -> None:
+        for key in ("startid", "endid"):
+            if key not in facts:
+                raise MapError(f"{where}: an edge has no {key}")
+        endpoints = facts["startid"], facts["endid"]
+        text = edge_text(name_of(facts.get("id")), *map(name_of, endpoints))
+        self._check(facts, text, _OF_EDGE[:1], endpoints)
+        if "id" in facts:
+            self._gathered.check_edge_name(facts["id"], endpoints)
+        line = geometry.get("coordinates")
+        self._gathered.add_edge(
+            endpoints,
+            _without(facts, _OF_EDGE),
+            name=facts.get("id"),
+            cost=facts.get("cost"),
+            line=_points_of(line) if isinstance(line, list) else None,
+        )
+
+    def _check(
+        self, facts: dict[str, Any], text: str, ids: tuple[str, ...], at: tuple[Any, ...]
+    ) -> None:
+        """Add findings at some nodes on ids, and on null, which stops Nav2's loader."""
+        nodes = tuple(map(name_of, at))
+        for key in ids:
+            value = facts.get(key)
+            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MOST_ID:
+                self._gathered.findings.add("bad-id", text, nodes=nodes)
+        if any(_holds_null(facts[key]) for key in _READ if key in facts):
+            self._gathered.findings.add("null", text, nodes=nodes)
+
+    def fields(self, name: str) -> dict[str, Any]:
+        """Return the fields of the graph."""
+        for both in self._gathered.edge_ids & self._node_ids:
+            text = f"node and edge {shown(both)}"
+            self._gathered.findings.add("repeated-id", text, nodes=(both,))
+        return self._gathered.fields("nav2", name, self._frame) | {"others": tuple(self._others)}
+
+
+class NodeLink:
+    """A graph in the form of `networkx.node_link_data`."""
+
+    def __init__(self, where: str) -> None:
+        self._gathered = Gathered(where)
+        self._where = where
+        self._is_directed = False
+        self._links: list[tuple[tuple[Any, Any], dict[str, Any]]] = []
+        self.name = ""
+
+    def set(self, key: str, value: Any) -> None:
+        """Take a member that is no list."""
+        if key == "directed":
+            self._is_directed = value is True
+        if key == "graph" and isinstance(value, dict):
+            self.name = str(value.get("name", ""))
+
+    def add(self, key: str, value: dict[str, Any]) -> None:
+        """Add a node or a link."""
+        if key == "nodes":
+            if "id" not in value:
+                raise MapError(f"{self._where}: a node has no id")
+            self._gathered.add_node(value["id"], point_of(value), _without(value, ("id",)))
+            return
+        if "source" not in value or "target" not in value:
+            raise MapError(f"{self._where}: a link has no source or no target")
+        facts = _without(value, ("source", "target", "key"))
+        self._links.append(((value["source"], value["target"]), facts))
+
+    def fields(self, name: str) -> dict[str, Any]:
+        """Return the fields of the graph."""
+        # `directed` may come after the links.
+        for endpoints, facts in self._links:
+            self._gathered.add_link(endpoints, facts, directed=self._is_directed)
+        return self._gathered.fields("node-link", name)
+
+
+def _points_of(line: list[Any]) -> list[Any]:
+    """Return the points of a line, or of the parts of a line; Nav2's own samples hold parts in a
+    LineString too."""
+    if not (line and isinstance(line[0], list) and line[0] and isinstance(line[0][0], list)):
+        return line
+    return [point for part in line if isinstance(part, list) for point in part]
+
+
+def _without(facts: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    return {key: value for key, value in facts.items() if key not in keys}
+
+
+def _holds_null(value: Any) -> bool:
+    if isinstance(value, dict):
+        return any(map(_holds_null, value.values()))
+    if isinstance(value, list):
+        return any(map(_holds_null, value))
+    return value is None
+
+
+# JSON whose long lists are read value by value, so that a large file never is one large tree.
+
+MOST_BYTES = 2**28
+"""Most bytes of a file: a million edges with metadata take about as many."""
+MOST_VALUES = 2**24
+"""Most values in a file, counted by its commas and brackets."""
+_LONGEST = 2**22
+"""Most characters of one node or edge, and of each value beside the lists."""
+_BLANK = re.compile(r"[ \t\n\r]*")
+
+
+def members_of(text: str, where: str) -> Iterator[tuple[str, int | None, Any]]:
+    """Yield the members of a JSON object, and of its lists each value by itself.
+
+    Parameters
+    ----------
+    text
+        The file. NaN and infinities are read as such, as programs write them.
+    where
+        What messages begin with.
+
+    Yields
+    ------
+    tuple
+        The key of a member, the index in its list (None where it is no list; -1 with no value for
+        an empty one), and the value.
+
+    Raises
+    ------
+    MapError
+        When the text is no JSON object, or too large; one line with the place.
+    """
+    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
+        raise MapError(f"{where}: JSON of more than {MOST_VALUES} values is not read")
+    try:
+        yield from _Scanner(text).members()
+    except json.JSONDecodeError as failure:
+        at = f"line {failure.lineno}, column {failure.colno}"
+        raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None
+    except RecursionError:
+        raise MapError(f"{where}: JSON nested deeper than anything meant") from None
+    except ValueError:  # an integer of more than 4300 digits
+        raise MapError(f"{where}: no JSON: a number has too many digits") from None
+
+
+class _Scanner:
+    """A place in a text, from which value after value is read."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._at = 0
+        self._begin, self._part = 0, text[:_LONGEST]
+        self._decoder = json.JSONDecoder()
+
+    def members(self) -> Iterator[tuple[str, int | None, Any]]:
+        """Yield as `members_of`."""
+        self._take("{")
+        if not self._skip("}"):
+            while True:
+                key = self._value()
+                if not isinstance(key, str):
+                    raise self._error("expected a key in quotes", self._at)
+                self._take(":")
+                if self._skip("["):
+                    for index, value in self._items():
+                        yield key, index, value
+                else:
+                    yield key, None, self._value()
+                if not self._skip(","):
+                    break
+            self._take("}")
+        self._blank()
+        if self._at < len(self._text):
+            raise self._error("more text after the end", self._at)
+
+    def _items(self) -> Iterator[tuple[int, Any]]:
+        if self._skip("]"):
+            yield -1, None
+            return
+        index = 0
+        while True:
+            yield index, self._value()
+            index += 1
+            if not self._skip(","):
+                break
+        self._take("]")
+
+    def _value(self) -> Any:
+        """Read one value out of a part of the text, so that none is longer than that part."""
+        self._blank()
+        for is_new in (False, True):
+            if is_new:
+                self._begin, self._part = self._at, self._text[self._at : self._at + _LONGEST]
+            is_last = self._begin + len(self._part) == len(self._text)
+            try:
+                value, end = self._decoder.raw_decode(self._part, self._at - self._begin)
+            except json.JSONDecodeError as stop:
+                failure = self._error(stop.msg, self._begin + stop.pos)
+            else:
+                if end < len(self._part) or is_last:
+                    self._at = self._begin + end
+                    return value
+                failure = self._error(f"one value of more than {_LONGEST} characters", self._at)
+            if is_last:
+                break
+        if is_last:
+            raise failure
+        raise self._error(f"one value of more than {_LONGEST} characters, or none", self._at)
+
+    def _blank(self) -> None:
+        found = _BLANK.match(self._text, self._at)
+        self._at = self._at if found is None else found.end()
+
+    def _skip(self, mark: str) -> bool:
+        self._blank()
+        is_there = self._text.startswith(mark, self._at)
+        self._at += is_there
+        return is_there
+
+    def _take(self, mark: str) -> None:
+        if not self._skip(mark):
+            raise self._error(f"expected {mark!r:.80}", self._at)
+
+    def _error(self, words: str, at: int) -> json.JSONDecodeError:
+        return json.JSONDecodeError(words, self._text, at)

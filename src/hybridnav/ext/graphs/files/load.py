@@ -1,0 +1,121 @@
+"""Files of graphs, whoever has made them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hybridnav._base.files import printable
+from hybridnav._base.yaml_file import parse_document
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
+from hybridnav.ext.fleet.files.graphs import (
+    JSON,
+    XML,
+    floor_in,
+    floors_of_text,
+    read_graph_text,
+    read_open_rmf,
+)
+from hybridnav.ext.graphs import WaypointGraph
+from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
+from hybridnav.ext.graphs.files.graphml_yaml import (
+    is_text_graph,
+    read_graphml,
+    read_text_graph,
+    read_yaml_graph,
+)
+from hybridnav.ext.graphs.files.json_graphs import read_json_graph
+from hybridnav.ext.graphs.files.rmf_read import is_rmf
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import PathLike
+    from hybridnav.ext.fleet import BuildingGraph
+
+_TEXTS = (".yaml", ".yml", ".tmap", ".tmap2", ".tplg", ".tpl")
+_KNOWN = (
+    "GeoJSON of Nav2, node-link JSON, GraphML, topological maps of STRANDS and LCAS, Open-RMF, "
+    "OpenStreetMap, LIF"
+)
+
+
+def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
+    r"""Read a graph of nodes at points and edges between them.
+
+    Parameters
+    ----------
+    path
+        A file of one of these formats:
+
+        * `.geojson`, `.json`: a route graph of Nav2, or the node-link form of networkx;
+        * `.graphml`, `.xml`: GraphML;
+        * any other name (`.tmap2`, `.tmap`, `.tplg`, `.yaml`, ...): a topological map of LCAS or
+          STRANDS, in YAML or the older text;
+        * one floor of a file that `load_building_graph` reads.
+
+        Coordinates are metres in the map frame. Nodes in node-link form and GraphML have theirs in
+        attributes, as `WaypointGraph.from_networkx` describes them.
+    floor
+        Which floor to read of a file with several. `load_building_graph` reads them all.
+
+    Returns
+    -------
+    WaypointGraph
+        The graph, with all facts that the file states. What can be read around (an id that occurs
+        twice, a node without coordinates, an edge to a node that is not there) is in its
+        `findings`. Where several nodes have one id, edges go to the last, as in Nav2.
+
+    Raises
+    ------
+    MapNotFoundError
+        When there is no such file.
+    MapError
+        When it cannot be read: it is in none of these formats, too large, has no node with a point,
+        has several floors and none is chosen, or not the floor that is.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> nodes = [{"id": 1, "x": 0.0, "y": 0.0}, {"id": 2, "x": 3.0, "y": 4.0}]
+    >>> import json
+    >>> links = [{"source": 1, "target": 2}]
+    >>> _ = Path("graph.json").write_text(json.dumps({"nodes": nodes, "links": links}))
+    >>> graph = hn.load_graph("graph.json")
+    >>> graph.format, graph.n_edges  # undirected: an edge in each direction
+    ('node-link', 2)
+    """
+    suffix, where = Path(path).suffix.lower(), f"graph {printable(path)}"
+    try:
+        found = _read(path, suffix, where)
+        if not isinstance(found, WaypointGraph):
+            return floor_in(found, floor, where)
+    except InvalidValueError as error:
+        raise MapError(str(error)) from None
+    if floor is not None:
+        raise MapError(f"{where}: a {found.format} graph has no floors: leave out {floor!r:.60}")
+    return found
+
+
+def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
+    """Read a graph in the format that its ending or its text shows."""
+    try:
+        return _read_known(path, suffix, where)
+    except MapError as error:
+        if isinstance(error, MapNotFoundError) or suffix in (*JSON, *XML, *_TEXTS):
+            raise
+        ending = printable(repr(suffix))[:20]
+        raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
+
+
+def _read_known(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
+    name, text = Path(path).stem, read_graph_text(path)
+    building = floors_of_text(text, suffix, where, name)
+    if building is not None:
+        return building
+    if suffix in JSON:
+        return read_json_graph(text, where, name)
+    if suffix in XML:
+        return read_graphml(text, where, name)
+    if is_text_graph(text):
+        return read_text_graph(text, where, name)
+    data = parse_document(text, where, MapError, graph_yaml.LIMITS)
+    return read_open_rmf(data, where, name) if is_rmf(data) else read_yaml_graph(data, where, name)

@@ -1,0 +1,210 @@
+"""Writer of route graphs for Nav2's route server: GeoJSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.new_file import NewFile
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.graphs import RouteGraph, WaypointGraph
+from hybridnav.ext.graphs.files.json_graphs import MOST_ID
+from hybridnav.ext.graphs.polylines import edge_metadata, node_metadata
+from hybridnav.maps.checks import checked_type
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import PathLike
+
+
+def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str = "map") -> None:
+    """Write a route graph as Nav2's route server reads it, a GeoJSON file.
+
+    A node is a `Point`, an edge a `LineString` in one direction; coordinates are metres in the map
+    frame. Ids are unique over nodes and edges: nodes from 0, edges after them. The `cost` of an
+    edge is its length in metres. The `metadata` of nodes are `class`, and `room` and `door` where
+    there is one; those of edges `class` (door or free), `room`, `door` (the first that it passes),
+    `doors`, `width_m`, `clearance_m`, `left_m` and `right_m`, and of lanes `lane` (right). Nothing
+    is null: what is not known or infinite is left out.
+
+    A `WaypointGraph` keeps its own ids, costs, lines and facts; ids that occur twice or that Nav2
+    cannot hold are replaced by free ones. Facts of a graph that is not from Nav2 become `metadata`,
+    with the id as `name`.
+
+    Parameters
+    ----------
+    graph
+        The graph, from the map or from a file.
+    path
+        The file, ending in .geojson or .json; one that exists is replaced.
+    frame
+        Name of the map frame, for nodes that state none.
+
+    Raises
+    ------
+    InvalidValueError
+        When this is no graph, the graph has no edge, which Nav2 refuses, or more nodes and edges
+        than Nav2 has ids, the frame has no name, or a fact contains itself.
+    MapError
+        When the name ends otherwise, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
+    >>> hn.export_nav2(build_route_graph(topology), "graph.geojson")
+    """
+    if isinstance(graph, WaypointGraph):
+        name = graph.name
+    else:
+        name = checked_type("graph", graph, RouteGraph).grid.name
+    file = NewFile.named(path, "route graph", "a route graph of Nav2", (".geojson", ".json"))
+    if not frame:
+        raise InvalidValueError("frame must be the name of the map frame, got an empty text")
+    if not graph.n_edges:
+        raise InvalidValueError(
+            f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: give it "
+            "more nodes"
+        )
+    if graph.n_nodes + graph.n_edges > MOST_ID:
+        raise InvalidValueError(
+            f"the route graph has {graph.n_nodes + graph.n_edges} nodes and edges, more than the "
+            f"{MOST_ID} ids of Nav2: build it with fewer nodes"
+        )
+    if isinstance(graph, WaypointGraph):
+        features = features_of(graph, frame)
+    else:
+        features = [*_nodes(graph, frame), *_edges(graph)]
+    # One feature a line, so that people can read and compare files.
+    lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
+    head = f'{{"type": "FeatureCollection", "name": {json.dumps(name)}, "features": ['
+    file.write(f"{head}\n{lines}\n]}}\n".encode())
+
+
+def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
+    return [
+        _feature(
+            {"id": node, "frame": frame, "metadata": node_metadata(graph, node)},
+            {"type": "Point", "coordinates": point},
+        )
+        for node, point in enumerate(graph.points.tolist())
+    ]
+
+
+def _edges(graph: RouteGraph) -> list[dict[str, Any]]:
+    points, lengths_m = graph.points.tolist(), graph.lengths_m.tolist()
+    return [
+        _feature(
+            {
+                "id": graph.n_nodes + edge,
+                "startid": tail,
+                "endid": head,
+                "cost": lengths_m[edge],
+                "metadata": edge_metadata(graph, [edge]),
+            },
+            {"type": "LineString", "coordinates": [points[tail], points[head]]},
+        )
+        for edge, (tail, head) in enumerate(graph.edges.tolist())
+    ]
+
+
+def _feature(properties: dict[str, Any], geometry: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+# Features of a GeoJSON file for Nav2, of a graph that others have made.
+
+_DEEPEST = 64
+_LARGEST = 2**1023
+"""Integers beyond have more digits than readers take."""
+
+
+def features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
+    """Return the features of a graph.
+
+    Facts of a graph that is from Nav2 stay where they are; those of others go to `metadata`, with
+    the id as `name`. Nothing is null and no number infinite: such facts are left out.
+
+    Parameters
+    ----------
+    graph
+        The graph.
+    frame
+        Name of the frame of nodes that state none.
+
+    Raises
+    ------
+    InvalidValueError
+        When a fact is nested deeper than 64 levels, as one that contains itself.
+    """
+    used: set[int] = set()
+    nodes = _ids(graph.names, used)
+    edges = _ids(graph.edge_names, used)
+    is_own = graph.format == "nav2"
+    features = []
+    for node, point in enumerate(graph.points.tolist()):
+        facts = _properties(graph.node_facts.get(node, {}), graph.names[node], is_own=is_own)
+        geometry = {"type": "Point", "coordinates": point}
+        features.append(_feature({"id": nodes[node], "frame": frame} | facts, geometry))
+    points, costs = graph.points, graph.costs.tolist()
+    for edge, (tail, head) in enumerate(graph.edges.tolist()):
+        facts = _properties(graph.edge_facts.get(edge, {}), graph.edge_names[edge], is_own=is_own)
+        ends = {"id": edges[edge], "startid": nodes[tail], "endid": nodes[head]}
+        cost = {} if math.isnan(costs[edge]) else {"cost": costs[edge]}
+        line = graph.lines.get(edge, points[[tail, head]])
+        geometry = {"type": "LineString", "coordinates": line.tolist()}
+        features.append(_feature(ends | cost | facts, geometry))
+    return features + [_plain(other, 0) for other in graph.others]
+
+
+def _ids(names: Sequence[int | str | None], used: set[int]) -> list[int]:
+    """Return an id for each name, the name itself where it is an id that nothing else has."""
+    ids: list[int] = []
+    wanted = {name for name in names if isinstance(name, int) and 0 <= name <= MOST_ID}
+    following = 0
+    for name in names:
+        if isinstance(name, int) and name in wanted and name not in used:
+            chosen = name
+        else:
+            while following in used or following in wanted:
+                following += 1
+            chosen = following
+        used.add(chosen)
+        ids.append(chosen)
+    return ids
+
+
+def _properties(facts: dict[str, Any], name: int | str | None, *, is_own: bool) -> dict[str, Any]:
+    plain: dict[str, Any] = _plain(facts, 0)
+    if is_own:
+        return plain
+    known = {"name": name} if isinstance(name, str) else {}
+    return {"metadata": known | plain} if known or plain else {}
+
+
+def _plain(value: Any, depth: int) -> Any:
+    """Return a value as JSON has it, None for what is left out."""
+    if depth > _DEEPEST:
+        raise InvalidValueError(
+            f"a fact is nested more than {_DEEPEST} deep, or contains itself: leave it out"
+        )
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, dict):
+        items = ((str(key), _plain(item, depth + 1)) for key, item in value.items())
+        return {key: item for key, item in items if item is not None}
+    if isinstance(value, list | tuple):
+        listed = (_plain(item, depth + 1) for item in value)
+        return [item for item in listed if item is not None]
+    if isinstance(value, bool | str) or value is None:
+        return value
+    if isinstance(value, int):
+        return value if abs(value) < _LARGEST else None
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value)

@@ -1,0 +1,348 @@
+"""Reader of OpenStreetMap's XML of buildings: indoor tags, area graphs (osmAG), foot ways."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.errors import MapError
+from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
+from hybridnav.ext.graphs import WaypointGraph
+from hybridnav.ext.graphs.files.anchors import Anchor
+from hybridnav.ext.graphs.files.osm_areas import add_area_graph
+from hybridnav.ext.graphs.files.osm_write import ALONE
+from hybridnav.ext.graphs.files.osm_xml import OsmData, OsmWay, Tags, levels_of, read_osm_xml
+from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count
+from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, shown
+
+if TYPE_CHECKING:
+    from hybridnav.ext.fleet import LinkKind
+
+Point = tuple[float, float]
+
+_HERE: dict[str, LinkKind] = {"elevator": "lift", "steps": "stairs"}
+"""Values of `highway` that join levels."""
+_VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
+"""Values of `osmAG:areaType` that join levels."""
+_INDOOR = ("room", "corridor", "area")
+_FACTS = ("wait_s", "ride_s", "cost_m", "max_radius_m")
+_KM_H = 3.6
+_DECIMALS = 5
+"""Decimals of metres."""
+
+
+@dataclass
+class OsmFloor:
+    """What lies on one level."""
+
+    name: str
+    level: float
+    routes: list[OsmWay] = field(default_factory=list)
+    areas: list[OsmWay] = field(default_factory=list)
+    passages: list[OsmWay] = field(default_factory=list)
+    alone: set[int] = field(default_factory=set)
+    """Nodes of the graph that are part of no way."""
+    elevation_m: float | None = None
+
+    def describe(self, tags: Tags) -> None:
+        """Take the name of the level from an element, and its height from an area of osmAG."""
+        self.name = tags.get("level:ref") or self.name
+        height = number_of(tags.get("height"))
+        if tags.get("osmAG:type") == "area" and not math.isnan(height):
+            self.elevation_m = height
+
+
+def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) -> BuildingGraph:
+    """Read a building.
+
+    Parameters
+    ----------
+    text
+        The file.
+    where
+        What messages begin with.
+    name
+        Name of a building that has none.
+    anchor
+        Where its frame is to lie on the Earth; None for the node named root of an area graph, or
+        else the least latitude and longitude.
+
+    Returns
+    -------
+    BuildingGraph
+        A floor for each level, from the lowest to the highest. Where a level has ways with
+        `highway`, its nodes and edges are those; else nodes stand for areas, doors and passages,
+        joined as `add_area_graph` does it.
+
+    Raises
+    ------
+    MapError
+        When it is no XML of OpenStreetMap, or has no level with a node.
+    """
+    data = read_osm_xml(text, where)
+    if not data.places:
+        raise MapError(f"{where}: no node has a latitude and a longitude")
+    title, anchor = _title(data, name), anchor or _anchor_of(data)
+    points = {node: _point(anchor, place) for node, place in data.places.items()}
+    floors = _sorted_floors(data, where)
+    graphs = [
+        _floor(floor, data, points, f"{where}, level {shown(floor.name)}") for floor in floors
+    ]
+    kept = [
+        (floor, graph) for floor, graph in zip(floors, graphs, strict=True) if graph is not None
+    ]
+    if not kept:
+        raise MapError(
+            f"{where}: no level has a node, expected rooms (indoor=room), areas of osmAG or ways "
+            "with highway and level"
+        )
+    found = {floor.level: floor.name for floor, _ in kept}
+    links = _Links(data, points, found, where)
+    return BuildingGraph(
+        name=title,
+        floors=tuple(graph for _, graph in kept if graph is not None),
+        links=tuple(links.found(floors)),
+    )
+
+
+def _point(anchor: Anchor, place: tuple[float, float]) -> Point | None:
+    """Return a point in metres, rounded: else nodes at a wall would lie in it after a round trip,
+    by less than the last decimal of degrees."""
+    x, y = anchor.point_of(*place)
+    return pair_of((round(x, _DECIMALS), round(y, _DECIMALS)))
+
+
+def _title(data: OsmData, name: str) -> str:
+    return next(
+        (t["hybridnav:building"] for t in data.tags.values() if "hybridnav:building" in t), name
+    )
+
+
+def _anchor_of(data: OsmData) -> Anchor:
+    """Return the anchor of a file: its root, or the corner of its nodes."""
+    for node, tags in data.tags.items():
+        if tags.get("name") == "root" and node in data.places:
+            heading = number_of(tags.get("hybridnav:heading_deg", 0.0))
+            latitude, longitude = data.places[node]
+            return _clipped(latitude, longitude, 0.0 if math.isnan(heading) else heading)
+    latitude, longitude = np.array(list(data.places.values())).min(axis=0).tolist()
+    return _clipped(latitude, longitude, 0.0)
+
+
+def _clipped(latitude: float, longitude: float, heading: float) -> Anchor:
+    return Anchor(min(max(latitude, -85.0), 85.0), longitude, heading)
+
+
+def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
+    """Return the levels, each with its ways; ways without a level lie on 0."""
+    floors: dict[float, OsmFloor] = {}
+    for way in data.ways:
+        part, levels = _part(way), levels_of(way.tags) or [0.0]
+        if part == "" or (part == "routes" and len(levels) > 1):
+            continue
+        for level in levels:
+            floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
+            getattr(floor, part).append(way)
+        if len(levels) == 1:
+            floors[levels[0]].describe(way.tags)
+    for node, tags in data.tags.items():
+        for level in levels_of(tags)[:1] if ALONE in tags else ():
+            floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
+            floor.alone.add(node)
+            floor.describe(tags)
+    if len(floors) > MOST_FLOORS:
+        raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
+    found = sorted(floors.values(), key=lambda floor: floor.level)
+    counts = Counter(floor.name for floor in found)
+    if max(counts.values(), default=1) > 1:
+        for floor in found:
+            floor.name = f"{floor.level:g}"
+    return found
+
+
+def _part(element: OsmWay) -> str:
+    """Return the list of a floor that an element belongs to, empty for none."""
+    kind = element.tags.get("osmAG:type")
+    if kind == "passage":
+        return "passages"
+    if element.is_closed and (kind == "area" or element.tags.get("indoor") in _INDOOR):
+        return "areas"
+    is_route = (
+        "highway" in element.tags and not element.is_closed and "hybridnav:link" not in element.tags
+    )
+    return "routes" if is_route else ""
+
+
+def _floor(
+    floor: OsmFloor, data: OsmData, points: dict[int, Point | None], where: str
+) -> FloorGraph | None:
+    """Return the graph of a level, None without a node."""
+    gathered = Gathered(where)
+    if floor.routes or floor.alone:
+        _add_routes(gathered, floor, data, points)
+    else:
+        own = {way.id for way in floor.areas}
+        inner = [way for way in floor.passages if not _leaves(way, own, data.closed)]
+        add_area_graph(gathered, floor.areas, inner, data.tags, points)
+    if not gathered.has_nodes:
+        return None
+    rooms = [way for way in floor.areas if _is_room(way)]
+    names = {way.id: way.tags.get("name", f"way {way.id}") for way in rooms}
+    return FloorGraph(
+        name=floor.name,
+        graph=WaypointGraph(**gathered.fields("osm", floor.name)),
+        elevation_m=floor.elevation_m,
+        doors=tuple(_doors(floor, names, data, points)),
+        areas=tuple(_areas(rooms, names, points)),
+    )
+
+
+def _leaves(element: OsmWay, own: set[int], elsewhere: frozenset[int]) -> bool:
+    """Return whether a passage leads to an area of another level."""
+    sides = [number_of(element.tags.get(key)) for key in ("osmAG:from", "osmAG:to")]
+    return any(side in elsewhere and side not in own for side in sides)
+
+
+def _add_routes(
+    gathered: Gathered, floor: OsmFloor, data: OsmData, points: dict[int, Point | None]
+) -> None:
+    """Add the nodes of ways, and an edge between each two that follow each other."""
+    used = floor.alone.union(*(way.refs for way in floor.routes))
+    for node in itertools.chain(data.places, data.lost):
+        if node in used:
+            gathered.add_node(node, points.get(node), data.tags.get(node, {}))
+    for way in floor.routes:
+        facts: dict[str, Any] = dict(way.tags)
+        if "hybridnav:door" in facts:
+            facts["door_name"] = facts["hybridnav:door"]
+        speed = number_of(facts.get("maxspeed"))
+        if speed > 0:
+            facts["speed_limit"] = round(speed / _KM_H, 6)
+        one_way = way.tags.get("oneway", "no")
+        for pair in itertools.pairwise(way.refs):
+            if one_way != "-1":
+                gathered.add_edge(pair, facts)
+            if one_way not in {"yes", "true", "1"}:
+                gathered.add_edge(pair[::-1], facts)
+
+
+def _is_room(element: OsmWay) -> bool:
+    kind = element.tags.get("osmAG:areaType", "room")
+    return kind in {"room", "corridor"} and "hybridnav:link" not in element.tags
+
+
+def _areas(
+    rooms: list[OsmWay], names: dict[int, str], points: dict[int, Point | None]
+) -> list[FloorArea]:
+    found = []
+    for way in rooms:
+        corners = [points.get(node) for node in way.refs[:-1]]
+        if None not in corners and len(set(corners)) > 2:  # noqa: PLR2004
+            is_corridor = "corridor" in {way.tags.get("osmAG:areaType"), way.tags.get("indoor")}
+            outline = np.array(corners, dtype=np.float64)
+            found.append(FloorArea(names[way.id], "corridor" if is_corridor else "room", outline))
+    return found
+
+
+def _doors(
+    floor: OsmFloor, names: dict[int, str], data: OsmData, points: dict[int, Point | None]
+) -> list[DoorLine]:
+    """Return the passages between two areas of a level."""
+    by_name = {name: way for way, name in names.items()}
+    found = []
+    for way in floor.passages:
+        sides = [_area_id(way.tags.get(key), names, by_name) for key in ("osmAG:from", "osmAG:to")]
+        rooms = [names[side] for side in sides if side is not None]
+        ends = [point for node in way.refs[:2] if (point := points.get(node)) is not None]
+        if len(rooms) < 2 or len(ends) < 2 or sides[0] == sides[1]:  # noqa: PLR2004 - both
+            continue
+        name = way.tags.get("name", f"way {way.id}")
+        is_opening = name not in data.door_names
+        found.append(DoorLine(name, (ends[0], ends[1]), (rooms[0], rooms[1]), is_opening))
+    return found
+
+
+def _area_id(value: str | None, names: dict[int, str], by_name: dict[str, int]) -> int | None:
+    """Return the area that a passage names, by its id or by its name."""
+    number = number_of(value)
+    if number in names:
+        return int(number)
+    return by_name.get(value or "")
+
+
+class _Links:
+    """What joins levels: ways and nodes with several levels, and areas of one name."""
+
+    def __init__(
+        self, data: OsmData, points: dict[int, Point | None], names: dict[float, str], where: str
+    ) -> None:
+        self._data, self._points, self._names, self._where = data, points, names, where
+        self._taken: set[str] = set()
+
+    def found(self, floors: list[OsmFloor]) -> list[Link]:
+        """Return all links."""
+        links = [*self._from_ways(), *self._from_nodes()]
+        grouped: dict[tuple[str, LinkKind], list[tuple[float, Point]]] = {}
+        for floor in floors:
+            for way in floor.areas:
+                kind = _VERTICAL.get(way.tags.get("osmAG:areaType", ""))
+                corners = [point for node in way.refs[:-1] if (point := self._points.get(node))]
+                name = way.tags.get("name", "")
+                if kind is not None and corners and name and name not in self._taken:
+                    x, y = np.mean(corners, axis=0).tolist()
+                    grouped.setdefault((name, kind), []).append((floor.level, (x, y)))
+        for (name, kind), stops in grouped.items():
+            links.append(self._link(name, kind, stops, {}))
+        return [link for link in links if link is not None]
+
+    def _from_ways(self) -> list[Link | None]:
+        links = []
+        for way in self._data.ways:
+            kind = self._kind(way.tags)
+            stops = []
+            for node in way.refs:
+                levels, point = levels_of(self._data.tags.get(node, {})), self._points.get(node)
+                if len(levels) == 1 and point is not None:
+                    stops.append((levels[0], point))
+            if kind is not None and len(levels_of(way.tags)) > 1:
+                links.append(self._link(way.tags.get("name", ""), kind, stops, way.tags))
+        return links
+
+    def _from_nodes(self) -> list[Link | None]:
+        links = []
+        for node, tags in self._data.tags.items():
+            kind, levels, point = self._kind(tags), levels_of(tags), self._points.get(node)
+            if kind is not None and len(levels) > 1 and point is not None:
+                stops = [(level, point) for level in levels]
+                links.append(self._link(tags.get("name", ""), kind, stops, tags))
+        return links
+
+    def _kind(self, tags: dict[str, str]) -> LinkKind | None:
+        stated = tags.get("hybridnav:link")
+        if stated == "ramp":
+            return "ramp"
+        return _HERE.get(tags.get("highway", ""))
+
+    def _link(
+        self, name: str, kind: LinkKind, points: list[tuple[float, Point]], tags: dict[str, str]
+    ) -> Link | None:
+        """Return a link, None if it stops at fewer than two levels."""
+        ends: dict[float, LinkEnd] = {}
+        for level, point in sorted(points, key=lambda each: each[0]):
+            if level in self._names:
+                ends.setdefault(level, LinkEnd(self._names[level], point))
+        if len(ends) < 2:  # noqa: PLR2004
+            return None
+        numbered = (f"{name or kind} {number}" for number in itertools.count(1))
+        tried = itertools.chain([name] if name else [], numbered)
+        own = next(each for each in tried if each not in self._taken)
+        self._taken.add(own)
+        check_link_count(len(self._taken), self._where)
+        given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
+        known = {key: value for key, value in given.items() if value > 0}
+        return Link(name=own, kind=kind, ends=tuple(ends.values()), **known)

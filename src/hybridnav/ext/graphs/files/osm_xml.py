@@ -1,0 +1,202 @@
+"""OpenStreetMap's XML: nodes and ways with their tags, element by element."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+from xml.parsers import expat
+
+from hybridnav.errors import MapError
+from hybridnav.ext.graphs.gather import number_of, shown
+
+MOST_BYTES = 2**25
+"""Most characters of a file: some 100,000 ways, which take 150 MB of memory."""
+_ENCODINGS = ("UTF-8", "UTF8", "US-ASCII", "ASCII")
+"""Those that an XML declaration may state: files are read as UTF-8."""
+_HEAD = 4096
+"""Characters in which the first element begins."""
+_DEEPEST = 20
+_MOST_LEVELS = 100
+"""Levels that one `level` may list."""
+_RANGE = re.compile(r"(-?\d{1,4})-(-?\d{1,4})")
+
+Tags = dict[str, str]
+
+
+@dataclass
+class OsmWay:
+    """A way."""
+
+    id: int
+    refs: list[int] = field(default_factory=list)
+    tags: Tags = field(default_factory=dict)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it ends where it begins, round an area."""
+        return len(self.refs) > 3 and self.refs[0] == self.refs[-1]  # noqa: PLR2004
+
+
+@dataclass
+class OsmData:
+    """What a file holds."""
+
+    places: dict[int, tuple[float, float]] = field(default_factory=dict)
+    """Latitude and longitude of each node in degrees."""
+    tags: dict[int, Tags] = field(default_factory=dict)
+    """Tags of the nodes that have some."""
+    ways: list[OsmWay] = field(default_factory=list)
+    lost: list[int] = field(default_factory=list)
+    """Nodes without a place on the Earth."""
+
+    @cached_property
+    def closed(self) -> frozenset[int]:
+        """Ids of the closed ways."""
+        return frozenset(way.id for way in self.ways if way.is_closed)
+
+    @cached_property
+    def door_names(self) -> frozenset[str]:
+        """Names of the nodes with `door`."""
+        return frozenset(tags.get("name", "") for tags in self.tags.values() if "door" in tags)
+
+
+def is_osm(text: str) -> bool:
+    """Return whether the first element of a text is that of OpenStreetMap's XML."""
+    first = re.search(r"<([A-Za-z]+)[\s>]", text[:_HEAD])
+    return first is not None and first[1] == "osm"
+
+
+def read_osm_xml(text: str, where: str) -> OsmData:
+    """Read nodes and ways; relations and all else are passed over.
+
+    Parameters
+    ----------
+    text
+        The file.
+    where
+        What messages begin with.
+
+    Raises
+    ------
+    MapError
+        When it is no XML of OpenStreetMap, or declares a document type: entities could make it
+        endless.
+    """
+    if len(text) > MOST_BYTES:
+        raise MapError(f"{where}: XML of OpenStreetMap of more than {MOST_BYTES} bytes is not read")
+    reader = _Reader(where)
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler = reader.start
+    parser.EndElementHandler = reader.end
+    parser.StartDoctypeDeclHandler = reader.refuse
+    parse_xml(parser, text, where)
+    return reader.data
+
+
+def parse_xml(parser: expat.XMLParserType, text: str, where: str) -> None:
+    """Parse a text that was read as UTF-8, by a parser for UTF-8.
+
+    Raises
+    ------
+    MapError
+        When it is no XML, or declares another encoding.
+    """
+
+    def check(_version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.upper() not in _ENCODINGS:
+            raise MapError(
+                f"{where}: declares the encoding {shown(encoding)!r:.40}, expected UTF-8: save the "
+                "file in that encoding"
+            )
+
+    parser.XmlDeclHandler = check
+    try:
+        parser.Parse(text.encode(), True)
+    except expat.ExpatError as failure:
+        at = f"line {failure.lineno}, column {failure.offset + 1}"
+        raise MapError(f"{where}, {at}: no XML: {expat.ErrorString(failure.code)}") from None
+    except UnicodeEncodeError:
+        raise MapError(f"{where}: not UTF-8 text") from None
+
+
+class _Reader:
+    """What expat calls."""
+
+    def __init__(self, where: str) -> None:
+        self.data = OsmData()
+        self._where = where
+        self._depth = 0
+        self._node: int | None = None
+        self._way: OsmWay | None = None
+
+    def refuse(self, *_: Any) -> None:
+        """Refuse a document type."""
+        raise MapError(f"{self._where}: XML with a document type (DOCTYPE) is not read")
+
+    def start(self, tag: str, given: dict[str, str]) -> None:
+        """Begin an element."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise MapError(f"{self._where}: XML nested more than {_DEEPEST} deep")
+        if self._depth == 1 and tag != "osm":
+            raise MapError(f"{self._where}: expected XML of OpenStreetMap (osm), got {tag!r:.40}")
+        if given.get("action") == "delete" or given.get("visible") == "false":
+            return
+        if tag == "node":
+            self._node = self._id(given, "id", tag)
+            place = number_of(given.get("lat")), number_of(given.get("lon"))
+            if abs(place[0]) <= 90 and abs(place[1]) <= 180:  # noqa: PLR2004 - degrees
+                self.data.places[self._node] = place
+            else:
+                self.data.lost.append(self._node)
+        elif tag == "way":
+            self._way = OsmWay(self._id(given, "id", tag))
+            self.data.ways.append(self._way)
+        elif tag == "nd" and self._way is not None:
+            self._way.refs.append(self._id(given, "ref", tag))
+        elif tag == "tag":
+            self._add_tag(given)
+
+    def _add_tag(self, given: dict[str, str]) -> None:
+        key, value = given.get("k"), given.get("v")
+        if key is None or value is None:
+            raise MapError(f"{self._where}: a tag has no k or no v")
+        if self._way is not None:
+            self._way.tags[key] = value
+        elif self._node is not None:
+            self.data.tags.setdefault(self._node, {})[key] = value
+
+    def end(self, tag: str) -> None:
+        """End an element."""
+        self._depth -= 1
+        if tag == "node":
+            self._node = None
+        elif tag == "way":
+            self._way = None
+
+    def _id(self, given: dict[str, str], key: str, tag: str) -> int:
+        text = given.get(key, "")
+        if not re.fullmatch(r"-?\d{1,19}", text):
+            raise MapError(f"{self._where}: expected <{tag} {key}=NUMBER>, got {shown(text)!r:.60}")
+        return int(text)
+
+
+def levels_of(tags: Tags) -> list[float]:
+    """Return the levels that an element states, ascending: `1`, `0;1`, `0-3`; none for none.
+
+    As on the pages of the keys `level` and `repeat_on` in OpenStreetMap's wiki.
+    """
+    found: set[float] = set()
+    for part in tags.get("level", "").split(";"):
+        ends = _RANGE.fullmatch(part.strip())
+        if ends:
+            low, high = int(ends[1]), int(ends[2])
+            found.update(range(low, min(high, low + _MOST_LEVELS) + 1))
+        else:
+            found.add(number_of(part))
+        if len(found) > _MOST_LEVELS:
+            break
+    return sorted(level for level in found if not math.isnan(level))

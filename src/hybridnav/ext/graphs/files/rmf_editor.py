@@ -1,0 +1,274 @@
+"""Reader of the building maps of Open-RMF's traffic editor, `*.building.yaml`.
+
+Coordinates and the choice of lanes follow open-rmf/rmf_traffic_editor,
+`rmf_building_map_tools/building_map`: `building.py`, `level.py`, `lift.py`, `transform.py`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from hybridnav._base.trig import cos, sin
+from hybridnav.errors import MapError
+from hybridnav.ext.fleet import DoorLine
+from hybridnav.ext.graphs.files.rmf_drawing import Drawing, drawing_of, drawings_of
+from hybridnav.ext.graphs.files.rmf_read import (
+    MOST_FLOORS,
+    Name,
+    Point,
+    RmfFloor,
+    RmfLift,
+    building_of,
+    lane_ends,
+    list_of,
+    mapping_of,
+    options_of,
+)
+from hybridnav.ext.graphs.gather import number_of, pair_of, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from hybridnav.ext.fleet import BuildingGraph
+
+_OPTIONS = 4
+"""Place of the options of a vertex: x, y, z and name stand before."""
+_MOST_GRAPHS = 10
+"""The editor numbers graphs from 0 to 9."""
+_MOST_CROSSINGS = 2_000_000
+"""Pairs of a lane and a door of one level that may cross."""
+_GAP_M = 0.05
+"""Gap between a cabin and its shaft, `gap` of `lift.py`."""
+_IN_FILE_ONLY = ("bidirectional", "graph_idx", "orientation")
+_OPPOSITE = {"forward": "backward", "backward": "forward"}
+
+
+def is_drawn(data: Mapping[str, Any]) -> bool:
+    """Return whether a file of Open-RMF is a building map: its vertices have a number as third
+    item."""
+    for level in data["levels"].values():
+        vertices = level.get("vertices") if isinstance(level, dict) else None
+        for vertex in vertices if isinstance(vertices, list) else []:
+            if isinstance(vertex, list) and len(vertex) > 2:  # noqa: PLR2004
+                return isinstance(vertex[2], int | float)
+    return False
+
+
+def read_drawn(
+    data: dict[str, Any], where: str, name: str, *, graph_index: int | None = None
+) -> BuildingGraph:
+    """Read a building map.
+
+    Parameters
+    ----------
+    data
+        The file as parsed.
+    where
+        What messages begin with.
+    name
+        Name of a building that has none.
+    graph_index
+        Which of the graphs to read, from 0 to 9; None for the first that has lanes.
+
+    Returns
+    -------
+    BuildingGraph
+        A floor for each level on which the graph has lanes, from the lowest to the highest, in
+        metres, with y up, in the frame of the reference level.
+
+    Raises
+    ------
+    MapError
+        When it is not of this form, its coordinates are degrees, the scale of a level is not known,
+        or no lane belongs to the graph.
+    """
+    levels = mapping_of(data["levels"], where, "levels", MOST_FLOORS)
+    contents = {
+        level: mapping_of(content, f"{where}, level {shown(level)}", "the level")
+        for level, content in levels.items()
+    }
+    index = _graph_index(contents, where, graph_index)
+    drawings = drawings_of(data, contents, where)
+    reference = str(data.get("reference_level_name", next(iter(contents), "")))
+    lifts = {
+        lift: _Cabin(mapping_of(facts, at, "the lift"), reference, drawings, at)
+        for lift, facts in mapping_of(data.get("lifts"), where, "lifts", MOST_FLOORS).items()
+        for at in [f"{where}, lift {shown(lift)}"]
+    }
+    found = {lift: RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
+    taken: set[Name] = set()
+    floors = []
+    for level, content in contents.items():
+        floor = RmfFloor(level, where, _elevation(content))
+        if any(_index_of(lane) == index for lane in _lanes(content)):
+            _fill(floor, content, drawing_of(drawings, level, where), index, taken)
+        for lift, cabin in lifts.items():
+            inside = (point for point in floor.points if cabin.holds(level, point))
+            end = next(inside, None)
+            if end is not None:
+                found[lift].ends[level] = end
+        floors.append(floor)
+    floors.sort(key=lambda floor: floor.elevation_m or 0.0)
+    title = str(data.get("building_name") or data.get("name") or name)
+    return building_of(floors, found, title, where)
+
+
+def _graph_index(contents: dict[str, Any], where: str, wanted: int | None) -> int:
+    used = {_index_of(lane) for content in contents.values() for lane in _lanes(content)}
+    known = sorted(index for index in used if 0 <= index < _MOST_GRAPHS)
+    if wanted is None and known:
+        return known[0]
+    if wanted in known:
+        return int(wanted or 0)
+    text = ", ".join(map(str, known)) or "none"
+    raise MapError(f"{where}: no lane of graph {wanted or 0}; graphs with lanes: {text}")
+
+
+def _lanes(content: dict[str, Any]) -> Iterator[list[Any]]:
+    lanes = content.get("lanes")
+    yield from (lane for lane in lanes if isinstance(lane, list)) if isinstance(lanes, list) else ()
+
+
+def _index_of(lane: list[Any]) -> int:
+    options = lane[2] if len(lane) > 2 and isinstance(lane[2], dict) else {}  # noqa: PLR2004
+    value = _value(options.get("graph_idx", [2, 0]))
+    return value if type(value) is int else -1
+
+
+def _value(parameter: Any) -> Any:
+    """Return the value of a parameter `[type, value]`."""
+    is_pair = isinstance(parameter, list) and len(parameter) == 2  # noqa: PLR2004
+    return parameter[1] if is_pair else None
+
+
+def _elevation(content: dict[str, Any]) -> float:
+    value = number_of(content.get("elevation", 0.0))
+    return 0.0 if math.isnan(value) else value
+
+
+def _fill(
+    floor: RmfFloor, content: dict[str, Any], drawing: Drawing, index: int, taken: set[Name]
+) -> None:
+    """Add the vertices that lanes of a graph use, in the order of their first use, the lanes and
+    the doors."""
+    at = f"{floor.where}, level {shown(floor.name)}"
+    vertices = list_of(content.get("vertices"), at, "vertices")
+    lanes = list_of(content.get("lanes"), at, "lanes")
+    chosen = []
+    for number, lane in enumerate(lanes):
+        ends = lane_ends(lane, f"{at}, lane {number}")
+        if _index_of(lane) == index:
+            chosen.append((ends, _parameters(lane, 2, f"{at}, lane {number}")))
+    numbers: dict[int, int] = {}
+    for end in itertools.chain.from_iterable(ends for ends, _ in chosen):
+        if end in numbers or not 0 <= end < len(vertices):
+            continue
+        numbers[end] = len(numbers)
+        _add_vertex(floor, vertices[end], drawing, taken, f"{at}, vertex {end}")
+    for number, entry in enumerate(list_of(content.get("doors"), at, "doors")):
+        floor.doors.append(_door(entry, vertices, drawing, f"{at}, door {number}"))
+    ends_of = [[numbers.get(end, -1 - end) for end in ends] for ends, _ in chosen]
+    passed = _doors_passed([[_point_at(floor, end) for end in ends] for ends in ends_of], floor)
+    for (tail, head), door, (_, facts) in zip(ends_of, passed, chosen, strict=True):
+        known = {key: value for key, value in facts.items() if key not in _IN_FILE_ONLY and value}
+        _add_lanes(floor, (tail, head), known | ({"door_name": door} if door else {}), facts)
+
+
+def _point_at(floor: RmfFloor, number: int) -> Point | None:
+    return floor.points[number] if 0 <= number < len(floor.points) else None
+
+
+def _add_vertex(
+    floor: RmfFloor, entry: Any, drawing: Drawing, taken: set[Name], where: str
+) -> None:
+    values = list_of(entry, where, "[x, y, z, name, ...]")
+    raw = pair_of(values)
+    name = values[3] if len(values) > 3 else None  # noqa: PLR2004
+    facts = _parameters(values, _OPTIONS, where)
+    point = None if raw is None else drawing.point(raw)
+    floor.add_vertex("" if name is None else str(name), point, facts, taken)
+
+
+def _parameters(entry: list[Any], at: int, where: str) -> dict[str, Any]:
+    return {key: _value(value) for key, value in options_of(entry, at, where).items()}
+
+
+def _add_lanes(
+    floor: RmfFloor, vertices: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
+) -> None:
+    """Add a lane, and the one back if it leads in both directions."""
+    tail, head = vertices
+    way = facts.get("orientation")
+    ahead = {"orientation_constraint": way} if way in _OPPOSITE else {}
+    floor.add_lane((tail, head), known | ahead)
+    if facts.get("bidirectional") is True:
+        back = {"orientation_constraint": _OPPOSITE[way]} if way in _OPPOSITE else {}
+        floor.add_lane((head, tail), known | back)
+
+
+def _door(entry: Any, vertices: list[Any], drawing: Drawing, where: str) -> DoorLine:
+    ends = []
+    for number in lane_ends(entry, where):
+        raw = pair_of(vertices[number]) if 0 <= number < len(vertices) else None
+        if raw is None:
+            raise MapError(f"{where}: vertex {number} is not there, or has no point")
+        ends.append(drawing.point(raw))
+    name = _parameters(entry, 2, where).get("name")
+    if not isinstance(name, str | int) or isinstance(name, bool):
+        raise MapError(f"{where}: expected a name [1, NAME], got {name!r:.60}")
+    return DoorLine(str(name), (ends[0], ends[1]))
+
+
+class _Cabin:
+    """The rectangle of a lift, in the frame of the reference level."""
+
+    def __init__(
+        self, facts: dict[str, Any], reference: str, drawings: dict[str, Drawing], where: str
+    ) -> None:
+        raw = pair_of((facts.get("x"), facts.get("y")))
+        width, depth, yaw = (number_of(facts.get(key)) for key in ("width", "depth", "yaw"))
+        if raw is None or not (width > 0 and depth > 0 and math.isfinite(yaw)):
+            raise MapError(f"{where}: expected x, y, yaw, and width and depth in metres")
+        drawing = drawing_of(drawings, str(facts.get("reference_floor_name", reference)), where)
+        self.dims_m = width, depth
+        self._at, self._yaw = drawing.point(raw), yaw
+        self._levels = {
+            str(key) for key in mapping_of(facts.get("level_doors"), where, "level_doors")
+        }
+
+    def holds(self, level: str, point: Point | None) -> bool:
+        """Return whether a point lies inside, on a level where the lift has doors."""
+        if point is None or level not in self._levels:
+            return False
+        dx, dy = point[0] - self._at[0], point[1] - self._at[1]
+        cosine, sine = cos(self._yaw), sin(self._yaw)
+        across, along = abs(dx * cosine + dy * sine), abs(dy * cosine - dx * sine)
+        return across <= self.dims_m[0] / 2 + _GAP_M and along <= self.dims_m[1] / 2 + _GAP_M
+
+
+def _doors_passed(lanes: list[list[Point | None]], floor: RmfFloor) -> list[str]:
+    """Return the last door of the file that each lane crosses, empty for none."""
+    passed = [""] * len(lanes)
+    whole = [[end for end in ends if end is not None] for ends in lanes]
+    kept = [at for at, ends in enumerate(whole) if len(ends) == 2]  # noqa: PLR2004
+    if not floor.doors or not kept:
+        return passed
+    if len(floor.doors) * len(kept) > _MOST_CROSSINGS:
+        raise MapError(
+            f"{floor.where}, level {shown(floor.name)}: {len(floor.doors)} doors and {len(kept)} "
+            f"lanes, at most {_MOST_CROSSINGS} pairs of them are tested"
+        )
+    doors = shapely.linestrings([door.ends for door in floor.doors])
+    segments = shapely.linestrings([whole[at] for at in kept])
+    found = shapely.STRtree(doors).query(segments, predicate="intersects")
+    for lane, door in sorted(found.T.tolist()):
+        (a, b), (c, d) = whole[kept[lane]], floor.doors[door].ends
+        along, across = np.subtract(b, a), np.subtract(d, c)
+        if along[0] * across[1] != along[1] * across[0]:  # they are not parallel
+            passed[kept[lane]] = floor.doors[door].name
+    return passed

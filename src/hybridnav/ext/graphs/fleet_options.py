@@ -1,0 +1,133 @@
+"""Options of formats that fleets speak, and what `hybridnav export` writes in them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import hybridnav as hn
+from hybridnav.cli.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hybridnav.ext.fleet import BuildingGraph
+    from hybridnav.ext.graphs import RouteGraph
+
+ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
+"""Endings of the file of each format."""
+_FEWEST, _MOST = 2, 3
+"""Numbers of an anchor: latitude, longitude, and the heading if there is one."""
+
+FloorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--floor",
+        metavar="NAME",
+        help="Name of the floor in rmf, osm and lif.",
+        show_default="0",
+    ),
+]
+AnchorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--anchor",
+        metavar="LAT,LON[,DEG]",
+        help="For osm: latitude and longitude of the origin of the map frame, and the direction of "
+        "its y axis, clockwise from north.",
+    ),
+]
+VehiclesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--vehicle",
+        metavar="TYPE",
+        help="For lif: a type of vehicle, MANUFACTURER.SERIES; may be given several times.",
+    ),
+]
+NoDoorsOption = Annotated[
+    bool,
+    typer.Option(
+        "--no-doors", help="For rmf: name no doors, which robots would ask to open and wait for."
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """The options of one of these formats."""
+
+    kind: str
+    floor: str
+    anchor: hn.Anchor | None
+    vehicles: tuple[str, ...]
+    doors: bool
+
+    @classmethod
+    def read(
+        cls,
+        kind: str,
+        floor: str | None,
+        anchor: str | None,
+        vehicles: list[str] | None,
+        *,
+        no_doors: bool,
+    ) -> Fleet | None:
+        """Return the options, None for a format that has none of them.
+
+        Raises
+        ------
+        UsageError
+            When an option is for another format, or one that the format needs is missing.
+        """
+        homes = {
+            "--floor": (floor is not None, tuple(ENDINGS)),
+            "--anchor": (anchor is not None, ("osm",)),
+            "--vehicle": (bool(vehicles), ("lif",)),
+            "--no-doors": (no_doors, ("rmf",)),
+        }
+        for option, (is_given, kinds) in homes.items():
+            if is_given and kind not in kinds:
+                known = ", ".join(kinds)
+                raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+        if kind not in ENDINGS:
+            return None
+        if kind == "osm" and anchor is None:
+            raise UsageError("--format osm needs --anchor LAT,LON[,DEG]: where the map lies")
+        if kind == "lif" and not vehicles:
+            raise UsageError("--format lif needs --vehicle MANUFACTURER.SERIES: who drives")
+        place = None if anchor is None else _anchor(anchor)
+        return cls(
+            kind, "0" if floor is None else floor, place, tuple(vehicles or ()), not no_doors
+        )
+
+    def write(self, topology: hn.TopologicalMap, graph: RouteGraph, out: Path) -> tuple[str, ...]:
+        """Write a file of one floor; return what it does not hold."""
+        from hybridnav.ext.fleet import BuildingGraph  # noqa: PLC0415 - on demand
+
+        floor = hn.floor_graph(topology, graph, name=self.floor)
+        return self.write_building(BuildingGraph(name=graph.grid.name, floors=(floor,)), out)
+
+    def write_building(self, building: BuildingGraph, out: Path) -> tuple[str, ...]:
+        """Write a file of a building; return what it does not hold."""
+        if self.kind == "rmf":
+            return hn.export_rmf(building, out, doors=self.doors)
+        if self.anchor is not None:
+            return hn.export_osm(building, out, anchor=self.anchor)
+        return hn.export_lif(building, out, vehicle_types=self.vehicles)
+
+
+def _anchor(text: str) -> hn.Anchor:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not _FEWEST <= len(numbers) <= _MOST or not all(map(math.isfinite, numbers)):
+        raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}")
+    try:
+        return hn.Anchor(*numbers)
+    except hn.InvalidValueError as error:
+        raise UsageError(f"--anchor: {error}") from None

@@ -1,0 +1,156 @@
+"""Kernels of route graphs: spanners, and shortest routes between many pairs."""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.trig import exp, log
+
+_ROUNDING = 1e-12
+"""Relative slack on the length of a route, which is a sum of rounded numbers."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def spanner(positions, pairs, lengths, stretch):
+    """Choose pairs so that a route over chosen ones joins every pair, at most `stretch` times as
+    long.
+
+    Parameters
+    ----------
+    positions
+        float64 (n, 2), nodes.
+    pairs
+        int64 (m, 2), two nodes each, by length.
+    lengths
+        float64 (m,), the distance of each pair, ascending.
+    stretch
+        At least 1.
+
+    Returns
+    -------
+    array
+        bool (m,), the chosen pairs.
+    """
+    n, m = len(positions), len(pairs)
+    first = np.full(n, -1, np.int64)
+    following, head = np.empty(2 * m, np.int64), np.empty(2 * m, np.int64)
+    costs, reached = np.full(n, np.inf), np.empty(n, np.int64)
+    is_chosen = np.zeros(m, np.bool_)
+    n_arcs = 0
+    for pair in range(m):
+        tail, goal = pairs[pair, 0], pairs[pair, 1]
+        limit = stretch * lengths[pair] * (1.0 + _ROUNDING)
+        costs[tail], reached[0], n_reached = 0.0, tail, 1
+        heap = [(lengths[pair], 0.0, tail)]
+        is_joined = False
+        while heap and not is_joined:
+            _, cost, here = heapq.heappop(heap)
+            is_joined = here == goal
+            arc = first[here] if cost <= costs[here] else -1
+            while arc >= 0:
+                other = head[arc]
+                row, col = positions[other, 0], positions[other, 1]
+                step = math.hypot(positions[here, 0] - row, positions[here, 1] - col)
+                rest = math.hypot(positions[goal, 0] - row, positions[goal, 1] - col)
+                through = cost + step
+                if through < costs[other] and through + rest <= limit:
+                    if costs[other] == np.inf:
+                        reached[n_reached] = other
+                        n_reached += 1
+                    costs[other] = through
+                    heapq.heappush(heap, (through + rest, through, other))
+                arc = following[arc]
+        for k in range(n_reached):
+            costs[reached[k]] = np.inf
+        if not is_joined:
+            is_chosen[pair] = True
+            for k in range(2):
+                node = pairs[pair, k]
+                head[n_arcs], following[n_arcs] = pairs[pair, 1 - k], first[node]
+                first[node] = n_arcs
+                n_arcs += 1
+    return is_chosen
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def routes(graph, starts, goals, passed):
+    """Find the shortest route of each of many pairs.
+
+    Parameters
+    ----------
+    graph
+        int64 (n + 1,) first edge of each node, int64 (m,) head and float64 (m,) cost of each edge.
+    starts, goals
+        For each end int64 (p + 1,) offsets, int64 (k,) the nodes that it is joined to and float64
+        (k,) the costs to join them.
+    passed
+        int64 (w,), filled with the nodes of each route, from the last to the first.
+
+    Returns
+    -------
+    tuple
+        float64 (p,) costs, infinite for none; int64 (p + 1,) offsets of the routes in `passed`, -1
+        in the last place if these are too short for all; int64 (p,) number of expanded nodes.
+    """
+    first, head, cost_of = graph
+    n, n_pairs = len(first) - 1, len(starts[0]) - 1
+    costs, before = np.full(n, np.inf), np.full(n, -1, np.int64)
+    finish = np.full(n, np.inf)
+    found, offsets = np.full(n_pairs, np.inf), np.zeros(n_pairs + 1, np.int64)
+    expanded = np.zeros(n_pairs, np.int64)
+    used = 0
+    for pair in range(n_pairs):
+        reached = [np.int64(0) for _ in range(0)]
+        for k in range(goals[0][pair], goals[0][pair + 1]):
+            finish[goals[1][k]] = goals[2][k]
+        heap = [(np.inf, np.int64(-1))]
+        for k in range(starts[0][pair], starts[0][pair + 1]):
+            node = starts[1][k]
+            costs[node] = starts[2][k]
+            reached.append(node)
+            heapq.heappush(heap, (costs[node], node))
+        best, last = np.inf, np.int64(-1)
+        while heap[0][0] < best:
+            cost, here = heapq.heappop(heap)
+            if cost > costs[here]:
+                continue
+            expanded[pair] += 1
+            if cost + finish[here] < best:
+                best, last = cost + finish[here], here
+            for edge in range(first[here], first[here + 1]):
+                other, through = head[edge], cost + cost_of[edge]
+                if through < costs[other]:
+                    if costs[other] == np.inf:
+                        reached.append(other)
+                    costs[other], before[other] = through, here
+                    heapq.heappush(heap, (through, other))
+        found[pair] = best
+        node = last
+        while node >= 0:
+            if used == len(passed):
+                offsets[n_pairs] = -1
+                return found, offsets, expanded
+            passed[used] = node
+            used += 1
+            node = before[node]
+        offsets[pair + 1] = used
+        for node in reached:
+            costs[node], before[node] = np.inf, -1
+        for k in range(goals[0][pair], goals[0][pair + 1]):
+            finish[goals[1][k]] = np.inf
+    return found, offsets, expanded
+
+
+@njit(cache=True, nogil=True)
+def log_uniform(low, high, shares):
+    """Return numbers between `low` and each of `high`, by their shares in the logarithm."""
+    found = np.empty(len(high))
+    for k in range(len(high)):
+        found[k] = low * exp(shares[k] * log(high[k] / low))
+    return found

@@ -1,0 +1,250 @@
+"""The picture of a graph that others have made, with what is wrong with it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from hybridnav.maps.islands import unique_rows
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.layout import finish
+from hybridnav.viz.maps import ground_entries
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridnav.ext.graphs import GraphCheck, RouteGraph
+    from hybridnav.viz.layout import Entry
+
+
+_COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
+_MARKS = "sD^vo<>phP"
+"""Marks of the kinds of findings, again from the first where there are more."""
+_SMALLEST, _LARGER, _LARGEST = 4.0, 0.8, 9.0
+"""Size of the first mark, and how much larger the next are, up to a limit, in line widths: marks at
+one point are all seen."""
+_ARROW_IN = 0.07
+"""Length of the arrow on an edge that leads one way, in inches."""
+_MARGIN_M = 0.5
+
+
+def plot_graph_check(
+    check: GraphCheck,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw a graph over its map, and where something is wrong.
+
+    Parameters
+    ----------
+    check
+        The graph, its map, and the findings; up to 1,000 of a kind are drawn.
+    ax
+        Axes to draw on; by default new ones in a new figure.
+    title
+        Title instead of the names and counts; empty for none.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.ext.graphs import plot_graph_check
+    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
+    >>> plain = nx.Graph()
+    >>> plain.add_node("a", x=2.5, y=5.0)
+    >>> plain.add_node("b", x=30.0, y=5.0)
+    >>> plain.add_edge("a", "b")
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
+    >>> check = hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    >>> plot_graph_check(check, title="checked").get_title()
+    'checked'
+    """
+    grid, graph = check.grid, check.graph
+    view = known_view(grid).holding(graph.points, _MARGIN_M)
+    canvas = Canvas.opened(ax, width_in, view)
+    draw_cells(
+        canvas,
+        grid,
+        grid.classes,
+        style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED),
+    )
+    line = canvas.sizes.line
+    entries: list[Entry] = []
+    for chosen, name, colour, width in (
+        (check.is_clear, "edges", style.ARC, 0.5),
+        (~check.is_clear, "edges that the robot cannot follow", style.PATH, 0.9),
+    ):
+        bent = graph.lines if check.along_lines else {}
+        straight = chosen.copy()
+        straight[list(bent)] = False
+        ends = unique_rows(np.sort(graph.edges[straight], axis=1)).rows
+        drawn = [*graph.points[ends], *(bent[edge] for edge in bent if chosen[edge])]
+        if drawn:
+            look: dict[str, Any] = {"color": colour, "linewidth": width * line}
+            canvas.add_lines(drawn, colors=colour, linewidths=width * line, zorder=2)
+            entries.append((Line2D([], [], **look), name))
+    entries += _draw_arrows(canvas, check, line)
+    entries += _draw_nodes(canvas, check, line)
+    entries += _draw_findings(canvas, check, line)
+    what = f"{check.count:,} findings" if check.findings else "nothing found"
+    counts = [f"{graph.n_nodes:,} nodes", f"{graph.n_edges:,} edges", what]
+    words = [f"{graph.name} on {grid.name}", *counts] if title is None else [title]
+    finish(canvas, [*entries, *ground_entries(grid)], words)
+    return canvas.ax
+
+
+def _draw_nodes(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
+    """Draw the nodes where the robot fits."""
+    points = check.graph.points[check.is_free]
+    if not len(points):
+        return []
+    look: dict[str, Any] = {"color": style.INK, "marker": "o", "linestyle": "none"}
+    look["markersize"] = 2.2 * line
+    canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **look)
+    return [(Line2D([], [], **look), "nodes")]
+
+
+def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
+    """Draw an arrow on each edge that leads one way only."""
+    graph = check.graph
+    both = set(map(tuple, graph.edges.tolist()))
+    bent = graph.lines if check.along_lines else {}
+    lines = [
+        bent.get(edge, graph.points[[tail, head]])
+        for edge, (tail, head) in enumerate(graph.edges.tolist())
+        if tail != head and (head, tail) not in both
+    ]
+    if not lines:
+        return []
+    # In the middle of the edge, on polylines of the segment there.
+    at = np.array([each[(len(each) - 2) // 2 : (len(each) - 2) // 2 + 2] for each in lines])
+    steps = at[:, 1] - at[:, 0]
+    along = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    look: dict[str, Any] = {"color": style.INK}
+    shape: dict[str, Any] = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
+    shape |= {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}
+    canvas.ax.quiver(
+        *at.mean(axis=1).T,
+        *(along * _ARROW_IN * line).T,
+        angles="xy",
+        pivot="mid",
+        scale=1.0,
+        zorder=3.5,
+        **look,
+        **shape,
+    )
+    mark = Line2D([], [], marker=">", linestyle="none", markersize=5.0 * line, **look)
+    return [(mark, "edges that lead one way")]
+
+
+def _draw_findings(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
+    """Mark each finding: at its point, or in the middle of its edge."""
+    entries: list[Entry] = []
+    # What lies far outside is marked at the rim.
+    low, high = canvas.view.low + _MARGIN_M, canvas.view.high - _MARGIN_M
+    for number, found in enumerate(check.findings):
+        points = [
+            np.clip(np.mean(each.points, axis=0), low, high)
+            for each in found.examples
+            if each.points
+        ]
+        look: dict[str, Any] = {
+            "color": _COLOURS[found.severity],
+            "marker": _MARKS[number % len(_MARKS)],
+            "markersize": min(_SMALLEST + number * _LARGER, _LARGEST) * line,
+            "markerfacecolor": "none",
+            "markeredgewidth": 1.1 * line,
+            "linestyle": "none",
+        }
+        name = found.text.partition(",")[0]
+        if points:
+            canvas.ax.plot(*np.array(points).T, zorder=4, **look)
+        else:
+            name, look["marker"] = f"{name}: not drawn", "None"
+        entries.append((Line2D([], [], **look), f"{found.severity}: {name}"))
+    return entries
+
+
+# Pictures of route graphs over their map.
+
+_KINDS = {
+    "cover": ("further nodes", style.ARC, "o", 1.6),
+    "lane": ("lanes", style.SELF_LOOP, "o", 1.6),
+    "bend": ("bends", style.PARALLEL, "o", 2.0),
+    "place": ("places", style.INK, "o", 3.0),
+    "room": ("rooms", style.PATH, "s", 4.0),
+    "door": ("doors", style.HOLE, "D", 4.0),
+}
+"""Name, colour, mark and size in line widths of each kind of node, the least important first."""
+
+
+def plot_route_graph(
+    graph: RouteGraph,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the nodes and edges of a route graph over its map.
+
+    Parameters
+    ----------
+    graph
+        The graph.
+    ax
+        Axes to draw on; by default new ones in a new figure.
+    title
+        Title instead of the map's name and the counts; empty for none.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import plot_route_graph
+    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
+    >>> plot_route_graph(hn.build_route_graph(topology), title="graph").get_title()
+    'graph'
+    """
+    grid = graph.grid
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    classes = (style.BLOCKED, style.FREE, style.UNEXPLORED)
+    draw_cells(canvas, grid, grid.classes, style.rgb(*classes))
+    ends = np.sort(graph.edges, axis=1)
+    ends = unique_rows(ends).rows
+    line = canvas.sizes.line
+    canvas.add_lines(graph.points[ends], colors=style.ARC, linewidths=0.35 * line, zorder=2)
+    entries: list[Entry] = [(Line2D([], [], color=style.ARC, linewidth=0.5 * line), "edges")]
+    kinds = np.array(graph.kinds)
+    for kind, (name, colour, mark, size) in _KINDS.items():
+        points = graph.points[kinds == kind]
+        if not len(points):
+            continue
+        look: dict[str, Any] = {
+            "color": colour,
+            "marker": mark,
+            "markersize": size * line,
+            "linestyle": "none",
+        }
+        canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **look)
+        entries.append((Line2D([], [], **look), name))
+    counts = [f"{graph.n_nodes:,} nodes", f"{graph.n_edges:,} edges"]
+    words = [grid.name, *counts] if title is None else [title]
+    finish(canvas, [*entries, *ground_entries(grid)], words)
+    return canvas.ax

@@ -1,0 +1,252 @@
+"""`hybridnav explore`: a simulated robot makes a map of a floor plan."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast, get_args
+
+import typer
+
+import hybridnav as hn
+from hybridnav._base.files import printable
+from hybridnav.cli.common import (
+    answer,
+    check_output,
+    check_writable,
+    extent_line,
+    progress_bar,
+    timings,
+)
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption
+from hybridnav.cli.reading import check_room_to_be, load_numba
+from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps.names import read_point
+
+if TYPE_CHECKING:
+    from hybridnav.ext.live.explore import By, Exploration, Sensor, Step
+
+StartOption = Annotated[
+    str | None,
+    typer.Option(
+        "--start",
+        metavar="X,Y",
+        help="Where the robot wakes up, in metres.",
+        show_default="the point farthest from walls",
+    ),
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("-o", "--out", metavar="MAP", help="Write the robot's map, a ROS map (.yaml)."),
+]
+SensorOption = Annotated[
+    str, typer.Option("--sensor", metavar="KIND", help="laser, all round, or sonar, a ring of 16.")
+]
+RangeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--range",
+        metavar="R",
+        help="Range of the sensor in metres.",
+        show_default="8 for the laser, 6.477 for sonars",
+    ),
+]
+NoiseOption = Annotated[
+    float, typer.Option("--noise", metavar="S", help="Standard deviation of readings in metres.")
+]
+RadiusOption = Annotated[
+    float | None,
+    typer.Option(
+        "--robot-radius",
+        metavar="R",
+        help="Robot radius in metres; else the model's.",
+        show_default="0.25",
+    ),
+]
+SeedOption = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the noise and the pyramid.")
+]
+ByOption = Annotated[
+    str,
+    typer.Option(
+        "--by",
+        metavar="RULE",
+        help="Which goal comes next: path, the nearest; frontier, the nearest, even if it has "
+        "become known on the way; room, those of its room first.",
+    ),
+]
+GoalsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--most-goals",
+        metavar="N",
+        min=1,
+        help="End after N choices: of goals, of drives back, of looks again.",
+    ),
+]
+AnimationOption = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Write an animation of places and rooms: .gif."),
+]
+FramesOption = Annotated[
+    int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
+]
+
+
+def explore(
+    map_file: MapArgument,
+    start: StartOption = None,
+    out: OutOption = None,
+    sensor: SensorOption = "laser",
+    range_m: RangeOption = None,
+    noise_m: NoiseOption = 0.01,
+    robot_radius_m: RadiusOption = None,
+    seed: SeedOption = 0,
+    by: ByOption = "path",
+    most_goals: GoalsOption = None,
+    plot: AnimationOption = None,
+    frames: FramesOption = 60,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    as_json: JsonOption = False,
+) -> None:
+    """Let a simulated robot explore MAP, and print what it drove and knows."""
+    point = None if start is None else _point(start)
+    check_output(out, "--out", (".yaml", ".yml"))
+    if out is not None:
+        check_writable(out.with_suffix(".pgm"), "--out")
+    check_output(plot, "--plot", (".gif",))
+    load_numba()
+    world = hn.load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells).grid
+    check_room_to_be(world)
+    if out is not None:
+        _check_kept(map_file, out)
+    from hybridnav.ext.live import explore as exploring  # noqa: PLC0415 - loads numba
+
+    maps = _Maps(frames)
+    with progress_bar("exploring") as advance:
+        done = exploring.explore(
+            world,
+            point,
+            sensor=_sensor(sensor, range_m, noise_m),
+            seed=seed,
+            by=_rule(by),
+            most_goals=exploring.MOST_GOALS if most_goals is None else most_goals,
+            watch=None if plot is None else maps.add,
+            progress=advance,
+        )
+    if out is not None:
+        hn.write_ros_map(done.grid, out)
+    if plot is not None:
+        maps.draw(done.grid, plot)
+    answer(_figures(done) if as_json else _summary(done, world, out))
+
+
+class _Maps:
+    """Maps of an exploration, at most so many: every one, every second one and so on."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._every, self._count = most, 1, 0
+        self._grids: list[hn.OccupancyGrid] = []
+
+    def add(self, step: Step) -> None:
+        """Keep the map of a step, if it is its turn."""
+        if self._count % self._every == 0:
+            if len(self._grids) == self._most - 1:
+                self._grids, self._every = self._grids[::2], 2 * self._every
+            if self._count % self._every == 0:
+                self._grids.append(step.topology.grid)
+        self._count += 1
+
+    def draw(self, last: hn.OccupancyGrid, file: Path) -> None:
+        """Write an animation of the maps, and of the last one."""
+        from hybridnav.ext.live import ReplayAnimation, replay  # noqa: PLC0415 - loads matplotlib
+
+        animation = ReplayAnimation(most_frames=self._most)
+        with progress_bar("drawing") as advance:
+            for step in replay([*self._grids, last]):
+                animation.add(step)
+                advance(step.number + 1, len(self._grids) + 1)
+        animation.save(file)
+
+
+def _rule(text: str) -> By:
+    from hybridnav.ext.live.explore import By  # noqa: PLC0415 - loads numba
+
+    if text not in get_args(By):
+        raise UsageError(f"--by must be one of {', '.join(get_args(By))}, got {printable(text)}")
+    return cast("By", text)
+
+
+def _point(text: str) -> tuple[float, float]:
+    point = read_point(text)
+    if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
+        raise UsageError(f"--start must be two finite numbers X,Y in metres, got {text!r:.80}")
+    return point[0], point[1]
+
+
+def _check_kept(map_file: Path, out: Path) -> None:
+    """Refuse a map that would replace the floor plan, its image, or the image beside it."""
+    from hybridnav.maps.files.ros import files_of  # noqa: PLC0415 - on demand
+
+    kept = {map_file.with_suffix(ending).resolve() for ending in (".yaml", ".yml", ".pgm")}
+    if map_file.suffix.lower() in {".yaml", ".yml"}:
+        kept |= {file.resolve() for file in files_of(map_file)}
+    if not kept.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
+        raise UsageError(
+            f"--out {str(out)!r:.80} would replace the floor plan, expected another name: "
+            "choose one"
+        )
+
+
+def _sensor(kind: str, range_m: float | None, noise_m: float) -> Sensor:
+    from hybridnav.ext.live.explore import laser_all_round  # noqa: PLC0415 - loads numba
+    from hybridnav.ext.live.mapping import SimulatedSonars  # noqa: PLC0415
+
+    if kind == "laser":
+        return laser_all_round(max_range_m=8.0 if range_m is None else range_m, noise_m=noise_m)
+    if kind == "sonar":
+        return SimulatedSonars(max_range_m=6.477 if range_m is None else range_m, noise_m=noise_m)
+    raise UsageError(f"--sensor must be laser or sonar, got {kind!r:.40}")
+
+
+def _figures(done: Exploration) -> str:
+    figures = {
+        "rows": done.grid.shape[0],
+        "cols": done.grid.shape[1],
+        "cells": done.grid.class_counts(),
+        "driven_m": round(done.driven_m, 3),
+        "scans": len(done.points),
+        "goals": done.n_goals,
+        "given_up": done.n_given_up,
+        "looks_again": done.n_looks_again,
+        "share_known": done.share_known,
+        "complete": done.is_complete,
+        "seconds": {name: round(value, 6) for name, value in done.seconds.items()},
+    }
+    return json.dumps(figures) + "\n"
+
+
+def _summary(done: Exploration, world: hn.OccupancyGrid, out: Path | None) -> str:
+    rows, cols = done.grid.shape
+    counts = done.grid.class_counts()
+    kinds = ", ".join(f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
+    known = math.floor(1000 * done.share_known) / 10  # 100 % means all
+    ended = "no goal is left: a door may be closed in the map"
+    if done.share_known == 1.0:
+        ended = "nothing in reach is unknown"
+    if not done.is_complete:
+        ended = "ended by --most-goals"
+    name = printable(world.name if out is None else out)
+    lines = [
+        f"map        {name}, {cols} x {rows} cells of {done.grid.resolution_m:g} m",
+        extent_line(done.grid),
+        f"cells      {kinds}",
+        f"driven     {done.driven_m:.1f} m, {len(done.points):,} scans, {done.n_goals:,} goals",
+        f"known      {known:g} % of what the robot can reach, {ended}",
+        f"given up   {done.n_given_up:,} cells that stayed unexplored from beside them",
+        f"doubts     {done.n_looks_again:,} spots where doubtful cells or gaps were seen again",
+        f"seconds    {timings(done.seconds)}",
+    ]
+    return "\n".join(lines) + "\n"

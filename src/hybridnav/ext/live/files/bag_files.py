@@ -1,0 +1,306 @@
+"""Bags of ROS 1 and ROS 2 by the package rosbags: their topics, and their messages one by one."""
+
+from __future__ import annotations
+
+import bz2
+from contextlib import contextmanager
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from hybridnav._base.files import printable
+from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, brief
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+
+    from rosbags.highlevel import AnyReader
+
+    from hybridnav._base.typing import PathLike
+
+
+GRID, LASER, ODOMETRY, PATH = (
+    f"{package}/msg/{name}"
+    for package, name in (
+        ("nav_msgs", "OccupancyGrid"),
+        ("sensor_msgs", "LaserScan"),
+        ("nav_msgs", "Odometry"),
+        ("nav_msgs", "Path"),
+    )
+)
+TRANSFORMS = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
+
+
+class Bag:
+    """A bag: a file of ROS 1 (.bag), a folder of ROS 2, or one of its files (.mcap, .db3).
+
+    Parameters
+    ----------
+    path
+        The file or folder.
+
+    Raises
+    ------
+    MapNotFoundError
+        When it does not exist.
+    MapError
+        When rosbags is not installed.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self._path = Path(path)
+        self.where = f"bag {printable(path)}"
+        """Name of the bag in messages."""
+        try:
+            is_there = self._path.exists()
+        except (OSError, ValueError):
+            is_there = False
+        if not is_there:
+            raise MapNotFoundError(f"{self.where}: no such file or folder")
+        check_rosbags(self.where)
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of its files."""
+        path = self._path
+        files = path.iterdir() if path.is_dir() else [path]
+        return sum(file.stat().st_size for file in files if file.is_file())
+
+    @cached_property
+    def topics(self) -> dict[str, tuple[str, int]]:
+        """The type of the messages of each topic, and how many there are.
+
+        Raises
+        ------
+        MapError
+            When the file is no bag, or damaged.
+        """
+        with self._open() as reader:
+            return {
+                name: (topic.msgtype or "", topic.msgcount) for name, topic in reader.topics.items()
+            }
+
+    def topics_of(self, msgtypes: Collection[str]) -> list[str]:
+        """Return the topics of messages of some types, in order; errors as for `topics`."""
+        return sorted(name for name, (kind, _) in self.topics.items() if kind in msgtypes)
+
+    def topic_of(self, msgtype: str, topic: str | None) -> str:
+        """Return the topic of messages of a type.
+
+        Parameters
+        ----------
+        msgtype
+            The type.
+        topic
+            Name of the topic; None for the only one.
+
+        Raises
+        ------
+        MapError
+            When there is none, more than one and none was named, or the file is damaged.
+        """
+        found = self.topics_of({msgtype})
+        short = msgtype.replace("/msg/", "/")
+        if topic is None and len(found) == 1:
+            return found[0]
+        if topic in found:
+            return str(topic)
+        named = "a topic" if topic is None else f"topic {brief(topic)}"
+        if not found:
+            raise MapError(f"{self.where}: expected {named} of {short}, got no topic of that type")
+        raise MapError(
+            f"{self.where}: expected {named} of {short}, got {', '.join(found):.200}: name one"
+        )
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
+        """Yield the messages of some topics with these, in the order in which they were recorded.
+
+        Raises
+        ------
+        MapError
+            When the file is damaged; what was yielded before is sound.
+        """
+        with self._open() as reader:
+            wanted = [each for each in reader.connections if each.topic in topics]
+            if not wanted:
+                return
+            for connection, _, raw in reader.messages(wanted):
+                yield connection.topic, reader.deserialize(raw, connection.msgtype)
+
+    def last(self, topic: str) -> Any:
+        """Return the last message of a topic.
+
+        Raises
+        ------
+        MapError
+            When there is none, or the file is damaged.
+        """
+        with self._open() as reader:
+            wanted = [each for each in reader.connections if each.topic == topic]
+            found = None
+            for connection, _, raw in reader.messages(wanted):
+                found = connection, raw
+            if found is None:
+                raise MapError(f"{self.where}: topic {topic} has no message")
+            return reader.deserialize(found[1], found[0].msgtype)
+
+    @contextmanager
+    def _open(self) -> Iterator[AnyReader]:
+        from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
+
+        bound_rosbags()
+        try:
+            with AnyReader([self._path], default_typestore=_usual_types()) as reader:
+                yield reader
+        except HybridNavError:
+            raise
+        except TooLargeError as failure:
+            raise MapError(f"{self.where}: {failure}") from None
+        except MemoryError:  # sizes stand in the file, and may be any number
+            raise MapError(f"{self.where}: damaged, or larger than the memory") from None
+        except Exception as failure:  # noqa: BLE001 - the parsers raise anything
+            text = printable(" ".join(str(failure).split())[:100]) or type(failure).__name__
+            raise MapError(f"{self.where}: no bag, or damaged ({text})") from None
+
+
+@cache
+def _usual_types() -> Any:
+    """Return the types of messages, for bags of ROS 2 that do not define theirs."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - an extra
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def check_rosbags(where: str) -> None:
+    """Raise `MapError` if the package that reads and writes bags is not installed."""
+    try:
+        import rosbags.highlevel  # noqa: F401, PLC0415 - an extra
+    except ImportError:
+        raise MapError(
+            f"{where}: the package rosbags is needed, and is not installed: "
+            "python -m pip install 'hybridnav[bags]'"
+        ) from None
+
+
+# Limits on what compressed bags unpack to: a small file may hold any number of zeros.
+#
+# rosbags unpacks a chunk at once, whatever its size. Its decompressors are replaced by ones that
+# stop at a limit, which changes nothing for bags within it.
+
+MOST_BYTES = 1 << 29
+"""Bytes that a chunk or message may unpack to; chunks are some MB, maps of 400 Mcells 400 MB."""
+MOST_TIMES = 200
+"""How many times as large as the file what it unpacks to may be, where that is more."""
+_MOST_FRAMES = 10_000
+"""Compressed frames that may follow each other in a chunk; writers make one."""
+
+
+class TooLargeError(Exception):
+    """More than the limit; its text is the whole reason."""
+
+    def __init__(self, what: str, most_bytes: int) -> None:
+        super().__init__(
+            f"{what} unpacks to more than {most_bytes / 2**20:,.0f} MiB, expected at most that: "
+            "unpack it by the tools of ROS if it is sound"
+        )
+
+
+class _Unpacker(Protocol):
+    """What bz2, lz4 and zstd have in common."""
+
+    @property
+    def eof(self) -> bool: ...
+    @property
+    def unused_data(self) -> bytes | None: ...
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
+
+
+def unpacked(make: Callable[[], Any], data: bytes, what: str, most_bytes: int) -> bytes:
+    """Return what compressed frames hold.
+
+    Parameters
+    ----------
+    make
+        Makes a decompressor of one frame, as in the module bz2.
+    data
+        The frames.
+    what
+        Words for them in messages.
+    most_bytes
+        Size in bytes at which to stop.
+
+    Raises
+    ------
+    TooLargeError
+        When they hold more.
+    EOFError
+        When the last one has no end, or there are more than 10,000.
+    """
+    parts: list[bytes] = []
+    left = most_bytes
+    for _ in range(_MOST_FRAMES):
+        unpacker: _Unpacker = make()
+        parts.append(unpacker.decompress(data, max_length=left + 1))
+        left -= len(parts[-1])
+        if left < 0:
+            raise TooLargeError(what, most_bytes)
+        if not unpacker.eof:
+            break
+        data = unpacker.unused_data or b""
+        if not data:
+            return b"".join(parts)
+    raise EOFError("compressed data without an end")
+
+
+class _BoundedZstd:
+    """The two functions of the module zstd that the reader of bags of ROS 2 calls."""
+
+    def __init__(self, zstd: Any) -> None:
+        self._zstd = zstd
+
+    def decompress(self, data: bytes) -> bytes:
+        return unpacked(self._zstd.ZstdDecompressor, data, "a message", MOST_BYTES)
+
+    @contextmanager
+    def open(self, file: Any, mode: str) -> Iterator[_BoundedFile]:
+        size = file.seek(0, 2)
+        file.seek(0)
+        with self._zstd.open(file, mode) as unpacking:
+            yield _BoundedFile(unpacking, max(MOST_BYTES, MOST_TIMES * size))
+
+
+class _BoundedFile:
+    """A file that is read up to a limit."""
+
+    def __init__(self, file: Any, most_bytes: int) -> None:
+        self._file, self._most, self._left = file, most_bytes, most_bytes
+
+    def read(self, size: int) -> bytes:
+        found: bytes = self._file.read(size)
+        self._left -= len(found)
+        if self._left < 0:
+            raise TooLargeError("a file of the bag", self._most)
+        return found
+
+
+@cache
+def bound_rosbags() -> None:
+    """Replace the decompressors of rosbags, once."""
+    from lz4.frame import (  # type: ignore[import-untyped]  # noqa: PLC0415 - an extra
+        LZ4FrameDecompressor,
+    )
+    from rosbags.rosbag1 import reader as reader_1  # noqa: PLC0415
+    from rosbags.rosbag2 import reader as reader_2  # noqa: PLC0415
+    from rosbags.rosbag2 import storage_mcap  # noqa: PLC0415
+
+    at_2: Any = reader_2
+    zstd = at_2.zstd
+    of_1: dict[str, Any] = reader_1.decompressors
+    for name, make in (("bz2", bz2.BZ2Decompressor), ("lz4", LZ4FrameDecompressor)):
+        of_1[name] = lambda data, make=make: unpacked(make, data, "a chunk", MOST_BYTES)
+    of_mcap: dict[str, Any] = storage_mcap.DECOMPRESSORS
+    for name, make in (("lz4", LZ4FrameDecompressor), ("zstd", zstd.ZstdDecompressor)):
+        of_mcap[name] = lambda data, size, make=make: unpacked(
+            make, data, "a chunk", min(size, MOST_BYTES)
+        )
+    at_2.zstd = _BoundedZstd(zstd)

@@ -1,0 +1,383 @@
+"""Maps and scans of bags of ROS 1 and ROS 2; plans and maps into bags."""
+
+from __future__ import annotations
+
+import math
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.files import printable
+from hybridnav._base.messages import number_of, stamp_ns_of, value_of
+from hybridnav._base.trig import atan2, cos
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.ext.live.files.bag_files import (
+    GRID,
+    LASER,
+    ODOMETRY,
+    PATH,
+    TRANSFORMS,
+    Bag,
+    check_rosbags,
+)
+from hybridnav.ext.live.files.bag_poses import NoPoseError, Transforms, frame_of
+from hybridnav.ext.live.files.scan_log import ScanLog
+from hybridnav.ext.live.mapping import LaserScan
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.checks import checked_radius, checked_thresholds, checked_type
+from hybridnav.planner import PlanResult, Tour
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from hybridnav._base.typing import FloatArray, PathLike
+
+
+_MOST_TILT_RAD = 0.1
+"""Angle between the vertical and the axis of a laser up to which its scans count as level."""
+_FIXED = ("map", "odom")
+"""Usual names of the frame in which a robot moves, the better first."""
+
+
+def load_bag_map(
+    path: PathLike,
+    *,
+    topic: str | None = None,
+    robot_radius_m: float | None = None,
+    free_threshold: float = 0.196,
+    occupied_threshold: float = 0.65,
+) -> OccupancyGrid:
+    """Read the last map of a bag of ROS 1 or ROS 2. Needs the extra `bags`; ROS is not needed.
+
+    Parameters
+    ----------
+    path
+        A file (.bag, .mcap, .db3), or the folder of a bag of ROS 2.
+    topic
+        Topic of `nav_msgs/OccupancyGrid`; None for `/map`, or the only one.
+    robot_radius_m, free_threshold, occupied_threshold
+        As in `OccupancyGrid`.
+
+    Returns
+    -------
+    OccupancyGrid
+        The map, named after its topic.
+
+    Raises
+    ------
+    MapNotFoundError
+        When there is no such bag.
+    MapError
+        When it is no bag or damaged, holds no such topic or several, its map is wrong, or rosbags
+        is not installed.
+    InvalidValueError
+        When the radius or a threshold is out of range.
+
+    Examples
+    --------
+    >>> hn.save_bag("office.bag", grid=hn.example_map("office"))
+    >>> hn.load_bag_map("office.bag").shape
+    (580, 960)
+    """
+    checked_thresholds(free_threshold, occupied_threshold)
+    if robot_radius_m is not None:
+        checked_radius(robot_radius_m)
+    bag = Bag(path)
+    if topic is None and "/map" in bag.topics_of({GRID}):
+        topic = "/map"
+    topic = bag.topic_of(GRID, topic)
+    message = bag.last(topic)
+    try:
+        return OccupancyGrid.from_message(
+            message,
+            robot_radius_m=robot_radius_m,
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+            name=topic.strip("/") or "map",
+        )
+    except InvalidValueError as error:
+        raise MapError(f"{bag.where}, {topic}: {error}") from None
+
+
+class BagLog(ScanLog):
+    """The laser scans of a bag of ROS 1 or ROS 2, as an iterable. Needs the extra `bags`.
+
+    The pose of a scan is that of its frame at its time, by the transforms of the bag (tf, and
+    odometry for frames that they lack). Scans are left out and counted if there is no transform at
+    their time, the laser is tilted by more than 0.1 radians, or they do not follow from those
+    before (see `ScanSequence`). A laser that hangs upside down is read as such. Readings below the
+    scan's `range_min` are none.
+
+    Parameters
+    ----------
+    path
+        A file (.bag, .mcap, .db3), or the folder of a bag of ROS 2.
+    topic
+        Topic of `sensor_msgs/LaserScan`; None for the only one.
+    frame
+        Frame in which the robot moves; None for `map`, `odom`, or the root of the transforms,
+        whichever is there first.
+
+    Raises
+    ------
+    MapNotFoundError
+        When there is no such bag.
+    MapError
+        When it is no bag or damaged, holds no such topic or several, or rosbags is not installed.
+
+    Examples
+    --------
+    >>> hn.save_bag("plans.bag", grid=hn.example_map("figure1"))
+    >>> try:
+    ...     hn.BagLog("plans.bag", topic="/scan")
+    ... except hn.MapError as error:
+    ...     print(error)
+    bag plans.bag: expected topic '/scan' of sensor_msgs/LaserScan, got no topic of that type
+    """
+
+    expected = "messages of sensor_msgs/LaserScan, with transforms of their frame"
+
+    def __init__(
+        self, path: PathLike, *, topic: str | None = None, frame: str | None = None
+    ) -> None:
+        self._bag = Bag(path)
+        self._topic = self._bag.topic_of(LASER, topic)
+        self._count = self._bag.topics[self._topic][1]
+        self._frame = frame
+        super().__init__(path, self._bag.size_bytes)
+
+    def _read(self) -> Iterator[LaserScan | str]:
+        transforms = self._transforms()
+        n_wrong, fixed = transforms.n_wrong, self._frame
+        if n_wrong:
+            self.notes.append(f"{n_wrong} transforms are wrong")
+        messages = self._bag.messages([self._topic])
+        for done in count(1):
+            self.bytes_read = self.size_bytes * min(done, self._count) // max(self._count, 1)
+            try:
+                found = next(messages, None)
+            except MapError:
+                yield "rest of the bag damaged"
+                break
+            if found is None:
+                break
+            message = found[1]
+            try:
+                fixed = fixed or _fixed_frame(transforms, frame_of(message, "header.frame_id"))
+                yield _scan_of(message, transforms, fixed)
+            except (NoPoseError, InvalidValueError) as fault:
+                named = isinstance(fault, NoPoseError)
+                yield str(fault) if named else "pose, angle, time or range out of range"
+
+    def _transforms(self) -> Transforms:
+        """Return the transforms of the bag; what is damaged in it ends them."""
+        of_odometry = self._bag.topics_of({ODOMETRY})
+        of_frames = self._bag.topics_of(TRANSFORMS)
+        found, odometry = Transforms(), Transforms()
+        try:
+            for topic, message in self._bag.messages([*of_odometry, *of_frames]):
+                if topic in of_odometry:
+                    odometry.add_odometry(message)
+                else:
+                    found.add_message(message, is_static=topic.endswith("tf_static"))
+        except MapError:
+            self.notes.append("transforms of a damaged bag")
+        found.join(odometry)
+        return found
+
+
+def _fixed_frame(transforms: Transforms, frame: str) -> str:
+    """Return the frame in which a robot moves, of those above the frame of its laser."""
+    above = transforms.ancestors(frame)
+    named = next((name for name in _FIXED if name in above), None)
+    if named is None and not transforms.has_motion(above):
+        raise NoPoseError(f"no transforms of a robot that moves above {frame:.40}")
+    return named or above[-1]
+
+
+def _scan_of(message: Any, transforms: Transforms, fixed: str) -> LaserScan:
+    what = "scan"
+    stamp_ns = stamp_ns_of(message, what)
+    frame = frame_of(message, "header.frame_id")
+    rotation, place = transforms.pose(frame, fixed, stamp_ns)
+    upright = cos(_MOST_TILT_RAD)
+    if abs(rotation[2, 2]) < upright:
+        raise NoPoseError("laser tilted")
+    side = math.copysign(1.0, rotation[2, 2])  # a laser upside down counts clockwise
+    far_m = float(value_of(message, "range_max", what))
+    return LaserScan(
+        _ranges(message),
+        (float(place[0]), float(place[1]), atan2(rotation[1, 0], rotation[0, 0])),
+        start_rad=side * number_of(message, "angle_min", what),
+        step_rad=side * number_of(message, "angle_increment", what),
+        max_range_m=far_m if far_m > 0 else math.inf,
+        time_s=stamp_ns / 1e9,
+    )
+
+
+def _ranges(message: Any) -> FloatArray:
+    try:
+        with np.errstate(invalid="ignore"):  # not every NaN survives the cast in silence
+            ranges = np.array(value_of(message, "ranges", "scan"), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValueError("scan: ranges must be numbers") from None
+    ranges[ranges < number_of(message, "range_min", "scan")] = math.nan
+    return ranges
+
+
+# Writer of bags of ROS 1 and ROS 2: maps and plans.
+
+_SECOND_NS = 1_000_000_000
+_STORAGES = ("mcap", "sqlite3")
+
+
+def save_bag(  # noqa: PLR0913 - the last five have defaults
+    path: PathLike,
+    plans: Sequence[PlanResult | Tour] = (),
+    *,
+    grid: OccupancyGrid | None = None,
+    frame: str = "map",
+    stamp_ns: int = 0,
+    storage: str = "mcap",
+) -> None:
+    """Write plans, and their map, as a bag of ROS 1 or ROS 2. Needs the extra `bags`.
+
+    Topics are `/plan` (`nav_msgs/Path`, poses 5 cm apart, one message a plan, a second apart) and
+    `/map` (`nav_msgs/OccupancyGrid`). Plans without a path are left out. Foxglove opens both kinds
+    of bags.
+
+    Parameters
+    ----------
+    path
+        A name that ends in .bag makes a file of ROS 1; any other one a folder of ROS 2. Nothing may
+        have that name; folders that it lacks are made.
+    plans
+        Results of a planner.
+    grid
+        A map; None for none.
+    frame
+        Name of the map frame.
+    stamp_ns
+        Time of the map and of the first plan, in nanoseconds since 1970.
+    storage
+        Format of a bag of ROS 2, `"mcap"` or `"sqlite3"`.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is nothing to write, or something else than plans and a map, or a name, time or
+        format is wrong.
+    MapError
+        When the name is taken, the bag cannot be written, or rosbags is not installed.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> result = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5))
+    >>> hn.save_bag("plans", [result], grid=topology.grid)
+    >>> hn.load_bag_map("plans").shape == topology.grid.shape
+    True
+    """
+    target = Path(path)
+    where = f"bag {printable(target)}"
+    if storage not in _STORAGES:
+        raise InvalidValueError(
+            f"storage must be one of {', '.join(_STORAGES)}, got {storage!r:.80}"
+        )
+    messages = list(_messages(plans, grid, frame, stamp_ns))
+    if not messages:
+        raise InvalidValueError(f"{where}: nothing to write, expected a plan with a path, or a map")
+    check_rosbags(where)
+    try:
+        if target.exists():
+            raise MapError(f"{where}: the name is taken, expected a new one: bags are not replaced")
+        _write(target, messages, storage)
+    except OSError as error:
+        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+
+
+def _messages(
+    plans: Sequence[PlanResult | Tour], grid: OccupancyGrid | None, frame: str, stamp_ns: int
+) -> Iterator[tuple[str, str, int, dict[str, Any]]]:
+    """Yield topic, type, time in nanoseconds, and content of each message."""
+    if grid is not None:
+        content = checked_type("grid", grid, OccupancyGrid).to_message(frame, stamp_ns=stamp_ns)
+        yield "/map", GRID, stamp_ns, content
+    for plan in plans:
+        for result in plan.results if isinstance(plan, Tour) else (plan,):
+            path = checked_type("plans", result, PlanResult).path
+            if path is not None:
+                yield "/plan", PATH, stamp_ns, path.to_message(frame, stamp_ns=stamp_ns)
+                stamp_ns += _SECOND_NS
+
+
+def _write(
+    target: Path, messages: list[tuple[str, str, int, dict[str, Any]]], storage: str
+) -> None:
+    from rosbags.rosbag1 import Writer as Writer1  # noqa: PLC0415 - an extra
+    from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: PLC0415
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
+
+    is_1 = target.suffix.lower() == ".bag"
+    store = get_typestore(Stores.ROS1_NOETIC if is_1 else Stores.ROS2_HUMBLE)
+    serialize = store.serialize_ros1 if is_1 else store.serialize_cdr
+    plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
+    writer: Any = Writer1(target) if is_1 else Writer(target, version=8, storage_plugin=plugin)
+    with writer:
+        topics: dict[str, Any] = {}
+        for topic, msgtype, stamp_ns, content in messages:
+            if topic not in topics:
+                kept = _kept(topic, is_1=is_1)
+                topics[topic] = writer.add_connection(topic, msgtype, typestore=store, **kept)
+            message = _filled(store, msgtype, content)
+            writer.write(topics[topic], stamp_ns, serialize(message, msgtype))
+
+
+def _kept(topic: str, *, is_1: bool) -> dict[str, Any]:
+    """Return how players keep the last message of a topic for late listeners: that of the map."""
+    if topic != "/map":
+        return {}
+    if is_1:
+        return {"latching": 1}
+    from rosbags.interfaces import (  # noqa: PLC0415 - an extra
+        Qos,
+        QosDurability,
+        QosHistory,
+        QosLiveliness,
+        QosReliability,
+        QosTime,
+    )
+
+    unset = QosTime(0, 0)
+    return {
+        "offered_qos_profiles": [
+            Qos(
+                QosHistory.KEEP_LAST,
+                1,
+                QosReliability.RELIABLE,
+                QosDurability.TRANSIENT_LOCAL,
+                unset,
+                unset,
+                QosLiveliness.SYSTEM_DEFAULT,
+                unset,
+                avoid_ros_namespace_conventions=False,
+            )
+        ]
+    }
+
+
+def _filled(store: Any, msgtype: str, content: Any) -> Any:
+    """Return the message of a type with some content; fields that it lacks are 0."""
+    if msgtype.endswith("/OccupancyGrid"):
+        content = content | {"data": np.array(content["data"], dtype=np.int8)}
+    values = {}
+    for name, (_, kind) in store.fielddefs[msgtype][1]:
+        value = content.get(name, 0)
+        if isinstance(value, dict):
+            value = _filled(store, kind, value)
+        elif isinstance(value, list):
+            value = [_filled(store, kind[0][1], each) for each in value]
+        values[name] = value
+    return store.types[msgtype](**values)

@@ -1,0 +1,220 @@
+"""`hybridnav map`: from a robot's log to a map file."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import hybridnav as hn
+from hybridnav._base.files import printable
+from hybridnav.cli.common import answer, check_writable, extent_line, progress_bar
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import JsonOption
+from hybridnav.cli.reading import load_numba
+from hybridnav.errors import MapError
+from hybridnav.ext.live.log_options import is_bag, open_log
+from hybridnav.maps import DEFAULT_MAX_CELLS
+
+if TYPE_CHECKING:
+    from hybridnav.ext.live.files.scan_log import ScanLog
+    from hybridnav.ext.live.mapping import Mapper
+
+_LESS_OFTEN = 16
+"""Scans between two moves of the bar."""
+
+LogArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="LOG",
+        help="CARMEN log (.log, or packed by gzip), or bag of ROS (.bag, .mcap, .db3, folder).",
+    ),
+]
+TopicOption = Annotated[
+    str | None,
+    typer.Option(
+        "--topic",
+        metavar="NAME",
+        help="Topic of a bag: of scans, or of a map, whose last message is written.",
+    ),
+]
+FrameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--frame",
+        metavar="NAME",
+        help="Frame of a bag in which the robot moves.",
+        show_default="map, odom or the root",
+    ),
+]
+OutOption = Annotated[
+    Path, typer.Option("-o", "--out", metavar="MAP", help="ROS map (.yaml); beside it the image.")
+]
+ResolutionOption = Annotated[
+    float, typer.Option("--resolution", metavar="R", help="Side of a cell in metres.")
+]
+MaxRangeOption = Annotated[
+    float,
+    typer.Option("--max-range", metavar="R", help="Readings of R metres or more are no obstacles."),
+]
+MinRangeOption = Annotated[
+    float, typer.Option("--min-range", metavar="R", help="Readings up to R metres are none.")
+]
+ClearRangeOption = Annotated[
+    float,
+    typer.Option(
+        "--clear-range", metavar="R", help="Metres that a beam without a return makes free."
+    ),
+]
+ToleranceOption = Annotated[
+    float,
+    typer.Option(
+        "--tolerance", metavar="R", help="Metres before its end that a beam does not make free."
+    ),
+]
+HitOption = Annotated[
+    float,
+    typer.Option("--hit", metavar="P", help="Occupancy of a cell after one scan that hit it."),
+]
+PassOption = Annotated[
+    float,
+    typer.Option("--pass", metavar="P", help="Occupancy of a cell after one scan that passed it."),
+]
+LeastOption = Annotated[
+    float,
+    typer.Option(
+        "--least",
+        metavar="P",
+        help="Least occupancy of a cell: 0.02 lets later scans undo earlier ones, by 0 all count "
+        "alike.",
+    ),
+]
+CellsOption = Annotated[
+    int,
+    typer.Option(
+        "--max-cells", metavar="N", min=1, help="Scans that need more cells are left out."
+    ),
+]
+
+
+def map(  # noqa: A001 - the command's name
+    log_file: LogArgument,
+    out: OutOption,
+    resolution_m: ResolutionOption = 0.05,
+    max_range_m: MaxRangeOption = 30.0,
+    min_range_m: MinRangeOption = 0.0,
+    clear_range_m: ClearRangeOption = 0.0,
+    tolerance_m: ToleranceOption = 0.1,
+    when_hit: HitOption = 0.988,
+    when_passed: PassOption = 0.19,
+    least: LeastOption = 0.0,
+    max_cells: CellsOption = DEFAULT_MAX_CELLS,
+    topic: TopicOption = None,
+    frame: FrameOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map."""
+    if out.suffix.lower() not in {".yaml", ".yml"}:
+        raise UsageError(f"--out must end in .yaml or .yml, got '{printable(out)}'")
+    for file in (out, out.with_suffix(".pgm")):
+        check_writable(file, "--out")
+        if file.resolve() == log_file.resolve():
+            raise UsageError(
+                f"--out {str(out)!r:.80} would replace the log, expected another name: choose one"
+            )
+    if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
+        return
+    load_numba()
+    from hybridnav.ext.live.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
+
+    model = LaserModel(when_hit, when_passed, max_range_m, min_range_m, clear_range_m, tolerance_m)
+    mapper = Mapper(
+        resolution_m=resolution_m, laser=model, least_probability=least, max_cells=max_cells
+    )
+    log = open_log(log_file, topic, frame)
+    began = time.perf_counter()
+    _add_all(log, mapper)
+    seconds = time.perf_counter() - began
+    where = f"log {printable(log_file)}"
+    if not log.n_scans:
+        raise MapError(f"{where}: no scan of a laser, expected {log.expected}; {log.summary()}")
+    if not mapper.has_cells:
+        raise MapError(
+            f"{where}: no reading below the greatest range of {max_range_m:g} m; {log.summary()}"
+        )
+    grid = mapper.to_grid(robot_radius_m=0.0, name=out.stem)
+    hn.write_ros_map(grid, out)
+    describe = _figures if as_json else _summary
+    answer(describe(grid, log, seconds, out))
+
+
+def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noqa: FBT001 - private
+    """Write the last map of a topic, and return whether the topic holds maps."""
+    from hybridnav.ext.live.files.bag_files import GRID, Bag  # noqa: PLC0415 - on demand
+
+    if topic not in Bag(bag).topics_of({GRID}):
+        return False
+    grid = hn.load_bag_map(bag, topic=topic, robot_radius_m=0.0)
+    hn.write_ros_map(grid, out)
+    rows, cols = grid.shape
+    if as_json:
+        figures = {"map": str(out), "rows": rows, "cols": cols, "resolution_m": grid.resolution_m}
+        answer(json.dumps(figures | {"cells": grid.class_counts()}) + "\n")
+    else:
+        answer("\n".join(_map_lines(grid, out)) + "\n")
+    return True
+
+
+def _map_lines(grid: hn.OccupancyGrid, out: Path) -> list[str]:
+    rows, cols = grid.shape
+    counts = grid.class_counts()
+    kinds = (f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
+    return [
+        f"map        {printable(out)}, {cols} x {rows} cells of {grid.resolution_m:g} m",
+        extent_line(grid),
+        f"cells      {', '.join(kinds)}",
+    ]
+
+
+def _add_all(log: ScanLog, mapper: Mapper) -> None:
+    """Add the scans of a log to a map, with a bar over the bytes of the file."""
+    with progress_bar("reading scans") as advance:
+        for count, scan in enumerate(log):
+            n_before = mapper.n_scans
+            mapper.add(scan)
+            if mapper.n_scans == n_before:  # also where a wrong first scan has gone
+                log.leave_out("beyond --max-cells")
+            if count % _LESS_OFTEN == 0:
+                advance(log.bytes_read, log.size_bytes)
+        advance(log.size_bytes, log.size_bytes)
+
+
+def _figures(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
+    rows, cols = grid.shape
+    figures = {
+        "map": str(out),
+        "rows": rows,
+        "cols": cols,
+        "resolution_m": grid.resolution_m,
+        "cells": grid.class_counts(),
+        "scans": log.n_scans,
+        "left_out": dict(log.skipped),
+        "no_readings": log.n_no_readings,
+        "recorded_s": log.duration_s,
+        "seconds": round(seconds, 6),
+    }
+    return json.dumps(figures) + "\n"
+
+
+def _summary(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
+    recorded = f", recorded in {log.duration_s:.0f} s" if log.duration_s > 0 else ""
+    lines = [
+        *_map_lines(grid, out),
+        f"scans      {log.n_scans:,}{recorded}",
+        f"log        {log.summary()}",
+        f"seconds    {seconds:.3f}",
+    ]
+    return "\n".join(lines) + "\n"

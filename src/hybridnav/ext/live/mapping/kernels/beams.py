@@ -1,0 +1,305 @@
+"""Kernels of beams: the cells that they pass, by exact walks on integers.
+
+Positions are (row, col) counted in 2^-16 of a cell and always odd, so that no endpoint lies on a
+line of the lattice; beams of up to 2^14 cells are compared without rounding in int64.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.trig import atan2, cos, exp, log, sin, tan
+
+_SHIFT = 16
+_NONE, _HIT, _CLEAR = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def _on_lattice(cells):
+    """Return a position, counted in cells, as an odd number of 2^-16 of a cell."""
+    return np.int64(math.floor(cells * (1 << _SHIFT))) | 1
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def beam_ends(ranges_m, pose, angles, limits, resolution_m):
+    """Return where the beams of a scan end.
+
+    Parameters
+    ----------
+    ranges_m
+        float64 (n,).
+    pose
+        `(x, y, heading)` of the laser, x and y relative to the corner of cell (0, 0).
+    angles
+        Direction of the first beam and the step to the next one, in radians.
+    limits
+        The least and the greatest range, how far a beam without a return clears, how far before its
+        return a beam ceases to clear, and how far behind it a beam occupies a cell, in metres.
+    resolution_m
+        Side of a cell.
+
+    Returns
+    -------
+    tuple
+        int64 (n, 2), cells that beams occupy. int64 (n + 1, 2), positions at which they cease to
+        clear, in the last row the laser. uint8 (n,): 0 for no reading, 1 for a hit, 2 for no
+        return. int64 (4,): first and last row, first and last column of the cells that they meet.
+    """
+    x, y, heading = pose
+    low, high, clear, blurred, depth = limits
+    n = len(ranges_m)
+    hits, ends = np.empty((n, 2), np.int64), np.empty((n + 1, 2), np.int64)
+    kinds = np.zeros(n, np.uint8)
+    ends[:, 0], ends[:, 1] = _on_lattice(y / resolution_m), _on_lattice(x / resolution_m)
+    row, col = ends[n, 0] >> _SHIFT, ends[n, 1] >> _SHIFT
+    hits[:, 0], hits[:, 1] = row, col
+    box = np.array([row, row, col, col])
+    for k in range(n):
+        reach = ranges_m[k]
+        if not reach > low:  # NaN too
+            continue
+        kinds[k] = _HIT if reach < high else _CLEAR
+        until = reach - blurred if reach < high else clear
+        reach = reach + depth if reach < high else clear
+        angle = heading + (angles[0] + k * angles[1])
+        cosine, sine = cos(angle), sin(angle)
+        if until > 0.0:
+            ends[k, 0] = _on_lattice((y + until * sine) / resolution_m)
+            ends[k, 1] = _on_lattice((x + until * cosine) / resolution_m)
+        hits[k, 0] = _on_lattice((y + reach * sine) / resolution_m) >> _SHIFT
+        hits[k, 1] = _on_lattice((x + reach * cosine) / resolution_m) >> _SHIFT
+        box[0], box[1] = min(box[0], hits[k, 0]), max(box[1], hits[k, 0])
+        box[2], box[3] = min(box[2], hits[k, 1]), max(box[3], hits[k, 1])
+    return hits, ends, kinds, box
+
+
+@njit(cache=True, nogil=True)
+def _start_of_walk(start_row, start_col, end_row, end_col):
+    """Return the first cell of a beam, the steps to its last one, and the state of the walk.
+
+    J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray tracing, 1987, on integers. The
+    walk crosses next the line with the smaller state; on a tie it passes a corner.
+    """
+    row, col = start_row >> _SHIFT, start_col >> _SHIFT
+    rows, cols = abs(end_row - start_row), abs(end_col - start_col)
+    to_row = (
+        ((row + 1) << _SHIFT) - start_row if end_row > start_row else start_row - (row << _SHIFT)
+    )
+    to_col = (
+        ((col + 1) << _SHIFT) - start_col if end_col > start_col else start_col - (col << _SHIFT)
+    )
+    return row, col, to_row * cols, to_col * rows, cols << _SHIFT, rows << _SHIFT
+
+
+@njit(cache=True, nogil=True)
+def add_hits(evidence, seen_at, corner, beams, scan, changes):
+    """Add the cells that beams of a scan occupy, unless the scan has met them already.
+
+    Parameters
+    ----------
+    evidence
+        float32 (rows, cols), log odds; changed.
+    seen_at
+        int32 (rows, cols), the number of the last scan that met a cell; changed.
+    corner
+        Row and column of the first cell of these arrays.
+    beams
+        Cells of hits, ends and kinds, as from `beam_ends`.
+    scan
+        Number of the scan, at least 1; another one than that of every other scan.
+    changes
+        Log odds of a hit and of a pass, and the limit of their sum, float32.
+    """
+    hit, _, limit = changes
+    hits, _, kinds = beams
+    for k in range(len(kinds)):
+        if kinds[k] == _HIT:
+            row, col = hits[k, 0] - corner[0], hits[k, 1] - corner[1]
+            if seen_at[row, col] != scan:
+                seen_at[row, col] = scan
+                evidence[row, col] = min(evidence[row, col] + hit, limit)
+
+
+@njit(cache=True, nogil=True)
+def add_passes(evidence, seen_at, corner, beams, scan, changes):
+    """Add the cells that beams of a scan pass, unless the scan has met them already.
+
+    A beam does not free the cell that it occupies. The parameters are those of `add_hits`.
+    """
+    _, passed, limit = changes
+    hits, ends, kinds = beams
+    first_row, first_col = corner
+    n = len(kinds)
+    for k in range(n):
+        if kinds[k] == _NONE or (ends[k, 0] == ends[n, 0] and ends[k, 1] == ends[n, 1]):
+            continue
+        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
+            ends[n, 0], ends[n, 1], ends[k, 0], ends[k, 1]
+        )
+        row_step = 1 if ends[k, 0] > ends[n, 0] else -1
+        col_step = 1 if ends[k, 1] > ends[n, 1] else -1
+        last_row, last_col = ends[k, 0] >> _SHIFT, ends[k, 1] >> _SHIFT
+        while row != last_row or col != last_col:
+            i, j = row - first_row, col - first_col
+            if seen_at[i, j] != scan:
+                seen_at[i, j] = scan
+                evidence[i, j] = max(evidence[i, j] + passed, -limit)
+            steps_row, steps_col = by_row <= by_col, by_col <= by_row
+            if steps_row:
+                row += row_step
+                by_row += more_row
+            if steps_col:
+                col += col_step
+                by_col += more_col
+        i, j = row - first_row, col - first_col
+        is_hit = kinds[k] == _HIT and row == hits[k, 0] and col == hits[k, 1]
+        if seen_at[i, j] != scan and not is_hit:
+            seen_at[i, j] = scan
+            evidence[i, j] = max(evidence[i, j] + passed, -limit)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def ray_lengths(classes, obstacle, start, targets):
+    """Return how far rays run before they enter a cell that stops them.
+
+    Parameters
+    ----------
+    classes
+        uint8 (rows, cols).
+    obstacle
+        The class of cells that stop rays. What lies outside the map stops none.
+    start
+        `(row, col)` in cells.
+    targets
+        float64 (n, 2), `(row, col)` in cells, within 2^14 cells of the start.
+
+    Returns
+    -------
+    FloatArray
+        float64 (n,), in cells; infinite where nothing stops the ray before its target.
+    """
+    lengths = np.full(len(targets), np.inf)
+    start_row, start_col = _on_lattice(start[0]), _on_lattice(start[1])
+    for k in range(len(targets)):
+        end_row, end_col = _on_lattice(targets[k, 0]), _on_lattice(targets[k, 1])
+        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
+            start_row, start_col, end_row, end_col
+        )
+        up, right = end_row > start_row, end_col > start_col
+        last_row, last_col = end_row >> _SHIFT, end_col >> _SHIFT
+        share = 0.0
+        while True:
+            inside = 0 <= row < classes.shape[0] and 0 <= col < classes.shape[1]
+            if inside and classes[row, col] == obstacle:
+                lengths[k] = share * math.hypot(end_row - start_row, end_col - start_col)
+                lengths[k] /= 1 << _SHIFT
+                break
+            if row == last_row and col == last_col:
+                break
+            steps_row, steps_col = by_row <= by_col, by_col <= by_row
+            if steps_row:
+                row += 1 if up else -1
+                by_row += more_row
+                line = (row if up else row + 1) << _SHIFT
+                share = (line - start_row) / (end_row - start_row)
+            if steps_col:
+                col += 1 if right else -1
+                by_col += more_col
+                line = (col if right else col + 1) << _SHIFT
+                share = (line - start_col) / (end_col - start_col)
+    return lengths
+
+
+@njit(cache=True, nogil=True)
+def probabilities(evidence, met):
+    """Return the probabilities, float32, of log odds; NaN where no scan met a cell."""
+    found = np.full(evidence.shape, np.nan, np.float32)
+    for i in range(evidence.shape[0]):
+        for j in range(evidence.shape[1]):
+            if met[i, j]:
+                found[i, j] = 1.0 / (1.0 + exp(-np.float64(evidence[i, j])))
+    return found
+
+
+# Kernels of cones: the evidence of a sonar's reading.
+
+
+@njit(cache=True, nogil=True)
+def _profile(share, off_axis):
+    """Return the product of the profiles along the range and across the cone."""
+    return (1.0 - share * share) * (1.0 - off_axis * off_axis)
+
+
+@njit(cache=True, nogil=True)
+def _box(apex, half_angle, far):
+    """Return the first and last row, and column, of cells that a cone may meet."""
+    low_row, high_row, low_col, high_col = apex[0], apex[0], apex[1], apex[1]
+    for k in range(-2, 3):
+        angle = apex[2] + k * half_angle / 2
+        row, col = apex[0] + far * sin(angle), apex[1] + far * cos(angle)
+        low_row, high_row = min(low_row, row), max(high_row, row)
+        low_col, high_col = min(low_col, col), max(high_col, col)
+    # Between two of these directions the arc bulges.
+    bulge = far * (1.0 - cos(half_angle / 4))
+    rows = math.floor(low_row - bulge), math.floor(high_row + bulge)
+    return rows, (math.floor(low_col - bulge), math.floor(high_col + bulge))
+
+
+@njit(cache=True, nogil=True)
+def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
+    """Add the reading of one sonar to a grid; see `SonarModel`.
+
+    Parameters
+    ----------
+    evidence
+        float32 (rows, cols), log odds; changed.
+    seen_at
+        int32 (rows, cols), the number of the last scan that met a cell; changed.
+    corner
+        Row and column of the first cell of these arrays.
+    apex
+        `(row, col, heading)` of the sonar, in cells and radians.
+    reading
+        The range in cells, and whether there was an echo.
+    shape
+        Half of the opening in radians, tolerance and least range in cells.
+    changes
+        The greatest and the least probability of a reading, and the limit of log odds.
+    scan
+        Number of the scan, at least 1.
+    """
+    reach, is_echo = reading
+    half_angle, tolerance, least = shape
+    when_hit, when_passed, limit = changes
+    axis_row, axis_col = sin(apex[2]), cos(apex[2])
+    far = reach + tolerance if is_echo else reach
+    near = reach - tolerance if is_echo else reach
+    widest = tan(half_angle)
+    (first_row, last_row), (first_col, last_col) = _box(apex, half_angle, far)
+    for row in range(first_row, last_row + 1):
+        for col in range(first_col, last_col + 1):
+            rows, cols = row + 0.5 - apex[0], col + 0.5 - apex[1]
+            ahead, aside = cols * axis_col + rows * axis_row, rows * axis_col - cols * axis_row
+            if abs(aside) > widest * ahead:  # most cells of the box
+                continue
+            distance = math.hypot(rows, cols)
+            if not least <= distance <= far:
+                continue
+            off_axis = atan2(aside, ahead) / half_angle
+            if distance >= near and is_echo:
+                share = _profile((distance - reach) / tolerance, off_axis)
+                probability = 0.5 + (when_hit - 0.5) * share
+            elif distance < near:
+                share = _profile((distance - least) / (near - least), off_axis)
+                probability = 0.5 - (0.5 - when_passed) * share
+            else:
+                continue
+            i, j = row - corner[0], col - corner[1]
+            seen_at[i, j] = scan
+            change = log(probability / (1.0 - probability))
+            evidence[i, j] = min(max(evidence[i, j] + change, -limit), limit)

@@ -1,0 +1,258 @@
+"""Scans: the readings of a laser or of a ring of sonars, with the pose at which they were taken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.copies import frozen
+from hybridnav._base.trig import sines_and_cosines
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps.frame import FARTHEST_M
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import FloatArray
+
+
+_MOST_TURN_RAD = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class LaserScan:
+    """Readings of a laser that were taken at one pose.
+
+    Parameters
+    ----------
+    ranges_m
+        Distance that each beam measured, float64 (n,), n >= 1. NaN and values below 0 are no
+        readings; infinity stands for a beam without a return. Copied.
+    pose
+        `(x, y, heading)` of the laser in the map frame, in metres and radians.
+    start_rad, step_rad
+        Direction of the first beam relative to the heading, counter-clockwise, and the angle from
+        each beam to the next one.
+    max_range_m
+        Range of this laser: readings of that length or more are beams without a return.
+    time_s
+        When the scan was taken; NaN if unknown.
+
+    Raises
+    ------
+    InvalidValueError
+        When the pose or an angle is not finite, there are no ranges, or the maximum is no positive
+        number.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.live.mapping import LaserScan
+    >>> scan = LaserScan(np.array([1.0, 2.0]), pose=(0.0, 0.0, 0.0), start_rad=0, step_rad=1.0)
+    >>> len(scan.ranges_m)
+    2
+    """
+
+    ranges_m: FloatArray = field(repr=False)
+    pose: tuple[float, float, float]
+    start_rad: float
+    step_rad: float
+    max_range_m: float = math.inf
+    time_s: float = math.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ranges_m", checked_ranges(self.ranges_m))
+        object.__setattr__(self, "pose", checked_pose(self.pose))
+        for name in ("start_rad", "step_rad", "max_range_m", "time_s"):
+            object.__setattr__(self, name, checked_number(name, getattr(self, name)))
+        if not (abs(self.start_rad) <= _MOST_TURN_RAD and abs(self.step_rad) <= _MOST_TURN_RAD):
+            raise InvalidValueError(
+                f"start_rad and step_rad are {self.start_rad} and {self.step_rad}, expected finite "
+                "angles within a few turns: give radians"
+            )
+        if not self.max_range_m > 0:
+            raise InvalidValueError(
+                f"max_range_m is {self.max_range_m}, expected a positive number: give metres, or "
+                "infinity if the laser states none"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class SonarScan:
+    """Readings of the sonars of a robot that were taken at one pose.
+
+    Parameters
+    ----------
+    ranges_m
+        Distance that each sonar measured, float64 (n,), n >= 1; NaN and values below 0 are no
+        readings, infinity stands for no echo. Copied.
+    pose
+        `(x, y, heading)` of the robot in the map frame, in metres and radians.
+    mounts
+        `(x, y, heading)` of each sonar on the robot, float64 (n, 3), metres and radians; see
+        `sonar_ring`. Copied.
+    time_s
+        When the scan was taken; NaN if unknown.
+
+    Raises
+    ------
+    InvalidValueError
+        When the pose or a mount is not finite, or there is not one mount for each range.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.live.mapping import SonarScan, sonar_ring
+    >>> scan = SonarScan(np.full(16, 2.0), pose=(0.0, 0.0, 0.0), mounts=sonar_ring())
+    >>> len(scan.ranges_m)
+    16
+    """
+
+    ranges_m: FloatArray = field(repr=False)
+    pose: tuple[float, float, float]
+    mounts: FloatArray = field(repr=False)
+    time_s: float = math.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ranges_m", checked_ranges(self.ranges_m))
+        object.__setattr__(self, "pose", checked_pose(self.pose))
+        object.__setattr__(self, "time_s", checked_number("time_s", self.time_s))
+        mounts = checked_array("mounts", self.mounts)
+        if mounts.shape != (len(self.ranges_m), 3) or not (np.abs(mounts) <= FARTHEST_M).all():
+            raise InvalidValueError(
+                f"mounts have the shape {mounts.shape}, expected finite (x, y, heading), one for "
+                f"each of {len(self.ranges_m)} ranges: make them with sonar_ring"
+            )
+        object.__setattr__(self, "mounts", mounts)
+
+
+def sonar_ring(n_sonars: int = 16, *, radius_m: float = 0.23) -> FloatArray:
+    """Return the mounts of sonars that stand evenly on a ring and look outwards.
+
+    Parameters
+    ----------
+    n_sonars
+        Number of sonars; the first looks ahead, the others follow counter-clockwise. The Nomad 200
+        has 16.
+    radius_m
+        Radius of the ring in metres; the default is that of the Nomad 200.
+
+    Returns
+    -------
+    FloatArray
+        `(x, y, heading)` of each sonar, float64 (n_sonars, 3), metres and radians.
+
+    Raises
+    ------
+    InvalidValueError
+        When the number or the radius is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.live.mapping import sonar_ring
+    >>> sonar_ring(4, radius_m=1.0).round(2) + 0.0
+    array([[ 1.  ,  0.  ,  0.  ],
+           [ 0.  ,  1.  ,  1.57],
+           [-1.  ,  0.  ,  3.14],
+           [ 0.  , -1.  ,  4.71]])
+    """
+    count = checked_count("n_sonars", n_sonars, MOST_READINGS)
+    radius = checked_number("radius_m", radius_m)
+    if not (math.isfinite(radius) and radius >= 0):
+        raise InvalidValueError(
+            f"radius_m is {radius_m}, expected a finite length >= 0: give metres"
+        )
+    heading = np.arange(count) * (math.tau / count)
+    sines, cosines = sines_and_cosines(heading)
+    return np.stack([radius * cosines, radius * sines, heading], axis=1)
+
+
+# Checks of scans and of the settings of sensors.
+
+MOST_READINGS = 1_000_000
+"""Readings of a scan, and sonars of a ring."""
+
+
+def checked_count(name: str, value: Any, most: int) -> int:
+    """Return a whole number from 1 to the most.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= most:
+        raise InvalidValueError(
+            f"{name} is {value!r:.80}, expected a whole number from 1 to {most}: give another one"
+        )
+    return int(value)
+
+
+def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return a finite pose, no farther than a grid may be.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is none.
+    """
+    try:
+        x_m, y_m, heading_rad = (float(value) for value in pose)
+    except (TypeError, ValueError, OverflowError):
+        x_m = y_m = heading_rad = math.nan
+    if not all(abs(value) <= FARTHEST_M for value in (x_m, y_m, heading_rad)):
+        raise InvalidValueError(
+            f"pose is {pose!r:.80}, expected finite (x, y, heading) within {FARTHEST_M:g} metres "
+            "and radians: give the pose at which the scan was taken"
+        )
+    return x_m, y_m, heading_rad
+
+
+def checked_number(name: str, value: Any) -> float:
+    """Return a number, NaN and infinite ones too.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is none.
+    """
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidValueError(
+            f"{name} is {value!r:.80}, expected a number: give it as a float"
+        ) from None
+
+
+def checked_array(name: str, values: Any) -> FloatArray:
+    """Return a copy of numbers as a read-only array.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no numbers.
+    """
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidValueError(
+            f"{name} are {type(values).__name__} {values!r:.60}, expected numbers: give them as an "
+            "array of float64"
+        ) from None
+    return frozen(array)
+
+
+def checked_ranges(ranges_m: FloatArray) -> FloatArray:
+    """Return a read-only copy of the readings of a scan.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are not numbers in one row.
+    """
+    ranges = checked_array("ranges", ranges_m)
+    if ranges.ndim != 1 or not 0 < ranges.size <= MOST_READINGS:
+        raise InvalidValueError(
+            f"ranges have the shape {ranges.shape}, expected 1 to {MOST_READINGS} numbers in one "
+            "row: give one scan at a time"
+        )
+    return ranges

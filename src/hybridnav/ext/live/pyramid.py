@@ -1,0 +1,361 @@
+"""A pyramid that follows its map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike, frozen
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.live.cellwise import CellDraft
+from hybridnav.ext.live.identities import settle
+from hybridnav.ext.live.kernels import rings as _ring_kernels
+from hybridnav.ext.live.shift import check_sides, shift_of
+from hybridnav.ext.live.state import State, pyramid_of, state_of
+from hybridnav.ext.live.tiles import NO_PLACE, Box
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.areas import box_of_area, class_reach, class_rules
+from hybridnav.maps.checks import checked_cell, checked_type
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.record import SURVIVES
+from hybridnav.pyramid.window import Criterion, contract_places
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
+
+    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.ext.live.tiles import Tiles
+    from hybridnav.pyramid import Linkage
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class OnlinePyramid:
+    """One version of a pyramid that follows its map: the places and all levels below them.
+
+    `update` returns the next version and leaves this one as it is: both share what did not change.
+    A version is a value: plans on an older one go on, in any thread.
+
+    Places have numbers that last from version to version. They are not indices of `pyramid`, the
+    dense form of a version, in which `place_numbers` states the number of each vertex.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from hybridnav.ext.live import OnlinePyramid
+    >>> grid = hn.example_map("figure1")
+    >>> online = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
+    >>> online.n_places, online.place_at((5, 13))
+    (10, 0)
+    >>> probability = grid.probability.copy()
+    >>> probability[5, 13] = 1.0
+    >>> update = online.update(replace(grid, probability=probability), changed=(1.3, 0.5, 1.4, 0.6))
+    >>> update.version.place_at((5, 13)), update.changed
+    (-1, (0, 2))
+    """
+
+    grid: OccupancyGrid
+    """The map of this version."""
+    merge_distance_m: float
+    linkage: Linkage
+    """Always "radius"."""
+    seed: int
+    low: tuple[int, int]
+    """Row and column of cell (0, 0) among the cells of the first version, negative where the map
+    has grown."""
+    _criterion: Criterion = field(repr=False)
+    _state: State = field(repr=False)
+
+    @classmethod
+    def of(cls, pyramid: DualGraphPyramid) -> OnlinePyramid:
+        """Make the first version from a pyramid; its places are numbered as the vertices are.
+
+        Parameters
+        ----------
+        pyramid
+            A pyramid without rooms, of the linkage "radius"; levels above its places are left out.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pyramid was built with rooms or another linkage, or its grid is too long.
+        """
+        if checked_type("pyramid", pyramid, DualGraphPyramid).rooms is not None:
+            raise InvalidValueError(
+                "the pyramid was built with rooms, expected one without: "
+                "build it without rooms, and find them on a version"
+            )
+        if pyramid.linkage != "radius":
+            raise InvalidValueError(
+                f"the pyramid was built with the linkage {brief(pyramid.linkage)}, expected "
+                "'radius', the default: places of other linkages do not follow a map"
+            )
+        check_sides(pyramid.grid)
+        # Loading a version needs no decimation.
+        from hybridnav.pyramid.decimation import squared_limit  # noqa: PLC0415
+
+        limit = squared_limit(pyramid.merge_distance_m, pyramid.grid.resolution_m)
+        return cls(
+            pyramid.grid,
+            pyramid.merge_distance_m,
+            pyramid.linkage,
+            pyramid.seed,
+            (0, 0),
+            Criterion(pyramid.linkage, limit, pyramid.seed),
+            state_of(pyramid),
+        )
+
+    def update(
+        self, grid: OccupancyGrid, *, changed: BaseGeometry | ArrayLike | None = None
+    ) -> Update:
+        """Return the next version, that of a changed map.
+
+        Places that hold no changed cell keep their cells, their levels and their numbers, unless
+        they take in new cells, or may merge with what changed beside them. The other places give
+        away and take in single cells. Levels are made when they are read.
+
+        Parameters
+        ----------
+        grid
+            The map now, with the cells of this version's grid: its frame may have its origin whole
+            rows and columns lower, and it may be larger on any side.
+        changed
+            The area where measurements changed, as in `HybridPlanner.update`: a shapely geometry
+            in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
+            mask, bool (rows, cols) of the new grid. The robot's radius is added on all sides, and
+            cells by which the map grew always count. Only there are cells compared: others stay as
+            they were until an update states them, and `pyramid` refuses such a version. None
+            compares all cells, as do grids with another radius or other thresholds.
+
+        Returns
+        -------
+        Update
+            The next version, and what became of the places.
+
+        Raises
+        ------
+        InvalidValueError
+            When the grid has cells of another size or at other points, or does not cover the one of
+            this version, or `changed` is no area and no mask of it.
+        """
+        checked_type("grid", grid, OccupancyGrid)
+        rows, cols = shift_of(self.grid, grid, otherwise="build a new pyramid")
+        check_sides(grid)
+        low = self.low[0] - rows, self.low[1] - cols
+        whole = Box(0, 0, *grid.shape)
+        first_row, high_row, first_col, high_col = box_of_area(changed, grid.frame, grid.shape)
+        box = Box(first_row, first_col, high_row, high_col).widened(class_reach(grid)).common(whole)
+        if class_rules(grid) != class_rules(self.grid) or grid.least_island_m2 > 0:
+            box = whole
+        old = Box(0, 0, *self.grid.shape).moved(rows, cols)
+        # Obstacles in new cells reach into those at the former rim.
+        apart = old.narrowed(class_reach(grid), whole)
+        inside = box.common(apart)
+        boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
+        state = vars(self).get("_with_levels", self._state)
+        draft = CellDraft(state, self._criterion)
+        draft.change([part.moved(*low) for part in boxes], grid.classes, low)
+        events = settle(draft)
+        cells = draft.cells - np.array(low)
+        version = replace(self, grid=grid, low=low, _state=draft.close())
+        order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1], kind="stable")
+        return Update(version, *events, frozen(cells[order]))
+
+    @property
+    def state(self) -> State:
+        """The cells and the table of places, for what follows the places."""
+        return self._state
+
+    @property
+    def n_places(self) -> int:
+        """Places of the version."""
+        return int(self._state.vertex_ends[SURVIVES])
+
+    @property
+    def n_levels(self) -> int:
+        """Levels up to that of the places, the base included."""
+        return int(np.count_nonzero(self._with_levels.vertex_ends[1:SURVIVES])) + 1
+
+    @cached_property
+    def _with_levels(self) -> State:
+        """The state with all levels below the places."""
+        return with_levels(self._state, self._box(), self._criterion)
+
+    @cached_property
+    def number_of(self) -> IntArray:
+        """int32 (rows, cols), the number of the place of each cell of the grid, -1 for none."""
+        return frozen(self._state.tiles.planes(self._box())[0])
+
+    def place_at(self, cell: tuple[int, int]) -> int:
+        """Return the number of the place that holds a cell (row, col) of the grid.
+
+        `NO_PLACE`, -1, for an occupied cell and for one outside the grid.
+
+        Raises
+        ------
+        InvalidValueError
+            When it is no cell.
+        """
+        row, col = checked_cell("cell", cell)
+        row, col = row + self.low[0], col + self.low[1]
+        return int(self._state.tiles.planes(Box(row, col, row + 1, col + 1))[0][0, 0])
+
+    def receptive_field(self, place: int) -> LongArray:
+        """Return the cells of a place, int64 (n, 2), (row, col) of the grid, in the order of rows.
+
+        Raises
+        ------
+        InvalidValueError
+            When the version has no such place.
+        """
+        is_number = isinstance(place, int | np.integer)
+        if not is_number or not self._state.places.has(place):
+            raise InvalidValueError(
+                f"there is no place {place!r:.40} in this version, expected one of its "
+                f"{self.n_places}: an update states what became of a place"
+            )
+        box = Box(*self._state.places.read([place])[0]["box"].tolist())
+        cells = np.argwhere(self._state.tiles.planes(box)[0] == place)
+        found: LongArray = cells + np.array(box[:2]) - np.array(self.low)
+        return found
+
+    @cached_property
+    def pyramid(self) -> DualGraphPyramid:
+        """The version as a pyramid of dense arrays, with all levels below the places.
+
+        Making it takes up to three times as long as a build, far longer than an update.
+
+        Raises
+        ------
+        InvalidValueError
+            When cells of the grid changed outside what an update stated.
+        """
+        return pyramid_of(self._with_levels, self._box(), self)
+
+    @cached_property
+    def place_numbers(self) -> LongArray:
+        """int64 (n_places,), the number of the place of each vertex of the last level of
+        `pyramid`."""
+        rows, cols = self.pyramid[-1].cells.T
+        return frozen(self.number_of[rows, cols].astype(np.int64))
+
+    def _box(self) -> Box:
+        return Box(0, 0, *self.grid.shape).moved(*self.low)
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class Update:
+    """A new version, and what became of the places of the one before, by number.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.live import OnlinePyramid
+    >>> grid = hn.OccupancyGrid(np.zeros((3, 5)), robot_radius_m=0)
+    >>> version = OnlinePyramid.of(hn.DualGraphPyramid.build(grid))
+    >>> wall = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    >>> update = version.update(hn.OccupancyGrid(np.tile(wall, (3, 1)), robot_radius_m=0))
+    >>> update.died, update.split
+    ((0,), {0: (1, 2)})
+    >>> update.cells.tolist()
+    [[0, 2], [1, 2], [2, 2]]
+    """
+
+    version: OnlinePyramid
+    """The new version."""
+    born: tuple[int, ...]
+    """Places that are none of the old ones; their numbers are new."""
+    died: tuple[int, ...]
+    """Old places that are no more."""
+    merged: dict[int, int]
+    """Those of them most of whose cells went into another place, with that place."""
+    split: dict[int, tuple[int, ...]]
+    """Old places of which several new ones mostly consist, with these."""
+    changed: tuple[int, ...]
+    """Places that kept their number, and most of their cells, but not all that they were."""
+    cells: LongArray
+    """int64 (n, 2), the cells (row, col) of the new grid whose `CellClass` is another than before,
+    in the order of rows. What lay outside the map before counts as occupied there. Whatever depends
+    on the classes of cells alone is as it was where none of these lies."""
+
+
+def _outside(inner: Box, outer: Box) -> list[Box]:
+    """Return the boxes that make up an outer box without an inner one."""
+    if inner.is_empty:
+        return [outer]
+    low, high = inner.low_row, inner.high_row
+    boxes = [
+        Box(outer.low_row, outer.low_col, low, outer.high_col),
+        Box(high, outer.low_col, outer.high_row, outer.high_col),
+        Box(low, outer.low_col, high, inner.low_col),
+        Box(low, inner.high_col, high, outer.high_col),
+    ]
+    return [box for box in boxes if not box.is_empty]
+
+
+# The levels below places, made when they are read.
+
+
+def with_levels(state: State, box: Box, criterion: Criterion) -> State:
+    """Return a version with all levels below the places that changed since they were made last.
+
+    Each of these places is dissolved into its cells and contracted again, beside places that stay
+    as they are, until its surviving cell alone is left.
+
+    Parameters
+    ----------
+    state
+        The version; it stays as it is.
+    box
+        All cells, by the rows and columns of the tiles.
+    criterion
+        When two fields merge; its linkage is "radius".
+    """
+    if state.has_levels:
+        return state
+    stale = state.places.stale()
+    tiles, places = state.tiles.next_version(), state.places.next_version()
+    cells, rows = tiles.read(box), places.read(stale)
+    dissolved = _ring_kernels.index_in(cells["place"], stale)
+    gone = (dissolved > 0) | ((cells["class"] == 0) & (cells["end"] > 0))
+    ring = _ring_kernels.ring_round(gone) & (cells["place"] != NO_PLACE)
+    survivors = np.zeros(box.shape, np.bool_)
+    row, col = (rows["cell"] - np.array(box[:2])).T
+    survivors[row, col] = True
+    joins = _joins_of(tiles, box, ring, cells)
+    fields = contract_places(dissolved, survivors, (ring, joins), criterion)
+    fresh = cells["class"] * gone
+    _ring_kernels.enter(
+        tuple(cells[name] for name in ("class", "end", "parent", "edges", "place")),
+        (gone, fresh),
+        (fields.record.vertex_end, fields.record.vertex_parent, fields.record.edge_end),
+        fields.field_of,
+        cells["place"].ravel()[fields.survivors].astype(np.int64),
+    )
+    tiles.write(box, cells)
+    rows["is_stale"] = False
+    places.write(stale, rows)
+    tiles.close()
+    places.close()
+    ends = np.bincount(cells["end"].ravel(), minlength=SURVIVES + 1).astype(np.int64)
+    return State(tiles, places, ends, state.next_place)
+
+
+def _joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteArray:
+    """Return the level at which the two cells of each base edge in a ring join, flat."""
+    joins: ByteArray
+    joins, beyond = _ring_kernels.ring_joins(ring, cells["end"], cells["parent"], cells["place"])
+    beyond[:, 2:] += np.tile(np.array(box[:2]), 2)
+    for edge, reached, *cell, row, col in beyond.tolist():
+        level, first, second = reached, (cell[0], cell[1]), (row, col)
+        while first != second:
+            if tiles.end_at(first) > tiles.end_at(second):
+                first, second = second, first
+            level = max(level, tiles.end_at(first))
+            first = tiles.parent_of(first)
+        joins[edge] = level
+    return joins

@@ -1,0 +1,358 @@
+"""The server of the page: checked requests in, JSON, tiles and files out."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from hybridnav.errors import HybridNavError, InvalidValueError, MapError
+from hybridnav.ext.page.floors import BuildingSession
+from hybridnav.ext.page.opening import BuildingOpening, Opening, PreparingError
+from hybridnav.ext.page.page import (
+    ASSETS,
+    KINDS,
+    POLICY,
+    asset,
+    exported,
+    exported_building,
+    live_page,
+)
+from hybridnav.ext.page.requests import (
+    AlternativesQuery,
+    At,
+    Edit,
+    FloorsAlternativesQuery,
+    FloorsPathQuery,
+    FloorsPlanQuery,
+    FloorsQuery,
+    PathQuery,
+    PlanQuery,
+    Save,
+    Undo,
+    checked,
+)
+from hybridnav.ext.page.session import ConflictError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from pydantic import BaseModel
+    from starlette.requests import Request
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+    from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.tiles import Theme
+
+_MOST_BYTES = 2_000_000
+"""Size of a request's body."""
+_HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"x-frame-options", b"DENY"),
+)
+_FORBIDDEN, _TOO_LARGE, _WRONG_KIND, _UNPROCESSABLE, _CONFLICT, _FULL, _NOT_YET = (
+    *(403, 413, 415, 422, 409, 507, 503),
+)
+
+
+class Guard:
+    """What answers only the page itself: its token, its host, its origin.
+
+    A page of another site knows no token, and a name that points to 127.0.0.1 is not a host of
+    this server.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+        self._app = app
+        self._prefix = f"/{token}/".encode()
+        self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
+        self._origins = {b"http://" + host for host in self._hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_safely(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+            await send(message)
+
+        refusal = self._refusal(scope) if scope["type"] == "http" else "no such protocol"
+        if refusal is not None:
+            await _error(refusal, _FORBIDDEN)(scope, receive, send_safely)
+            return
+        await self._app(scope, receive, send_safely)
+
+    def _refusal(self, scope: Scope) -> str | None:
+        headers: dict[bytes, list[bytes]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.lower(), []).append(value)
+        raw: bytes = scope.get("raw_path") or scope["path"].encode()
+        given = raw[: len(self._prefix)]
+        if not secrets.compare_digest(given, self._prefix):
+            return "the address has no valid token: open the address that the command printed"
+        hosts = headers.get(b"host", [])
+        if len(hosts) != 1 or hosts[0].lower() not in self._hosts:
+            return "wrong host"
+        if any(origin not in self._origins for origin in headers.get(b"origin", [])):
+            return "wrong origin"
+        if headers.get(b"sec-fetch-site", [b"none"])[0] not in {b"same-origin", b"none"}:
+            return "wrong site"
+        return None
+
+
+def make_app(
+    shown: Session | Opening | BuildingSession | BuildingOpening,
+    *,
+    token: str,
+    port: int,
+    folder: Path,
+) -> ASGIApp:
+    """Return the application of a page.
+
+    Parameters
+    ----------
+    shown
+        What it shows: a map or a building, or one that is still being prepared.
+    token
+        The first part of every path.
+    port
+        The port on 127.0.0.1.
+    folder
+        The only folder in which anything is written.
+    """
+    at = f"/{token}"
+    routes = [
+        Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
+        *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
+    ]
+    if isinstance(shown, BuildingSession | BuildingOpening):
+        on_floor = _OnMap(lambda request: shown.floor(request.path_params["floor"]), folder)
+        routes += _OverFloors(shown, folder).routes(at) + on_floor.routes(f"{at}/floor/{{floor}}")
+    else:
+        routes += _OnMap(lambda _: shown, folder).routes(at)
+    return Guard(Starlette(routes=routes), token, port)
+
+
+class _OnMap:
+    """What each request about one map does.
+
+    Parameters
+    ----------
+    of
+        Returns what a request is about.
+    folder
+        Where temporary files are written.
+    """
+
+    def __init__(self, of: Callable[[Request], Session | Opening], folder: Path) -> None:
+        self._of, self._folder = of, folder
+
+    def routes(self, at: str) -> list[Route]:
+        """Return the routes below a path."""
+        gets: dict[str, Callable[[Request], Any]] = {
+            "map.json": lambda request: self._of(request).describe(),
+            "state.json": lambda request: self._of(request).state(),
+            "rooms.json": lambda request: self._session(request).describe_rooms(),
+            "outlines.json": lambda request: self._session(request).outlines(),
+            "graph/{level}.json": lambda request: self._session(request).graph(
+                request.path_params["level"]
+            ),
+            "costs/{preset}.json": lambda request: self._session(request).costs(
+                request.path_params["preset"]
+            ),
+        }
+        acts: dict[str, tuple[type[BaseModel], Callable[[Session, Any], Any]]] = {
+            "plan": (PlanQuery, lambda session, query: session.planning.plan(query)),
+            "optimum": (PathQuery, lambda session, query: session.planning.optimum(query)),
+            "alternatives": (
+                AlternativesQuery,
+                lambda session, query: session.planning.alternatives(query),
+            ),
+            "at": (At, lambda session, asked: {"room": session.room_at(asked.point)}),
+            "edit": (Edit, lambda session, asked: session.edit(asked)),
+            "undo": (Undo, lambda session, asked: session.undo(asked.version)),
+            "save": (Save, lambda session, asked: session.save(asked)),
+        }
+        tile = f"{at}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
+        return [
+            Route(tile, _get(self._tile, "image/png")),
+            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
+            *(Route(f"{at}/{name}", _get_json(answer)) for name, answer in gets.items()),
+            *(
+                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
+                for name, (kind, act) in acts.items()
+            ),
+        ]
+
+    def _session(self, request: Request) -> Session:
+        """Return the session, once it is there."""
+        shown = self._of(request)
+        return shown.session if isinstance(shown, Opening) else shown
+
+    def _act(
+        self, kind: type[BaseModel], act: Callable[[Session, Any], Any]
+    ) -> Callable[[Request, Any], Any]:
+        return lambda request, value: act(self._session(request), checked(kind, value))
+
+    def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
+        kind = request.path_params["kind"]
+        query = checked(PathQuery, value) if value else None
+        return KINDS.get(kind, ""), exported(
+            self._session(request).planning, kind, query, self._folder
+        )
+
+    def _tile(self, request: Request) -> bytes:
+        place = request.path_params
+        numbers = [place[name] for name in ("zoom", "row", "col")]
+        if not all(n.isascii() and n.isdigit() and len(n) < 8 for n in numbers):  # noqa: PLR2004
+            raise InvalidValueError("a tile has three whole numbers")
+        zoom, row, col = map(int, numbers)
+        theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
+        return self._of(request).layer(place["layer"]).png(zoom, row, col, theme)
+
+
+class _OverFloors:
+    """What each request about a whole building does."""
+
+    def __init__(self, shown: BuildingSession | BuildingOpening, folder: Path) -> None:
+        self._shown, self._folder = shown, folder
+
+    def routes(self, at: str) -> list[Route]:
+        """Return the routes below a path."""
+        acts: dict[str, tuple[type[BaseModel], Callable[[BuildingSession, Any], Any]]] = {
+            "plan": (FloorsPlanQuery, lambda building, query: building.plan(query)),
+            "optimum": (FloorsQuery, lambda building, query: building.optimum(query)),
+            "alternatives": (
+                FloorsAlternativesQuery,
+                lambda building, query: building.alternatives(query),
+            ),
+        }
+        return [
+            Route(f"{at}/map.json", _get_json(lambda _: self._shown.describe())),
+            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
+            *(
+                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
+                for name, (kind, act) in acts.items()
+            ),
+        ]
+
+    def _session(self) -> BuildingSession:
+        """Return the session, once it is there."""
+        return self._shown.session if isinstance(self._shown, BuildingOpening) else self._shown
+
+    def _act(
+        self, kind: type[BaseModel], act: Callable[[BuildingSession, Any], Any]
+    ) -> Callable[[Request, Any], Any]:
+        return lambda _, value: act(self._session(), checked(kind, value))
+
+    def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
+        kind = request.path_params["kind"]
+        query = checked(FloorsPathQuery, value) if value else None
+        return exported_building(self._session(), kind, query, self._folder)
+
+
+def _error(message: str, code: int) -> JSONResponse:
+    return JSONResponse({"error": message}, status_code=code)
+
+
+async def _done(work: Callable[[], Any]) -> Any:
+    """Return what work returns, or the response that states why it does not."""
+    try:
+        return await run_in_threadpool(work)
+    except ConflictError as error:
+        return _error(str(error), _CONFLICT)
+    except PreparingError as error:
+        return _error(str(error), _NOT_YET)
+    except MapError as error:
+        return _error(str(error), _FULL)
+    except HybridNavError as error:
+        return _error(str(error), _UNPROCESSABLE)
+    except OSError as error:
+        return _error(f"cannot write: {error.strerror}", _FULL)
+
+
+def _get(read: Callable[[Any], Any], kind: str) -> Any:
+    async def answer(request: Request) -> Response:
+        found = await _done(lambda: read(request))
+        if isinstance(found, Response):
+            return found
+        return Response(found, media_type=kind, headers={"cache-control": "no-cache"})
+
+    return answer
+
+
+def _asset_reader(name: str) -> Callable[[Any], str]:
+    return lambda _: asset(name)
+
+
+def _get_json(read: Callable[[Any], Any]) -> Any:
+    async def answer(request: Request) -> Response:
+        return _json(await _done(lambda: read(request)))
+
+    return answer
+
+
+def _post(act: Callable[[Request, Any], Any]) -> Any:
+    async def answer(request: Request) -> Response:
+        value = await _body(request)
+        if isinstance(value, Response):
+            return value
+        return _json(await _done(lambda: act(request, value)))
+
+    return answer
+
+
+def _post_file(read: Callable[[Request, Any], tuple[str, bytes]]) -> Any:
+    async def answer(request: Request) -> Response:
+        value = await _body(request)
+        if isinstance(value, Response):
+            return value
+        found = await _done(lambda: read(request, value))
+        if isinstance(found, Response):
+            return found
+        name, content = found
+        headers = {
+            "content-disposition": f'attachment; filename="{name}"',
+            "cache-control": "no-store",
+        }
+        return Response(content, media_type="application/octet-stream", headers=headers)
+
+    return answer
+
+
+def _json(found: Any) -> Response:
+    if isinstance(found, Response):
+        return found
+    return JSONResponse(found, headers={"cache-control": "no-store"})
+
+
+async def _body(request: Request) -> Any:
+    """Return the value of a request's body, or the response that refuses it."""
+    if request.headers.get("content-type", "").partition(";")[0] != "application/json":
+        return _error("expected application/json", _WRONG_KIND)
+    body = b""
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > _MOST_BYTES:
+                return _error(f"more than {_MOST_BYTES} bytes", _TOO_LARGE)
+    except ClientDisconnect:
+        return Response()  # nobody is there to read it
+    try:
+        return json.loads(body)
+    except (ValueError, RecursionError):
+        return _error("expected JSON", _UNPROCESSABLE)

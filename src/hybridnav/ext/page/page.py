@@ -1,0 +1,274 @@
+"""The page itself: one HTML file, one style sheet, plain ES modules."""
+
+from __future__ import annotations
+
+import base64
+import json
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridnav._base.files import printable, replace_file
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.ext.graphs import build_route_graph
+from hybridnav.ext.graphs.files import export_nav2
+from hybridnav.ext.page.floors import BuildingSession
+from hybridnav.ext.page.tiles import TILE
+from hybridnav.planner import export_path, export_rooms
+from hybridnav.planner.saved import save
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav._base.typing import PathLike
+    from hybridnav.ext.page.planning import Planning
+    from hybridnav.ext.page.requests import FloorsPathQuery, FloorsPlanQuery, PathQuery, PlanQuery
+    from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.tiles import Layer, Theme
+
+
+_NAMES = (
+    *("scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js", "names.js"),
+    *("pictures.js", "main.js"),
+)
+"""The modules of the page."""
+ASSETS = (("page.css", "text/css"), *((name, "text/javascript") for name in _NAMES))
+"""Names and kinds of the files beside the page."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What the browser lets the page load: nothing but its own files."""
+_SAVED_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' data: blob:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; base-uri 'none'; form-action 'none'"
+)
+
+
+def asset(name: str) -> str:
+    """Return the text of a file of the page."""
+    return (files("hybridnav.ext.page") / "assets" / name).read_text(encoding="utf-8")
+
+
+def live_page() -> str:
+    """Return the page that a server stands behind."""
+    head = '<link rel="stylesheet" href="page.css">\n<script type="module" src="main.js"></script>'
+    return asset("page.html").replace("<!-- head -->", head)
+
+
+def whole_page(data: object) -> str:
+    """Return the page with everything inside, which opens without a server.
+
+    Parameters
+    ----------
+    data
+        What the server would answer, as plain values.
+    """
+    modules = "\n".join(_plain(asset(name)) for name in _NAMES)
+    # `</script>` in a name of a room must not end the script.
+    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    head = (
+        f'<meta http-equiv="Content-Security-Policy" content="{_SAVED_POLICY}">\n'
+        f"<style>\n{asset('page.css')}</style>\n"
+    )
+    end = (
+        f'<script type="application/json" id="saved">{text}</script>\n'
+        f'<script type="module">\n{modules}</script>\n'
+    )
+    page = asset("page.html").replace("<!-- head -->", head)
+    return page.replace("<!-- end -->", end)
+
+
+def _plain(module: str) -> str:
+    """Return a module's text without imports and exports: names differ between the modules."""
+    lines = [line for line in module.splitlines() if not line.startswith("import ")]
+    return "\n".join(line.removeprefix("export ") for line in lines)
+
+
+# The page as one file that opens without a server.
+
+_MOST_CELLS = 4_000_000
+"""Cells of a picture of all floors in the file; larger maps are halved until they have no more."""
+_THEMES: tuple[Theme, ...] = ("light", "dark")
+
+
+def save_page(
+    shown: Session | BuildingSession,
+    path: PathLike,
+    queries: Sequence[PlanQuery | FloorsPlanQuery] = (),
+) -> None:
+    """Write the page with its maps, their rooms and some routes into one HTML file.
+
+    Parameters
+    ----------
+    shown
+        What it shows: a map, or a building with all its floors.
+    path
+        The file; one that exists is replaced.
+    queries
+        The routes that it holds, planned now.
+
+    Raises
+    ------
+    MapError
+        When the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.ext.page import Session, save_page
+    >>> grid = hn.example_map("figure1")
+    >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
+    >>> model = hn.load("figure1.hnm")
+    >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
+    >>> save_page(Session(model, topology, model.fitted(None)), "page.html")
+    >>> Path("page.html").read_text()[:15]
+    '<!doctype html>'
+    """
+    if isinstance(shown, BuildingSession):
+        most = _MOST_CELLS // len(shown.sessions)
+        floors = [_map(session, most) for session in shown.sessions]
+        data: dict[str, Any] = {"map": shown.describe(), "floors": floors}
+    else:
+        data = _map(shown, _MOST_CELLS)
+    plan: Any = shown.plan if isinstance(shown, BuildingSession) else shown.planning.plan
+    data["routes"] = [
+        query.model_dump(include={"start", "goal", "preset"}) | plan(query) for query in queries
+    ]
+    try:
+        replace_file(Path(path), whole_page(data).encode())
+    except OSError as error:
+        raise MapError(f"page {printable(path)}: cannot write: {error.strerror}") from None
+
+
+def _map(session: Session, most_cells: int) -> dict[str, Any]:
+    """Return what a server would answer about a map, as plain values."""
+    place = session.planning.topology.pyramid.place_level
+    layers = {"map": "map", "rooms": "rooms", f"level-{place}": f"level-{place}"}
+    return {
+        "map": session.describe(),
+        "graph": session.graph(str(place)),
+        "tiles": {name: _tiles(session.layer(layer), most_cells) for name, layer in layers.items()},
+    }
+
+
+def _tiles(layer: Layer, most_cells: int) -> dict[str, Any]:
+    """Return the tiles of a layer as addresses that hold their data, for both themes."""
+    rows, cols = layer.index.shape
+    first = 0
+    while (rows >> first) * (cols >> first) > most_cells:
+        first += 1
+    found = {}
+    for zoom in range(first, max(layer.n_zooms, first + 1)):
+        side = TILE << zoom
+        for theme in _THEMES:
+            for row in range(-(-rows // side)):
+                for col in range(-(-cols // side)):
+                    content = base64.b64encode(layer.png(zoom, row, col, theme)).decode()
+                    found[f"{theme}/{zoom}/{row}/{col}"] = f"data:image/png;base64,{content}"
+    return {"first": first, "found": found}
+
+
+# Files that the page hands out: route graph, model, path, rooms.
+
+KINDS = {
+    "nav2": "route-graph.geojson",
+    "model": "model.hnm",
+    "rooms": "rooms.geojson",
+    "path-geojson": "path.geojson",
+    "path-csv": "path.csv",
+}
+"""Name of the file of each kind."""
+_OF_BUILDING = ("model", "path-geojson", "path-csv")
+
+
+def exported(planning: Planning, kind: str, query: PathQuery | None, folder: Path) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    planning
+        The planners.
+    kind
+        One of `KINDS`.
+    query
+        The query whose path is written; None for a file without a path.
+    folder
+        Where a temporary folder may lie for the time of the writing.
+
+    Raises
+    ------
+    InvalidValueError
+        When the kind is not known, or a path is wanted without a query.
+    """
+    if kind not in KINDS:
+        raise InvalidValueError(f"a file is one of {', '.join(KINDS)}, got {kind!r:.80}")
+    if kind.startswith("path") and query is None:
+        raise InvalidValueError("a path needs a start and a goal")
+    return _content(KINDS[kind], _writer(planning, kind, query), folder)
+
+
+def exported_building(
+    building: BuildingSession, kind: str, query: FloorsPathQuery | None, folder: Path
+) -> tuple[str, bytes]:
+    """Return the name and the content of a file about a whole building.
+
+    Parameters
+    ----------
+    building
+        The building.
+    kind
+        `model`, or `path-geojson` or `path-csv` for the part of a route on one floor.
+    query
+        The query whose path is written, and the floor; None for the model.
+    folder
+        Where a temporary folder may lie for the time of the writing.
+
+    Raises
+    ------
+    InvalidValueError
+        When the kind is not known, a path is wanted without a query, or the route does not visit
+        the floor.
+    """
+    if kind not in _OF_BUILDING:
+        raise InvalidValueError(f"a file is one of {', '.join(_OF_BUILDING)}, got {kind!r:.80}")
+    if kind == "model":
+        made = building.building(building.preset)
+        return KINDS[kind], _content(
+            KINDS[kind], lambda file: save(made, file, compress=True), folder
+        )
+    if query is None:
+        raise InvalidValueError("a path needs a start, a goal and a floor")
+    parts = building.on_floor(query)
+    return KINDS[kind], _content(KINDS[kind], lambda file: export_path(parts, file), folder)
+
+
+def _content(name: str, write: Callable[[Path], None], folder: Path) -> bytes:
+    """Return what a writer writes; its temporary folder lies where the page may write."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=".hybridnav-", dir=folder) as inside:
+            file = Path(inside) / name
+            try:
+                write(file)
+            except MapError as error:
+                # What the temporary folder is called helps nobody.
+                raise MapError(str(error).replace(printable(file), name)) from None
+            return file.read_bytes()
+    except OSError as error:
+        where = printable(folder.resolve().name)
+        raise MapError(
+            f"{name} cannot be written: the folder {where} takes no files: {error.strerror}"
+        ) from None
+
+
+def _writer(planning: Planning, kind: str, query: PathQuery | None) -> Callable[[Path], None]:
+    topology = planning.topology
+    if kind == "nav2":
+        return lambda file: export_nav2(build_route_graph(topology), file)
+    if kind == "model":
+        return lambda file: save(planning.planner(planning.presets[0]), file, compress=True)
+    if kind == "rooms" or query is None:
+        return lambda file: export_rooms(topology.rooms, file)
+    result = planning.outcome(query)
+    return lambda file: export_path(result, file)

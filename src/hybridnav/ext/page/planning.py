@@ -1,0 +1,187 @@
+"""Plans for the page: planners by preset, and answers as plain values in grid units."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import shapely
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.page.graph import in_grid, in_metres
+from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
+
+if TYPE_CHECKING:
+    from hybridnav.ext.page.requests import AlternativesQuery, Closed, PathQuery, PlanQuery
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
+    from hybridnav.planner.saved import Model
+    from hybridnav.topology import TopologicalMap
+
+GRID = "grid-astar"
+"""The preset of the optimum on the grid."""
+
+
+class Planning:
+    """The planners of one topological map, made when a preset is first asked for.
+
+    Parameters
+    ----------
+    model
+        The map or model.
+    topology
+        Its topological map with rooms.
+    settings
+        The preset that the page begins with; its section `pyramid` holds for all.
+    costs
+        Costs given beside the presets, None for none.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        topology: TopologicalMap,
+        settings: Preset,
+        costs: CostLayer | None = None,
+    ) -> None:
+        self.topology = topology
+        self.grid = topology.grid
+        self._model, self._settings, self._costs = model, settings, costs
+        self._planners: dict[str, HybridPlanner] = {}
+        self._making = threading.Lock()
+
+    @property
+    def presets(self) -> list[str]:
+        """The names to choose from, the one of the start first."""
+        first = self._settings.name
+        return [first, *(name for name in preset_names() if name != first)]
+
+    def adopt(self, planner: HybridPlanner) -> None:
+        """Take a planner over that is there already, with what it has prepared, unless the rooms
+        have changed."""
+        if planner.topology is self.topology:
+            self._planners[planner.preset.name] = planner
+
+    def planner(self, name: str) -> HybridPlanner:
+        """Return the planner of a preset.
+
+        Raises
+        ------
+        HybridNavError
+            When there is no such preset, or it cannot plan on this map.
+        """
+        with self._making:
+            if name not in self._planners:
+                self._planners[name] = self._made(name)
+            return self._planners[name]
+
+    def _made(self, name: str) -> HybridPlanner:
+        preset = self._settings
+        if name != preset.name:
+            if name not in self.presets:
+                raise InvalidValueError(f"no preset is called {name!r:.80}")
+            preset = load_preset(name).model_copy(update={"pyramid": self._settings.pyramid})
+        return self._model.planner(preset, topology=self.topology, costs=self._costs)
+
+    def plan(self, query: PlanQuery) -> dict[str, Any]:
+        """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
+        planner, points = self.planner(query.preset), self._points(query)
+        closed = self.blocked(query.closed)
+        if query.brief:
+            return self._facts(planner.plan(*points, blocked=closed))
+        tour = plan_tour(planner, points, blocked=closed)
+        return self._facts(tour.results[0]) | self._itinerary(tour)
+
+    def outcome(self, query: PathQuery) -> PlanResult:
+        """Return the plan itself, to be written."""
+        closed = self.blocked(query.closed)
+        return self.planner(query.preset).plan(*self._points(query), blocked=closed)
+
+    def optimum(self, query: PathQuery) -> dict[str, Any]:
+        """Return the shortest path of cells on the whole grid."""
+        on_grid = query.model_copy(update={"preset": GRID})
+        return self._facts(self.outcome(on_grid))
+
+    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
+        """Return some routes that differ for people."""
+        start, goal = self._points(query)
+        found = plan_alternatives(
+            self.planner(query.preset),
+            start,
+            goal,
+            query.count,
+            by=query.by,
+            blocked=self.blocked(query.closed),
+        )
+        routes = [
+            self._facts(each.result)
+            | self._itinerary(each.tour)
+            | {"overlap": round(each.overlap, 3)}
+            for each in found
+        ]
+        return {"routes": routes, "complete": found.complete, "note": found.note}
+
+    def _points(self, query: PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        start, goal = (in_metres(point, self.grid) for point in (query.start, query.goal))
+        if not self.planner(query.preset).needs_headings:
+            return start, goal
+        yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
+        return (*start, yaw), (*goal, yaw)
+
+    def blocked(self, closed: Closed) -> Blocked | None:
+        """Return what is closed, in metres; None for nothing.
+
+        Raises
+        ------
+        InvalidValueError
+            When the corners of an area make no polygon.
+        """
+        if not closed:
+            return None
+        areas: list[list[tuple[float, float]]] = [
+            [in_metres(p, self.grid) for p in ring] for ring in closed.polygons
+        ]
+        for ring in areas:
+            if not shapely.Polygon(ring).is_valid:
+                raise InvalidValueError(
+                    "the drawn area crosses itself: draw its corners in one turn round it"
+                )
+        return Blocked(doors=closed.doors, rooms=closed.rooms, polygons=areas)
+
+    def _facts(self, result: PlanResult) -> dict[str, Any]:
+        """Return the figures and the line of a plan; None stands for what is not finite."""
+        figures: dict[str, float | None] = {
+            "length_m": result.path.length_m if result.path is not None else None,
+            "cost": result.cost,
+            "lower_bound": result.lower_bound,
+            "gap": result.gap,
+        }
+        line = [] if result.path is None else in_grid(result.path.points, self.grid)
+        return {
+            "status": str(result.status),
+            "solved": result.solved,
+            "metric": result.metric,
+            "line": line,
+            "seconds": round(sum(result.stats.seconds.values()), 6),
+        } | {name: finite(value) for name, value in figures.items()}
+
+    def _itinerary(self, tour: Tour) -> dict[str, Any]:
+        """Return rooms, doors and words of a plan, and the places that it passes."""
+        route = tour.results[0].route
+        return {
+            "legs": [
+                {
+                    "room": leg.room or f"the {leg.shape}",
+                    "door": leg.door.number if leg.door else None,
+                }
+                for leg in tour.legs
+            ],
+            "words": tour.words(),
+            "places": list(route.places) if route is not None else [],
+        }
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number, None for what JSON cannot hold."""
+    return value if value is not None and math.isfinite(value) else None

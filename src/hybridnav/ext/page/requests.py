@@ -1,0 +1,347 @@
+"""What the page may ask for: each request is checked whole before anything is done."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.topology.rooms.files.outlines import Outlines
+from hybridnav.topology.rooms.files.paint import cells_inside
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.maps import OccupancyGrid
+
+
+_FAR = 1e7
+"""Grid units beyond which nothing lies: a map has fewer cells."""
+
+Number = Annotated[float, Field(ge=-_FAR, le=_FAR, allow_inf_nan=False)]
+Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+FloorNumber = Annotated[int, Field(ge=0, lt=100)]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+_PresetName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,60}$")]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Closed(_Strict):
+    """What is closed: doors by number, rooms by name, polygons in grid units."""
+
+    doors: Annotated[list[int], Field(max_length=10_000)] = []
+    rooms: Annotated[list[Name], Field(max_length=10_000)] = []
+    polygons: Annotated[
+        list[Annotated[list[Point], Field(min_length=3, max_length=1000)]], Field(max_length=100)
+    ] = []
+
+    def __bool__(self) -> bool:
+        """Return whether anything is closed."""
+        return bool(self.doors or self.rooms or self.polygons)
+
+
+class PathQuery(_Strict):
+    """A query between two points in grid units."""
+
+    start: Point
+    goal: Point
+    preset: _PresetName
+    closed: Closed = Closed()
+
+
+class PlanQuery(PathQuery):
+    """A plan; brief while an end is dragged."""
+
+    brief: bool = False
+
+
+class AlternativesQuery(PathQuery):
+    """Some routes between two points."""
+
+    count: Annotated[int, Field(ge=2, le=5)] = 3
+    by: Literal["doors", "homotopy"] = "doors"
+
+
+class FloorPoint(_Strict):
+    """A point in grid units of a floor of a building, by the number of the floor."""
+
+    floor: FloorNumber
+    point: Point
+
+
+class FloorClosed(Closed):
+    """What is closed on a floor."""
+
+    floor: FloorNumber
+
+
+class BuildingClosed(_Strict):
+    """What is closed in a building: links by name, and the rest by floor."""
+
+    links: Annotated[list[Name], Field(max_length=10_000)] = []
+    floors: Annotated[list[FloorClosed], Field(max_length=100)] = []
+
+
+class FloorsQuery(_Strict):
+    """A query between two points on any floors of a building."""
+
+    start: FloorPoint
+    goal: FloorPoint
+    preset: _PresetName
+    closed: BuildingClosed = BuildingClosed()
+    stairs: bool = True
+
+
+class FloorsPlanQuery(FloorsQuery):
+    """A plan over floors; brief while an end is dragged."""
+
+    brief: bool = False
+
+
+class FloorsAlternativesQuery(FloorsQuery):
+    """Some routes by different links."""
+
+    count: Annotated[int, Field(ge=2, le=5)] = 3
+
+
+class FloorsPathQuery(FloorsQuery):
+    """The part of a route on one floor, to be written."""
+
+    floor: FloorNumber
+
+
+class At(_Strict):
+    """A point whose room is asked for."""
+
+    point: Point
+
+
+class Edit(_Strict):
+    """A change of the rooms that everybody saw at a version."""
+
+    version: Annotated[int, Field(ge=0, le=10**9)]
+    change: Annotated[dict[str, Any], Field(max_length=8)]
+
+
+class Undo(_Strict):
+    """Take the last change of a version back."""
+
+    version: Annotated[int, Field(ge=0, le=10**9)]
+
+
+class Save(_Strict):
+    """Write the rooms of a version; `replace` writes over a file that others have changed."""
+
+    version: Annotated[int, Field(ge=0, le=10**9)]
+    replace: bool = False
+
+
+class Rename(_Strict):
+    """Another name for a room."""
+
+    op: Literal["rename"]
+    room: Name
+    name: Name
+
+
+class Merge(_Strict):
+    """One room of two; it has the name of the first."""
+
+    op: Literal["merge"]
+    room: Name
+    other: Name
+
+
+class Split(_Strict):
+    """Two rooms of one, on both sides of a line; the part on its right has the new name."""
+
+    op: Literal["split"]
+    room: Name
+    line: Annotated[list[Point], Field(min_length=2, max_length=2)]
+    name: Name
+
+
+class Move(_Strict):
+    """A corner of a room's outline elsewhere."""
+
+    op: Literal["move"]
+    room: Name
+    corner: Point
+    to: Point
+
+
+Change = Rename | Merge | Split | Move
+_KINDS: dict[str, type[Change]] = {
+    "rename": Rename,
+    "merge": Merge,
+    "split": Split,
+    "move": Move,
+}
+_T = TypeVar("_T", bound=BaseModel)
+
+
+def checked(kind: type[_T], value: Any) -> _T:
+    """Return a request of some kind.
+
+    Raises
+    ------
+    InvalidValueError
+        When a key or value is not as expected; the message names the first.
+    """
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "request"
+        raise InvalidValueError(f"{where}: {first['msg']}"[:300]) from None
+
+
+def checked_change(value: dict[str, Any]) -> Change:
+    """Return a change of the rooms.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is none.
+    """
+    op = value.get("op")
+    kind = _KINDS.get(op) if isinstance(op, str) else None
+    if kind is None:
+        raise InvalidValueError(f"op must be one of {', '.join(_KINDS)}, got {op!r:.80}")
+    found: Change = checked(kind, value)
+    return found
+
+
+# Changes of rooms: names, unions, cuts along a line, corners of outlines.
+
+TOLERANCE_M = 0.1
+"""How far the outlines whose corners are moved may lie from the cells."""
+_NEAR = 1.0
+"""Grid units within which a corner is meant."""
+
+
+def changed(rooms: RoomLabels, change: Change, grid: OccupancyGrid) -> RoomLabels:
+    """Return rooms after a change.
+
+    Parameters
+    ----------
+    rooms
+        The rooms before.
+    change
+        What to do, in grid units.
+    grid
+        The map.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no such room, a name is taken or no name, two rooms do not touch, a line cuts
+        nothing off, or a room would lose its last free cell.
+    """
+    if isinstance(change, Rename):
+        return _renamed(rooms, change)
+    if isinstance(change, Merge):
+        return _merged(rooms, change)
+    if isinstance(change, Split):
+        return _split(rooms, change, grid)
+    return _moved(rooms, change, grid)
+
+
+def rings_of(rooms: RoomLabels, grid: OccupancyGrid) -> list[list[list[list[float]]]]:
+    """Return the outline of each room, rings of corners `[column, row]` in grid units."""
+    if not rooms.names:
+        return []
+    outlines = Outlines(rooms.label_of, len(rooms.names), grid).within(TOLERANCE_M)
+    return [
+        [np.round(grid.frame.positions_of(ring)[:, ::-1], 3).tolist() for ring in rings]
+        for rings in outlines
+    ]
+
+
+def _renamed(rooms: RoomLabels, change: Rename) -> RoomLabels:
+    label = rooms.index(change.room)
+    if change.name != change.room and change.name in rooms.names:
+        raise InvalidValueError(f"another room is called {change.name!r:.80}: merge the two")
+    names = tuple(change.name if at == label else name for at, name in enumerate(rooms.names))
+    points = {change.name if name == change.room else name: p for name, p in rooms.points.items()}
+    return RoomLabels(names, rooms.label_of, points, rooms.doors)
+
+
+def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
+    kept, gone = rooms.index(change.room), rooms.index(change.other)
+    if kept == gone:
+        raise InvalidValueError(f"{change.room!r:.80} is one room: choose another one to merge")
+    label_of = rooms.label_of
+    if not _touch(label_of == kept, label_of == gone):
+        raise InvalidValueError(
+            f"{change.room!r:.80} and {change.other!r:.80} do not touch: only neighbours merge"
+        )
+    renumbered = np.where(label_of == gone, kept, label_of)
+    renumbered = np.where(renumbered > gone, renumbered - 1, renumbered)
+    names = tuple(name for at, name in enumerate(rooms.names) if at != gone)
+    points = {name: at for name, at in rooms.points.items() if name != change.other}
+    return RoomLabels(names, renumbered, points, rooms.doors)
+
+
+def _touch(one: BoolArray, other: BoolArray) -> bool:
+    """Return whether a cell of one set lies beside a cell of another one."""
+    return bool(
+        (one[:, 1:] & other[:, :-1]).any()
+        or (one[:, :-1] & other[:, 1:]).any()
+        or (one[1:] & other[:-1]).any()
+        or (one[:-1] & other[1:]).any()
+    )
+
+
+def _split(rooms: RoomLabels, change: Split, grid: OccupancyGrid) -> RoomLabels:
+    label = rooms.index(change.room)
+    if change.name in rooms.names:
+        raise InvalidValueError(f"another room is called {change.name!r:.80}: give a new name")
+    (x, y), (to_x, to_y) = change.line
+    row, col = np.nonzero(rooms.label_of == label)
+    right = (to_x - x) * (row + 0.5 - y) - (to_y - y) * (col + 0.5 - x) < 0
+    free = grid.measured[row, col] == CellClass.FREE
+    if not (free & right).any() or not (free & ~right).any():
+        raise InvalidValueError(f"the line does not cut {change.room!r:.80} in two")
+    label_of = rooms.label_of.copy()
+    label_of[row[right], col[right]] = len(rooms.names)
+    points = {name: at for name, at in rooms.points.items() if name != change.room}
+    return RoomLabels((*rooms.names, change.name), label_of, points, rooms.doors)
+
+
+def _moved(rooms: RoomLabels, change: Move, grid: OccupancyGrid) -> RoomLabels:
+    label = rooms.index(change.room)
+    before = [np.array(ring) for ring in rings_of(rooms, grid)[label]]
+    after = _with_corner(before, change.corner, change.to)
+    was, now = (cells_inside(rings, grid.shape) for rings in (before, after))
+    label_of = rooms.label_of.copy()
+    flat = label_of.ravel()
+    lost = np.setdiff1d(was, now)
+    flat[lost[flat[lost] == label]] = NO_ROOM
+    flat[np.setdiff1d(now, was)] = label
+    free = label_of[grid.measured == CellClass.FREE]
+    counts = np.bincount(free[free >= 0], minlength=len(rooms.names))
+    if not counts.all():
+        empty = rooms.names[int(counts.argmin())]
+        raise InvalidValueError(f"{empty!r:.80} would have no free cell left")
+    return RoomLabels(rooms.names, label_of, rooms.points, rooms.doors)
+
+
+def _with_corner(
+    rings: list[FloatArray], corner: Sequence[float], to: Sequence[float]
+) -> list[FloatArray]:
+    """Return rings with the corner that was meant elsewhere."""
+    distances = [np.hypot(*(ring - corner).T) for ring in rings]
+    ring = min(range(len(rings)), key=lambda at: float(distances[at].min()))
+    if distances[ring].min() > _NEAR:
+        raise InvalidValueError("the outline has no such corner: it has changed meanwhile")
+    moved = rings[ring].copy()
+    moved[int(distances[ring].argmin())] = to
+    return [moved if at == ring else each for at, each in enumerate(rings)]

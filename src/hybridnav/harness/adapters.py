@@ -1,0 +1,209 @@
+"""Presets, and methods on a grid of their own, as methods of the harness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
+from hybridnav.maps import CellClass
+from hybridnav.planner import HybridPlanner, PlanStatus
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import IntArray
+    from hybridnav.harness.baselines import Method
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Metric, PlanResult, Preset
+    from hybridnav.topology import TopologicalMap
+
+Cell = tuple[int, int]
+
+
+class HybridMethod:
+    """A preset of `HybridPlanner` as a method; see `baselines.Method`."""
+
+    def __init__(
+        self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
+    ) -> None:
+        self.topology = topology
+        self.name = preset.name
+        self._planner = HybridPlanner(topology, preset=preset, costs=costs)
+        self._planner.prepare()
+        self._frame = topology.grid.frame
+        free = topology.classes == CellClass.FREE
+        self.region_of: IntArray = topology.level.field_of
+        self.n_nodes = int(free.sum())
+        plain = ~topology.level.is_self_loop & free[topology.arcs].all(axis=1)
+        self.n_edges = int(plain.sum())
+
+    @cached_property
+    def memory_bytes(self) -> int:
+        """Sum of the arrays of the planner, the topological map and the record, in bytes."""
+        return _nbytes(self._planner, set())
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two free cells."""
+        endpoints = self._frame.points_of(np.array([start, goal]))
+        result = self._planner.plan(endpoints[0], endpoints[1])
+        route, stats = result.route, result.stats
+        path = result.path if result.solved else None
+        line = _line(result)
+        arc_ids = self.topology.arc_ids
+        by_costs = self._planner.costs is not None
+        claim = None
+        if by_costs and result.solved:
+            claim = CostClaim(result.cost, result.lower_bound, result.grid_bound)
+        is_factor = result.solved and line is None and not by_costs
+        return MethodResult(
+            None if path is None or line is not None else path.cells,
+            any_angle=line,
+            gave_up=str(result.status) if result.status in _GAVE_UP else "",
+            nodes=None if route is None else _dense(self.topology.place_ids, route.places),
+            arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
+            bound=1 + result.gap if is_factor else np.inf,
+            by_costs=claim,
+            expanded=stats.expanded,
+            expanded_nodes=stats.expanded_places,
+            expanded_border_cells=stats.expanded_border_cells,
+            expanded_intervals=stats.expanded_intervals,
+            seconds=_stages(result),
+        )
+
+    def close(self) -> None:
+        """End the process of a planner with OMPL."""
+        self._planner.close()
+
+
+LINE_METRICS: frozenset[Metric] = frozenset({"any-angle", "any-angle-weighted"})
+_GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
+
+
+def _line(result: PlanResult) -> AnyAngleResult | None:
+    """Return the path of a solved query if it is an any-angle path."""
+    is_line = result.metric in LINE_METRICS
+    if not is_line or result.path is None or not result.solved:
+        return None
+    how = result.refinement
+    return AnyAngleResult(
+        result.path.points,
+        result.path.length_m,
+        lower_bound_m=result.lower_bound if result.metric == "any-angle" else 0.0,
+        headings_rad=result.path.headings_rad if result.path.is_curved else None,
+        by_grid=None if how is None else how.by_grid,
+    )
+
+
+def _stages(result: PlanResult) -> dict[str, float]:
+    """Return seconds by stage, under the names that all methods use."""
+    seconds = dict(result.stats.seconds)
+    if "ompl" in seconds:
+        seconds["refine"] = seconds.pop("ompl")
+    if result.refinement is not None and result.refinement.trace:
+        seconds["first path"] = result.refinement.trace[0][0]
+    return seconds
+
+
+def _dense(ids: Any, named: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(np.searchsorted(ids, np.array(named, dtype=np.int64)).tolist())
+
+
+def _nbytes(thing: Any, seen: set[int]) -> int:
+    """Return the bytes of all arrays that a thing of this package holds, each counted once."""
+    if id(thing) in seen:
+        return 0
+    seen.add(id(thing))
+    if isinstance(thing, np.ndarray):
+        owner = thing
+        while isinstance(owner.base, np.ndarray):
+            owner = owner.base
+        counted = id(owner) in seen and owner is not thing
+        seen.add(id(owner))
+        return 0 if counted else owner.nbytes
+    if isinstance(thing, (list, tuple)):
+        return sum(_nbytes(item, seen) for item in thing)
+    if isinstance(thing, dict):
+        return sum(_nbytes(item, seen) for item in thing.values())
+    module = type(thing).__module__
+    if not module.startswith("hybridnav.") or module.startswith("hybridnav.maps"):
+        return 0
+    return _nbytes(getattr(thing, "__dict__", {}), seen)
+
+
+_MOST_RADIUS_M = 1e3
+
+
+def checked_grid(given: Any) -> dict[str, Any]:
+    """Return the settings of a grid of its own as a file of methods states them.
+
+    Raises
+    ------
+    InvalidValueError
+        When a key or a value is not known.
+    """
+    if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
+        raise InvalidValueError(
+            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {brief(given)}"
+        )
+    radius = given.get("robot_radius_m", 0)
+    is_number = isinstance(radius, (int, float)) and not isinstance(radius, bool)
+    if not is_number or not 0 <= radius <= _MOST_RADIUS_M:
+        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {brief(radius)}")
+    if not isinstance(given.get("corner_cutting", False), bool):
+        raise InvalidValueError(
+            f"grid: corner_cutting is true or false, got {brief(given['corner_cutting'])}"
+        )
+    return dict(given)
+
+
+class OnOwnGrid:
+    """A method on a grid of its own.
+
+    Its paths are judged on the grid of the run. Its plans, its bounds and its "no path" are about
+    its own grid: they are not passed on, and a query without a path has no answer.
+
+    Parameters
+    ----------
+    method
+        The method, made for `grid`.
+    grid
+        Its grid, of the same cells as that of the run.
+    """
+
+    region_of = None
+
+    def __init__(self, method: Method, grid: OccupancyGrid) -> None:
+        self._method = method
+        self._free = grid.classes == CellClass.FREE
+        self.name = method.name
+        self.n_nodes, self.n_edges = method.n_nodes, method.n_edges
+        self.memory_bytes = method.memory_bytes
+        self.version = getattr(method, "version", "")
+        self.settings = getattr(method, "settings", "")
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two cells that are free on the grid of the run."""
+        if not (self._free[start] and self._free[goal]):
+            return MethodResult(None, gave_up="start or goal is not free on its own grid")
+        answer = self._method.solve(start, goal)
+        line, claim = answer.any_angle, answer.by_costs
+        return replace(
+            answer,
+            nodes=None,
+            arcs=None,
+            bound=math.inf,
+            any_angle=None if line is None else replace(line, lower_bound_m=0.0),
+            by_costs=None if claim is None else replace(claim, lower_bound_m=0.0),
+            gave_up="" if answer.is_path else answer.gave_up or "no path on its own grid",
+        )
+
+    def close(self) -> None:
+        """End the processes of the method."""
+        close = getattr(self._method, "close", None)
+        if callable(close):
+            close()

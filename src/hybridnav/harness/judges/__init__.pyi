@@ -1,0 +1,22 @@
+from .anyangle import AnyAnglePath as AnyAnglePath, VisibilityGraph as VisibilityGraph
+from .arcs import Chords as Chords, chords_of as chords_of
+from .cheapest import CheapestCost as CheapestCost
+from .judge import (
+    ScipyOptimum as ScipyOptimum,
+    Verdict as Verdict,
+    judge_path as judge_path,
+    segment_faults as segment_faults,
+)
+from .judge_line import judge_line as judge_line, line_cells as line_cells
+from .segmentation import RoomAgreement as RoomAgreement, compare_rooms as compare_rooms
+from .statistics import (
+    Buckets as Buckets,
+    PairedDifference as PairedDifference,
+    Summary as Summary,
+    distance_buckets as distance_buckets,
+    paired_difference as paired_difference,
+    summarise as summarise,
+    thrun_count as thrun_count,
+)
+
+__all__: list[str]

@@ -1,0 +1,298 @@
+"""Kernels of the judge: exact tests of segments against the cells of a grid, and shortest paths.
+
+Positions are (row, col) in grid units: cell (r, c) spans [r, r + 1] x [c, c + 1], its corners are
+whole numbers. `free_of` states for each cell class whether it is free, so that no kernel needs a
+copy of the map. The tests are exact for coordinates that are multiples of 2^-24 below 2^28:
+differences of such numbers fit a float64, and products are compared with their rounding errors.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+
+from hybridnav._base.exact import compare_products
+from hybridnav._base.jit import guarded, njit
+
+CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
+"""Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,
+passes between two such cells that meet at a corner, runs along a side that two of them share."""
+
+ACROSS = math.sqrt(2)
+"""Longest way from a position to a corner of its cell, in cells."""
+
+OCTILE_RATIO = math.sqrt(4 - 2 * math.sqrt(2))
+"""Largest ratio of an octile length to the straight one, 1.0824."""
+
+
+@njit(cache=True, nogil=True)
+def _is_free(classes, free_of, row, col):
+    """Return whether a cell is in the map and free."""
+    if row < 0 or col < 0 or row >= classes.shape[0] or col >= classes.shape[1]:
+        return False
+    return free_of[classes[row, col]]
+
+
+@njit(cache=True, nogil=True)
+def crossing_at(classes, free_of, row, col):
+    """Return whether two free and two blocked cells face each other across a corner of the lattice.
+
+    Return 0 for no, 1 if the free cells are the south-west and north-east ones, -1 for the other
+    two.
+    """
+    south_west = _is_free(classes, free_of, row - 1, col - 1)
+    south_east = _is_free(classes, free_of, row - 1, col)
+    if south_west == south_east:
+        return 0
+    if south_west != _is_free(classes, free_of, row, col):
+        return 0
+    if south_east != _is_free(classes, free_of, row, col - 1):
+        return 0
+    return 1 if south_west else -1
+
+
+@njit(cache=True, nogil=True)
+def _point_code(classes, free_of, row, col):
+    """Return `CLEAR` if a point touches the closed square of a free cell, else `BLOCKED`."""
+    for r in range(math.ceil(row) - 1, math.floor(row) + 1):
+        for c in range(math.ceil(col) - 1, math.floor(col) + 1):
+            if _is_free(classes, free_of, r, c):
+                return CLEAR
+    return BLOCKED
+
+
+@njit(cache=True, nogil=True)
+def _level_code(classes, free_of, fixed, low, high, along_row):
+    """Judge a segment along a row (or column) of the lattice at `fixed`, from `low` to `high`."""
+    line = math.floor(fixed)
+    on_line = line == fixed
+    first = math.floor(low)
+    for step in range(first, math.ceil(high)):
+        if along_row:
+            upper = _is_free(classes, free_of, line, step)
+            lower = on_line and _is_free(classes, free_of, line - 1, step)
+            crossing = on_line and step > low and crossing_at(classes, free_of, line, step) != 0
+        else:
+            upper = _is_free(classes, free_of, step, line)
+            lower = on_line and _is_free(classes, free_of, step, line - 1)
+            crossing = on_line and step > low and crossing_at(classes, free_of, step, line) != 0
+        if not upper and not lower:
+            return SEAM if on_line else BLOCKED
+        if crossing:
+            return BETWEEN
+    return CLEAR
+
+
+@njit(cache=True, nogil=True)
+def segment_code(classes, free_of, row0, col0, row1, col1):
+    """Return the code of a segment's first fault, 0 for none; its endpoints count as touched only.
+
+    The walk visits the cells whose interior the segment enters (J. Amanatides, A. Woo: A fast voxel
+    traversal algorithm for ray tracing, 1987) with exact comparisons of the crossings.
+    """
+    rows, cols = classes.shape
+    if min(row0, row1) < 0 or max(row0, row1) > rows or min(col0, col1) < 0:
+        return OUTSIDE
+    if max(col0, col1) > cols:
+        return OUTSIDE
+    if row0 == row1:
+        if col0 == col1:
+            return _point_code(classes, free_of, row0, col0)
+        return _level_code(classes, free_of, row0, min(col0, col1), max(col0, col1), True)
+    if col0 == col1:
+        return _level_code(classes, free_of, col0, min(row0, row1), max(row0, row1), False)
+    if col1 < col0:
+        row0, col0, row1, col1 = row1, col1, row0, col0
+    width, height = col1 - col0, abs(row1 - row0)
+    up = row1 > row0
+    col = math.floor(col0)
+    row = math.floor(row0) if up else math.ceil(row0) - 1
+    last_col = math.ceil(col1) - 1
+    last_row = math.ceil(row1) - 1 if up else math.floor(row1)
+    turn = 1 if up else -1
+    while True:
+        if not free_of[classes[row, col]]:
+            return BLOCKED
+        if row == last_row and col == last_col:
+            return CLEAR
+        to_line = row + 1 - row0 if up else row0 - row
+        order = compare_products(col + 1 - col0, height, to_line, width)
+        if order == 0:
+            # Through a corner: never through one of the endpoints, since a cell is still to come.
+            if not free_of[classes[row, col + 1]] and not free_of[classes[row + turn, col]]:
+                return BETWEEN
+            row += turn
+            col += 1
+        elif order < 0:
+            col += 1
+        else:
+            row += turn
+
+
+@njit(cache=True, nogil=True)
+def segment_codes(classes, free_of, positions):
+    """Return the code of each segment of a polyline; a single point has one code."""
+    n = positions.shape[0]
+    codes = np.zeros(max(n - 1, 1), np.int8)
+    for i in range(codes.size):
+        j = min(i + 1, n - 1)
+        codes[i] = segment_code(
+            classes, free_of, positions[i, 0], positions[i, 1], positions[j, 0], positions[j, 1]
+        )
+    return codes
+
+
+@njit(cache=True, nogil=True)
+def crossed_joints(classes, free_of, positions):
+    """Return for each point whether the polyline crosses a corner there between two free cells.
+
+    Repeated points count once, as the last of them.
+    """
+    n = positions.shape[0]
+    crossed = np.zeros(n, np.bool_)
+    before = 0
+    for i in range(1, n - 1):
+        row, col = positions[i]
+        if positions[i + 1, 0] == row and positions[i + 1, 1] == col:
+            continue
+        came_row, came_col = positions[before, 0] - row, positions[before, 1] - col
+        before = i
+        if row != math.floor(row) or col != math.floor(col) or (came_row == 0 and came_col == 0):
+            continue
+        crossing = crossing_at(classes, free_of, int(row), int(col))
+        if crossing == 0:
+            continue
+        # The two free cells lie on opposite sides of the other diagonal through the corner.
+        came = came_row + crossing * came_col
+        goes = positions[i + 1, 0] - row + crossing * (positions[i + 1, 1] - col)
+        crossed[i] = (came > 0) != (goes > 0)
+    return crossed
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def octile_lengths(classes, free_of, start_row, start_col, goal_row, goal_col):
+    """Return the lengths of octile paths from each corner of the lattice to a goal, and from a
+    start; infinite where there is no path, and at corners too far away for a shortest path.
+
+    Such a path runs along sides and diagonals of free cells, and turns at corners where no two
+    blocked cells meet alone: it is legal at any angle. A legal segment between two corners has an
+    octile path in the cells that it passes, at most `OCTILE_RATIO` times as long.
+    """
+    rows, cols = classes.shape
+    lengths = np.full((rows + 1, cols + 1), np.inf)
+    done = np.zeros(lengths.shape, np.bool_)
+    heap = [(np.inf, 0, 0)]
+    for row, col, away in _corners_round(classes, free_of, goal_row, goal_col):
+        lengths[row, col] = away
+        heapq.heappush(heap, (away, row, col))
+    from_start = np.full(lengths.shape, np.inf)
+    for row, col, away in _corners_round(classes, free_of, start_row, start_col):
+        from_start[row, col] = away
+    best = np.inf
+    while heap:
+        length, row, col = heapq.heappop(heap)
+        if length > OCTILE_RATIO * (best + ACROSS) + ACROSS:  # see `lower_bounds`
+            break
+        if length == np.inf or done[row, col]:
+            continue
+        done[row, col] = True
+        best = min(best, length + from_start[row, col])
+        for up in range(-1, 2):
+            for right in range(-1, 2):
+                if not _is_step(classes, free_of, row, col, up, right):
+                    continue
+                total = length + math.hypot(up, right)
+                if total < lengths[row + up, col + right]:
+                    lengths[row + up, col + right] = total
+                    heapq.heappush(heap, (total, row + up, col + right))
+    return np.where(done, lengths, np.inf), best
+
+
+@njit(cache=True, nogil=True)
+def _corners_round(classes, free_of, row, col):
+    """Return the corners of the free cells that a position touches, each with its distance; none
+    where two free cells meet alone."""
+    corners = [(0, 0, np.inf)][:0]
+    for r in range(math.ceil(row) - 1, math.floor(row) + 1):
+        for c in range(math.ceil(col) - 1, math.floor(col) + 1):
+            if not _is_free(classes, free_of, r, c):
+                continue
+            for there_row in range(r, r + 2):
+                for there_col in range(c, c + 2):
+                    if crossing_at(classes, free_of, there_row, there_col) == 0:
+                        away = math.hypot(there_row - row, there_col - col)
+                        corners.append((there_row, there_col, away))
+    return corners
+
+
+@njit(cache=True, nogil=True)
+def _is_step(classes, free_of, row, col, up, right):
+    """Return whether an octile path on corners may step by one side or diagonal of a cell."""
+    if up == 0 and right == 0:
+        return False
+    low, left = row + min(up, 0), col + min(right, 0)
+    free = _is_free(classes, free_of, low, left)
+    if up == 0:
+        free = free or _is_free(classes, free_of, low - 1, left)
+    if right == 0:
+        free = free or _is_free(classes, free_of, low, left - 1)
+    return free and crossing_at(classes, free_of, row + up, col + right) == 0
+
+
+@njit(cache=True, nogil=True)
+def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
+    """Return the nodes on a shortest path from the last but one to the last, in order; empty if no
+    path is at most `most` long.
+
+    The search is A*, and tests only then whether two nodes see each other when their segment is the
+    next to be taken: the first segment to a node that passes the test is on a shortest path to it.
+    A shortest path bends round the blocked cell at each corner, so other segments are left out.
+
+    `nodes`, float64 (n, 2), are the corners that may be on the path, the start and the goal;
+    `blocked`, int64 (n, 2), the signs of the direction to the blocked cell of each, 0 at both ends;
+    `to_goal`, float64 (n,), lower bounds on the ways to the goal. All lengths are in cells.
+    """
+    n = nodes.shape[0]
+    lengths = np.zeros(n)
+    came = np.full(n, -1, np.int64)
+    heap = [(0.0, n - 2, n - 2)]
+    while heap and came[n - 1] < 0:
+        _, node, before = heapq.heappop(heap)
+        if came[node] >= 0:
+            continue
+        row, col = nodes[node]
+        from_row, from_col = row - nodes[before, 0], col - nodes[before, 1]
+        if node != before:
+            code = segment_code(classes, free_of, nodes[before, 0], nodes[before, 1], row, col)
+            if code != CLEAR:
+                continue
+        came[node] = before
+        lengths[node] = lengths[before] + math.hypot(from_row, from_col)
+        side = from_row * blocked[node, 1] - from_col * blocked[node, 0]
+        for head in range(n):
+            if came[head] >= 0:
+                continue
+            to_row, to_col = nodes[head, 0] - row, nodes[head, 1] - col
+            if to_row * to_col * blocked[node, 0] * blocked[node, 1] > 0:
+                continue
+            if to_row * to_col * blocked[head, 0] * blocked[head, 1] > 0:
+                continue
+            if side != 0.0:
+                turn = compare_products(from_row, to_col, from_col, to_row)
+                if turn * side < 0 or from_row * to_row + from_col * to_col < 0:
+                    continue
+            estimate = lengths[node] + math.hypot(to_row, to_col) + to_goal[head]
+            if estimate <= most:
+                heapq.heappush(heap, (estimate, head, node))
+    chain = np.empty(n, np.int64)
+    size, node = 0, n - 1
+    while came[n - 1] >= 0 and size < n:
+        chain[size] = node
+        size += 1
+        if node == n - 2:
+            break
+        node = came[node]
+    return chain[:size][::-1]

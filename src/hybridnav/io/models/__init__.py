@@ -1,6 +1,0 @@
-"""Models: a map with everything that planners have prepared on it, in one file."""
-
-from hybridnav.io.models.model import Model, is_model, open_model
-from hybridnav.io.models.saving import save
-
-__all__ = ["Model", "is_model", "open_model", "save"]

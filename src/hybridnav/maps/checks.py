@@ -1,0 +1,176 @@
+"""Checks of values that public functions are given."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError, brief
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+
+_T = TypeVar("_T")
+
+
+def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
+    """Return a value of a type.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    kind
+        The type.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is of another type.
+    """
+    if isinstance(value, kind):
+        return value
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    raise InvalidValueError(
+        f"{name} is {brief(value)} of type {type(value).__name__}, expected {article} "
+        f"{kind.__name__}: make one"
+    )
+
+
+def checked_whole(name: str, value: Any, low: int, high: int) -> int:
+    """Return a whole number in a range.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    low, high
+        The least and the greatest number.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no whole number, or lies outside the range.
+    """
+    try:
+        found = operator.index(value)
+    except TypeError:
+        found = low - 1
+    if low <= found <= high:
+        return found
+    raise InvalidValueError(
+        f"{name} must be a whole number from {low} to {high}, got {brief(value)}"
+    )
+
+
+def checked_radius(radius_m: Any) -> float:
+    """Return the radius of a robot in metres.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no finite number >= 0.
+    """
+    try:
+        found = float(radius_m)
+    except (TypeError, ValueError):
+        found = math.nan
+    if math.isfinite(found) and found >= 0:
+        return found
+    raise InvalidValueError(
+        f"robot radius must be a finite length in metres >= 0, got {brief(radius_m)}"
+    )
+
+
+def checked_thresholds(free: Any, occupied: Any) -> tuple[float, float]:
+    """Return the thresholds of free and occupied cells.
+
+    Raises
+    ------
+    InvalidValueError
+        When these are not two ascending numbers from 0 to 1.
+    """
+    try:
+        low, high = float(free), float(occupied)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if 0 <= low < high <= 1:
+        return low, high
+    raise InvalidValueError(
+        "thresholds must satisfy 0 <= free < occupied <= 1, "
+        f"got free {brief(free)} and occupied {brief(occupied)}"
+    )
+
+
+def checked_cell(name: str, cell: Any) -> tuple[int, int]:
+    """Return a cell as two integers.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    cell
+        What was given.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not two whole numbers.
+    """
+    try:
+        row, col = cell
+        return operator.index(row), operator.index(col)
+    except (TypeError, ValueError):
+        raise InvalidValueError(
+            f"{name} is {brief(cell)}, expected a cell (row, col): give two whole numbers"
+        ) from None
+
+
+def checked_between(name: str, value: Any, low: float, high: float) -> float:
+    """Return a number in a range.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    low, high
+        The least and the greatest number.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no number, or lies outside the range.
+    """
+    if isinstance(value, int | float | np.number) and low <= value <= high:
+        return float(value)
+    raise InvalidValueError(
+        f"{name} is {brief(value)}, expected a number from {low:,g} to {high:,g}: choose another "
+        "one"
+    )
+
+
+def checked_points(points: ArrayLike) -> FloatArray:
+    """Return the points as float64 (n, 2).
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no finite array of shape (n, 2) or there is none.
+    """
+    xy = np.asarray(points, dtype=np.float64)
+    if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004
+        raise InvalidValueError(f"points must have the shape (n, 2), n >= 1, got {xy.shape}")
+    if not np.isfinite(xy).all():
+        raise InvalidValueError("points need finite coordinates in metres")
+    return xy

@@ -1,0 +1,240 @@
+"""Costs as people write them: `clearance:multiplier=4`, `speed:FILE`, `keepout:FILE`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Any, Literal
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.files.ros import read_mask
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import PathLike
+    from hybridnav.maps import OccupancyGrid
+
+
+_KEYS = {
+    "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
+    "speed": ("base", "multiplier", "unit", "full_speed_mps", "x", "y", "yaw"),
+    "keepout": ("multiplier", "x", "y", "yaw"),
+}
+_POSE = ("x", "y", "yaw")
+"""Keys of the pose of a mask's frame in the map frame."""
+_TEXTS = frozenset({"unit"})
+
+
+@dataclass(frozen=True)
+class CostSpec:
+    """One source of costs."""
+
+    kind: str
+    """`clearance`, `speed` or `keepout`."""
+    file: str = ""
+    """File of a mask."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Settings by name."""
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Pose of the frame of a mask in the map frame, `(x, y, yaw)`."""
+        x, y, yaw = (self.settings.get(key, 0.0) for key in _POSE)
+        return x, y, yaw
+
+    def layer(self, grid: OccupancyGrid) -> CostLayer:
+        """Return the costs of the cells of a map; see `CostLayer` and `load_speed_mask`."""
+        others = {key: value for key, value in self.settings.items() if key not in _POSE}
+        if self.kind == "clearance":
+            return CostLayer.clearance(grid, **others)
+        if self.kind == "speed":
+            return load_speed_mask(self.file, grid, pose=self.pose, **others)
+        return load_keepout_mask(self.file, grid, pose=self.pose, **others)
+
+
+def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
+    """Return what some texts state.
+
+    Parameters
+    ----------
+    texts
+        `clearance[:KEY=VALUE,...]`, at most once, `speed:FILE[,KEY=VALUE,...]` or
+        `keepout:FILE[,KEY=VALUE,...]`; keys are the parameters of `CostLayer.clearance`,
+        `load_speed_mask` and `load_keepout_mask`, and x, y, yaw instead of a pose.
+
+    Raises
+    ------
+    InvalidValueError
+        When one of them has another form.
+    """
+    specs: list[CostSpec] = []
+    for text in texts:
+        kind, _, rest = text.partition(":")
+        if kind not in _KEYS:
+            raise InvalidValueError(f"costs must begin with {', '.join(_KEYS)}, got {text!r:.80}")
+        parts = rest.split(",") if rest else []
+        if kind == "clearance":
+            if any(spec.kind == kind for spec in specs):
+                raise InvalidValueError("costs clearance is given twice, put its settings into one")
+            specs.append(CostSpec(kind, settings=_settings(kind, parts)))
+            continue
+        if not parts or not parts[0]:
+            raise InvalidValueError(f"costs {kind}: expected {kind}:FILE, got {text!r:.80}")
+        specs.append(CostSpec(kind, parts[0], _settings(kind, parts[1:])))
+    return tuple(specs)
+
+
+def read_costs(texts: Sequence[str], grid: OccupancyGrid) -> CostLayer | None:
+    """Return the layer of the larger factors that some texts state, None for no texts.
+
+    Raises
+    ------
+    InvalidValueError
+        When a text has another form, or a setting is out of range.
+    MapError
+        When a mask cannot be read.
+    """
+    layers = [spec.layer(grid) for spec in parse_costs(texts)]
+    return reduce(or_, layers) if layers else None
+
+
+def _settings(kind: str, parts: list[str]) -> dict[str, Any]:
+    """Return the settings of `KEY=VALUE` parts."""
+    settings: dict[str, Any] = {}
+    for part in parts:
+        key, equals, text = part.partition("=")
+        known = _KEYS[kind]
+        if not equals or key not in known:
+            raise InvalidValueError(
+                f"costs {kind} takes KEY=VALUE with {', '.join(known)}, got {part!r:.80}"
+            )
+        if key in _TEXTS:
+            settings[key] = text
+            continue
+        try:
+            settings[key] = float(text)
+        except ValueError:
+            raise InvalidValueError(
+                f"costs {kind}: {key} must be a number, got {text!r:.80}"
+            ) from None
+    return settings
+
+
+# Filter masks of Nav2 in files of map_server, as layers of costs.
+
+
+def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
+    path: PathLike,
+    grid: OccupancyGrid,
+    *,
+    base: float = 100.0,
+    multiplier: float = -1.0,
+    unit: Literal["percent", "m/s"] = "percent",
+    full_speed_mps: float | None = None,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> CostLayer:
+    """Read a speed mask of Nav2: a metre in a slow zone costs as much more as it takes longer.
+
+    Parameters
+    ----------
+    path
+        YAML file of map_server beside the image; mode `raw`, `scale` or `trinary`. Dark pixels have
+        high values, unless it says `negate`; in the mode `raw` the number of a pixel is the value.
+    grid
+        The map. The mask may have another resolution, place and size.
+    base, multiplier, unit, full_speed_mps
+        As in `CostLayer.speed_mask`.
+    pose
+        `(x, y, yaw)` of the frame of the mask in the map frame, in metres and radians; the default
+        is for a mask in the map frame.
+    max_cells
+        The most cells that the mask may have.
+
+    Returns
+    -------
+    CostLayer
+        The factors of the map's cells.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file, or the image that it names, does not exist.
+    MapError
+        When a file cannot be read, or holds too many cells.
+    InvalidValueError
+        When a setting or the pose is out of range.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("slow.pgm").write_bytes(b"P5 3 1 255 " + bytes([0, 50, 75]))
+    >>> _ = Path("slow.yaml").write_text(
+    ...     "{image: slow.pgm, resolution: 1.0, origin: [0, 0, 0], negate: 0, mode: raw, "
+    ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
+    ... )
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
+    >>> hn.load_speed_mask("slow.yaml", grid).factors
+    array([[1., 2., 4.]], dtype=float32)
+    """
+    values, frame = read_mask(path, max_cells=max_cells)
+    return CostLayer.speed_mask(
+        grid,
+        values,
+        frame.moved(pose),
+        base=base,
+        multiplier=multiplier,
+        unit=unit,
+        full_speed_mps=full_speed_mps,
+    )
+
+
+def load_keepout_mask(
+    path: PathLike,
+    grid: OccupancyGrid,
+    *,
+    multiplier: float = 2.0,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> CostLayer:
+    """Read a keepout mask of Nav2: zones that are closed, and lanes of preference.
+
+    Parameters
+    ----------
+    path, grid, pose, max_cells
+        As in `load_speed_mask`.
+    multiplier
+        As in `CostLayer.keepout_mask`.
+
+    Returns
+    -------
+    CostLayer
+        The factors of the map's cells, and in `keepout` those that are closed, None without any.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file, or the image that it names, does not exist.
+    MapError
+        When a file cannot be read, or holds too many cells.
+    InvalidValueError
+        When the multiplier or the pose is out of range.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("zones.pgm").write_bytes(b"P5 3 1 255 " + bytes([254, 0, 254]))
+    >>> _ = Path("zones.yaml").write_text(
+    ...     "{image: zones.pgm, resolution: 1.0, origin: [0, 0, 0], negate: 0, "
+    ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
+    ... )
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
+    >>> hn.load_keepout_mask("zones.yaml", grid).keepout
+    array([[False,  True, False]])
+    """
+    values, frame = read_mask(path, max_cells=max_cells)
+    return CostLayer.keepout_mask(grid, values, frame.moved(pose), multiplier=multiplier)

@@ -1,0 +1,356 @@
+"""ROS maps: the YAML of map_server and the image it names, read as Nav2 reads them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.files import printable
+from hybridnav._base.yaml_file import read_yaml
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
+from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
+from hybridnav.maps.files.image import Raster, read_raster
+from hybridnav.maps.files.movingai import check_max_cells, check_size
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._base.typing import PathLike
+
+
+_MODES = ("trinary", "scale", "raw")
+_BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {
+    "false": False, "no": False, "off": False, "n": False, "0": False,
+}  # fmt: skip
+_UNKNOWN_GREY = 205
+"""The grey that map_saver and most SLAM tools write for "unknown"."""
+
+
+def load_ros_map(
+    path: PathLike,
+    *,
+    robot_radius_m: float | None = None,
+    free_threshold: float | None = None,
+    occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> OccupancyGrid:
+    """Load a map of ROS's map_server.
+
+    In the modes trinary and scale a pixel of brightness v in [0, 1] (the mean of its colour
+    channels) has the occupancy 1 - v, or v with `negate`; pixels that are not fully opaque were
+    never measured. In the mode raw the 8-bit values 0 to 100 are percentages, all others unknown.
+
+    Parameters
+    ----------
+    path
+        The YAML file.
+    robot_radius_m
+        Radius in metres by which occupied cells are inflated, 0 for a robot that is a point; None
+        is the default, 0.25 m.
+    free_threshold, occupied_threshold
+        U1 and U2 instead of the file's `free_thresh` and `occupied_thresh`.
+    max_cells
+        The most cells that the map may have; see `load_map`.
+
+    Returns
+    -------
+    OccupancyGrid
+        The grid, named after the file, or after its folder if the file is called map.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the YAML file or the image that it names does not exist.
+    MapError
+        When one of them cannot be read, or holds too many cells; the text names the file and the
+        key.
+    InvalidValueError
+        When the radius, a threshold or the limit is out of range.
+
+    Warns
+    -----
+    MapWarning
+        When the thresholds call grey 205, the usual mark of unknown cells, free.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.maps.files import load_ros_map
+    >>> _ = Path("tiny.pgm").write_bytes(b"P5 3 1 255 " + bytes([254, 205, 0]))
+    >>> _ = Path("tiny.yaml").write_text(
+    ...     "{image: tiny.pgm, resolution: 0.1, origin: [0, 0, 0], negate: 0, "
+    ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
+    ... )
+    >>> load_ros_map("tiny.yaml").frame.resolution_m
+    0.1
+    """
+    description = _read_description(Path(path), free_threshold, occupied_threshold)
+    raster = _read_image(description, max_cells)
+    probability = _probability(raster, description)
+    grid = OccupancyGrid(
+        probability,
+        description.frame,
+        free_threshold=description.free_threshold,
+        occupied_threshold=description.occupied_threshold,
+        robot_radius_m=robot_radius_m,
+        name=_name_of(Path(path)),
+    )
+    count = _unknown_called_free(raster, description)
+    if count:
+        warnings.warn(
+            f"{description.where}: {count} cells have grey {_UNKNOWN_GREY}, the usual mark of "
+            f"unknown, and count as free at a free threshold of {description.free_threshold:g}; "
+            "to make them unexplored set free_threshold to 0.196",
+            MapWarning,
+            stacklevel=3,
+        )
+    return grid
+
+
+def read_mask(path: PathLike, *, max_cells: int) -> tuple[NDArray[np.int8], Frame]:
+    """Read a map of map_server as the values of a `nav_msgs/OccupancyGrid`.
+
+    Parameters
+    ----------
+    path
+        The YAML file.
+    max_cells
+        The most cells that the map may have.
+
+    Returns
+    -------
+    tuple
+        int8 (rows, cols), from 0 to 100, -1 for unknown, row 0 at the lowest y; and the place of
+        the cells. Trinary maps hold 0, 100 and -1; in the mode `scale` occupancies between the
+        thresholds are spread over 0 to 100.
+
+    Raises
+    ------
+    MapNotFoundError, MapError, InvalidValueError
+        As in `load_ros_map`.
+    """
+    description = _read_description(Path(path), None, None)
+    occupancy = _probability(_read_image(description, max_cells), description)
+    low, high = np.float32(description.free_threshold), np.float32(description.occupied_threshold)
+    if description.mode == "raw":
+        between = np.rint(occupancy * 100)
+    elif description.mode == "scale":
+        between = np.clip(np.rint((occupancy - low) / (high - low) * 100), 0, 100)
+    else:
+        between = np.where(occupancy >= high, 100, np.where(occupancy <= low, 0, math.nan))
+    return np.where(np.isnan(between + occupancy), -1, between).astype(np.int8), description.frame
+
+
+def _read_image(description: _Description, max_cells: int) -> Raster:
+    """Return the image of a map, unless it holds too many cells."""
+    check_max_cells(max_cells)
+    return read_raster(
+        description.image,
+        what=f"{description.where}: image",
+        check_size=partial(
+            check_size,
+            max_cells=max_cells,
+            where=f"{description.where}: image {printable(description.image)}",
+        ),
+    )
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the YAML file of a map and the image that it names.
+
+    Raises
+    ------
+    MapError
+        When the YAML file cannot be read.
+    """
+    return [path, _read_description(path, None, None).image]
+
+
+@dataclass(frozen=True)
+class _Description:
+    """Contents of the YAML file, after overrides."""
+
+    where: str
+    image: Path
+    frame: Frame
+    mode: str
+    negate: bool
+    free_threshold: float
+    occupied_threshold: float
+
+
+def _read_description(
+    path: Path, free_threshold: float | None, occupied_threshold: float | None
+) -> _Description:
+    values = read_yaml(path, what="map", error=MapError, missing=MapNotFoundError)
+    where = f"map {printable(path)}"
+    required = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+    if "floors" in values:
+        raise MapError(
+            f"{where}: a building, expected one map: name that of a floor, or load it with "
+            "load_building"
+        )
+    absent = [key for key in required if key not in values]
+    if absent:
+        raise MapError(f"{where}: lacks {', '.join(absent)}")
+    low = _threshold(values, "free_thresh", where)
+    high = _threshold(values, "occupied_thresh", where)
+    low = low if free_threshold is None else free_threshold
+    high = high if occupied_threshold is None else occupied_threshold
+    if not 0 <= low < high <= 1:
+        kind = MapError if free_threshold is occupied_threshold is None else InvalidValueError
+        raise kind(
+            f"{where}: free_thresh must be less than occupied_thresh and both within [0, 1], "
+            f"got {low} and {high}"
+        )
+    return _Description(
+        where=where,
+        image=_image_path(values["image"], path, where),
+        frame=_frame(values, where),
+        mode=_mode(values.get("mode", "trinary"), where),
+        negate=_negate(values["negate"], where),
+        free_threshold=low,
+        occupied_threshold=high,
+    )
+
+
+def _number(value: Any, key: str, where: str) -> float:
+    """Return the finite number of a YAML value.
+
+    PyYAML reads 5e-2 as a text, Nav2 as a number.
+    """
+    number = math.nan
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except (ValueError, OverflowError):
+            number = math.nan
+    if not math.isfinite(number):
+        raise MapError(f"{where}: {key} must be a finite number, got {brief(value)}")
+    return number
+
+
+def _threshold(values: dict[str, Any], key: str, where: str) -> float:
+    number = _number(values[key], key, where)
+    if not 0 <= number <= 1:
+        raise MapError(f"{where}: {key} must be within [0, 1], got {number:g}")
+    return number
+
+
+def _frame(values: dict[str, Any], where: str) -> Frame:
+    resolution = _number(values["resolution"], "resolution", where)
+    origin = values["origin"]
+    if not isinstance(origin, list) or len(origin) != 3:  # noqa: PLR2004
+        raise MapError(f"{where}: origin must be [x, y, yaw], got {brief(origin)}")
+    x, y, yaw = (_number(value, "origin", where) for value in origin)
+    try:
+        return Frame(resolution, (x, y), yaw)
+    except InvalidValueError as error:
+        raise MapError(f"{where}: {error}") from None
+
+
+def _mode(value: Any, where: str) -> str:
+    mode = value.lower() if isinstance(value, str) else value
+    if mode not in _MODES:
+        raise MapError(f"{where}: mode must be one of {', '.join(_MODES)}, got {brief(value)}")
+    return str(mode)
+
+
+def _negate(value: Any, where: str) -> bool:
+    negate = _BOOLEANS.get(value.lower()) if isinstance(value, str) else value
+    if not isinstance(negate, int) or negate not in {0, 1}:
+        raise MapError(f"{where}: negate must be 0 or 1, got {brief(value)}")
+    return bool(negate)
+
+
+def _image_path(value: Any, path: Path, where: str) -> Path:
+    if not isinstance(value, str) or not value:
+        raise MapError(f"{where}: image must be the path of a file, got {brief(value)}")
+    try:
+        image = Path(value).expanduser()
+    except RuntimeError:  # no such user: an ordinary name
+        image = Path(value)
+    return path.parent / image
+
+
+def _name_of(path: Path) -> str:
+    return (path.absolute().parent.name or path.stem) if path.stem == "map" else path.stem
+
+
+def _probability(raster: Raster, description: _Description) -> NDArray[np.float32]:
+    """Return the occupancy, from a table over the levels, row 0 at the bottom of the image."""
+    level = np.arange(raster.white + 1)
+    if description.mode == "raw":
+        percent = np.rint(level * 255 / raster.white)
+        table = np.where(percent <= 100, percent / 100, math.nan)  # noqa: PLR2004
+    elif description.negate:
+        table = level / raster.white
+    else:
+        table = (raster.white - level) / raster.white
+    probability = table.astype(np.float32)[raster.level[::-1]]
+    if raster.opaque is not None and description.mode != "raw":  # Nav2: raw ignores opacity
+        probability[~raster.opaque[::-1]] = math.nan
+    return probability
+
+
+def _unknown_called_free(raster: Raster, description: _Description) -> int:
+    """Return the cells of the grey that means unknown, if the thresholds call it free."""
+    value = _UNKNOWN_GREY / 255 if description.negate else 1 - _UNKNOWN_GREY / 255
+    if description.mode == "raw" or np.float32(value) > np.float32(description.free_threshold):
+        return 0
+    unknown = raster.level == _UNKNOWN_GREY * raster.white // 255
+    if raster.opaque is not None:
+        unknown &= raster.opaque
+    return int(np.count_nonzero(unknown))
+
+
+# The project's own maps, which come with the package.
+
+_PACKAGE = Path(__file__).parents[2]
+_FOLDERS = (_PACKAGE / "example_maps", _PACKAGE.parents[1] / "maps")
+"""Folders of maps: inside an installed package, or beside `src` in a checkout."""
+_NAMES = ("figure1", "office")
+
+
+def example_map(name: str = "office", *, robot_radius_m: float | None = None) -> OccupancyGrid:
+    """Load one of the project's own maps, a file in the repository's `maps/`.
+
+    Parameters
+    ----------
+    name
+        `"office"`, a floor of 42 x 25 m as in a scan, or `"figure1"`, a small map after the source
+        paper's Fig. 1.
+    robot_radius_m
+        Radius in metres: a cell is blocked when its centre lies within it of the centre of an
+        occupied cell; 0 for a point. None is the default, 0.25 m.
+
+    Returns
+    -------
+    OccupancyGrid
+        Row 0 at the lowest y, placed in the map frame.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no such map, or the radius is negative or not finite.
+
+    Examples
+    --------
+    >>> hn.example_map("office").shape
+    (580, 960)
+    >>> hn.example_map("figure1").class_counts()
+    {'free': 330, 'unexplored': 341, 'occupied': 205, 'blocked': 324}
+    """
+    if name not in _NAMES:
+        raise InvalidValueError(
+            f"there is no example map {name!r:.80}, only {' and '.join(_NAMES)}: "
+            "load a map of your own with load_map"
+        )
+    files = [folder / name / f"{name}.yaml" for folder in _FOLDERS]
+    return load_ros_map(next(filter(Path.is_file, files)), robot_radius_m=robot_radius_m)

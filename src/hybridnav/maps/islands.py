@@ -1,0 +1,167 @@
+"""Runs of cells, and islands: small sets of free or unexplored cells, as raw scans contain many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.maps.classes import CellClass
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
+
+
+class UniqueRows(NamedTuple):
+    """The distinct rows of an array."""
+
+    rows: AnyArray
+    """(m, k), ascending by the first column, then by the next ones."""
+    first: LongArray
+    """int64 (m,), where each stands first."""
+    number_of: LongArray
+    """int64 (n,), the number of each given row among the distinct ones."""
+    n_times: LongArray
+    """int64 (m,), how often each is given."""
+
+
+def unique_rows(rows: AnyArray) -> UniqueRows:
+    """Return the distinct rows of an array.
+
+    `numpy.unique` with an axis would do, but it compares records: an interrupt there ends as a
+    TypeError, and nothing tells that it was one.
+
+    Parameters
+    ----------
+    rows
+        Shape (n, k), k >= 1.
+    """
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    is_new = np.ones(len(rows), np.bool_)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    begin = np.flatnonzero(is_new)
+    number_of = np.empty(len(rows), np.int64)
+    number_of[order] = np.cumsum(is_new) - 1
+    n_times = np.diff(begin, append=len(rows))
+    return UniqueRows(ordered[begin], order[begin], number_of, n_times)
+
+
+def in_runs(start: LongArray, length: LongArray) -> LongArray:
+    """Return the numbers in runs, one run after the other.
+
+    Parameters
+    ----------
+    start
+        int64 (n,), the first number of each run.
+    length
+        int64 (n,), >= 0.
+
+    Returns
+    -------
+    LongArray
+        int64, as many numbers as the runs have in all.
+    """
+    end = np.cumsum(length)
+    numbers: LongArray = np.repeat(start - end + length, length)
+    numbers += np.arange(len(numbers))
+    return numbers
+
+
+# Islands: small sets of free or unexplored cells, as raw scans contain many.
+
+_ROUNDING = 1e-9
+"""Relative slack on an area, so that 1 m² is 400 cells of 0.05 m and not 400.00001."""
+
+
+@dataclass(frozen=True)
+class DroppedIslands:
+    """Counts of the islands that a grid leaves out, and of their cells.
+
+    Parameters
+    ----------
+    free, free_cells
+        Free islands, and their cells: unexplored now, or closed.
+    unexplored, unexplored_cells
+        Unexplored islands, and their cells: closed now.
+    closed_cells
+        Cells of both kinds that are closed now: like an obstacle they belong to no place, but they
+        are not inflated.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.0, 1.0, 0.0]]), robot_radius_m=0)
+    >>> hn.drop_islands(grid, 2.0).dropped
+    DroppedIslands(free=1, free_cells=1, unexplored=0, unexplored_cells=0, closed_cells=1)
+    """
+
+    free: int = 0
+    free_cells: int = 0
+    unexplored: int = 0
+    unexplored_cells: int = 0
+    closed_cells: int = 0
+
+
+def without_islands(
+    classes: ByteArray, *, least_area_m2: float, cell_area_m2: float
+) -> tuple[ByteArray, DroppedIslands]:
+    """Drop the islands of an array of classes; see `drop_islands`.
+
+    Parameters
+    ----------
+    classes
+        uint8 `CellClass`, shape `(rows, cols)`.
+    least_area_m2, cell_area_m2
+        Least area of an island, >= 0, and area of a cell, in square metres.
+
+    Returns
+    -------
+    ByteArray
+        A new array of the same shape.
+    DroppedIslands
+        Counts of the dropped islands.
+    """
+    least_cells = least_area_m2 / cell_area_m2 * (1 - _ROUNDING)
+    free_of, areas = _islands(classes == CellClass.FREE)
+    small = areas < least_cells
+    small[0] = False
+    specks = small[free_of]
+    kept = np.where(specks, np.uint8(CellClass.UNEXPLORED), classes)
+    free_of[specks] = 0
+
+    island_of, areas = _islands(kept == CellClass.UNEXPLORED)
+    closed = (areas < least_cells) & (_free_neighbours(island_of, free_of) <= 1)
+    closed[0] = False
+    shut = closed[island_of]
+    kept[shut] = CellClass.OCCUPIED
+    unexplored = shut & (classes == CellClass.UNEXPLORED)
+    return kept, DroppedIslands(
+        free=int(np.count_nonzero(small)),
+        free_cells=int(np.count_nonzero(specks)),
+        unexplored=len(np.unique(island_of[unexplored])),
+        unexplored_cells=int(np.count_nonzero(unexplored)),
+        closed_cells=int(np.count_nonzero(shut)),
+    )
+
+
+def _islands(cells: BoolArray) -> tuple[IntArray, LongArray]:
+    """Label 4-connected sets of some cells from 1, 0 elsewhere, and count the cells of each."""
+    from scipy import ndimage  # noqa: PLC0415 - half a second that most grids do not need
+
+    label_of, count = ndimage.label(cells)
+    areas = np.bincount(label_of.ravel(), minlength=count + 1)
+    return label_of.astype(np.int32, copy=False), areas.astype(np.int64, copy=False)
+
+
+def _free_neighbours(island_of: IntArray, free_of: IntArray) -> LongArray:
+    """Return the number of free sets that are 4-adjacent to each island, int64 (n_islands + 1,)."""
+    pairs = []
+    for axis in (0, 1):
+        island, free = np.moveaxis(island_of, axis, 0), np.moveaxis(free_of, axis, 0)
+        for one, other in ((island[:-1], free[1:]), (island[1:], free[:-1])):
+            beside = (one > 0) & (other > 0)
+            pairs.append(np.stack([one[beside], other[beside]], axis=1))
+    islands = unique_rows(np.concatenate(pairs)).rows[:, 0]
+    counts = np.bincount(islands, minlength=int(island_of.max(initial=0)) + 1)
+    return counts.astype(np.int64, copy=False)

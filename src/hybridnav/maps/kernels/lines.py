@@ -1,0 +1,138 @@
+"""Kernels of lines: the cells that a polyline passes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+
+_SLIVER_CELLS = 1e-9
+"""Shorter segments of a line are rounding: the line passes the corner of a cell."""
+
+
+@njit(cache=True, nogil=True)
+def _is_free(free, row, col):
+    """Return whether a cell is on the grid and free."""
+    return 0 <= row < free.shape[0] and 0 <= col < free.shape[1] and free[row, col]
+
+
+@njit(cache=True, nogil=True)
+def _free_cell_at(free, row, col):
+    """Return a free cell that contains a position.
+
+    If the position lies on lines of the lattice, the cells beside it are tried in turn.
+    """
+    above, right = math.floor(row), math.floor(col)
+    below, left = math.ceil(row) - 1, math.ceil(col) - 1
+    # Most positions lie inside one cell; a look at it would fetch another row of the map.
+    if above == below and right == left:
+        return above, right
+    if _is_free(free, above, right):
+        return above, right
+    if _is_free(free, above, left):
+        return above, left
+    if _is_free(free, below, right):
+        return below, right
+    return below, left
+
+
+@njit(cache=True, nogil=True)
+def _next_cut(start, reach, line):
+    """Return the share of a segment at which it meets a line of the lattice; 2 if it does not."""
+    return 2.0 if reach == 0.0 else (line - start) / reach
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def passed_cells(free, positions):
+    """Return the cells that a polyline passes, int64 (m, 2); see `cells_of_line`."""
+    room = 2
+    for k in range(len(positions) - 1):
+        for axis in range(2):
+            room += int(abs(positions[k + 1, axis] - positions[k, axis])) + 2
+    cells = np.empty((room, 2), np.int64)
+    cells[0, 0], cells[0, 1] = _free_cell_at(free, positions[0, 0], positions[0, 1])
+    n = 1
+    for k in range(len(positions) - 1):
+        row, col = positions[k, 0], positions[k, 1]
+        down, across = positions[k + 1, 0] - row, positions[k + 1, 1] - col
+        length = math.hypot(down, across)
+        # The next line of the lattice in each direction, and where the segment meets it.
+        down_step, across_step = math.copysign(1.0, down), math.copysign(1.0, across)
+        line_row = math.floor(row) + 1.0 if down > 0.0 else math.ceil(row) - 1.0
+        line_col = math.floor(col) + 1.0 if across > 0.0 else math.ceil(col) - 1.0
+        by_row, by_col = _next_cut(row, down, line_row), _next_cut(col, across, line_col)
+        here = 0.0
+        while here < 1.0:
+            there = min(by_row, by_col, 1.0)
+            if (there - here) * length > _SLIVER_CELLS:
+                middle = (here + there) / 2
+                cell = _free_cell_at(free, row + middle * down, col + middle * across)
+                if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
+                    cells[n, 0], cells[n, 1] = cell
+                    n += 1
+            if by_row <= there:
+                line_row += down_step
+                by_row = _next_cut(row, down, line_row)
+            if by_col <= there:
+                line_col += across_step
+                by_col = _next_cut(col, across, line_col)
+            here = there
+    cell = _free_cell_at(free, positions[-1, 0], positions[-1, 1])
+    if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
+        cells[n, 0], cells[n, 1] = cell
+        n += 1
+    return cells[:n].copy()
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def walks_clear(free, tails, heads):
+    """Return which walks from cell to cell meet free cells only, bool (n,).
+
+    The walk is that of Nav2's collision monitor, Bresenham's line as its `LineIterator` visits it:
+    one cell for each step along the longer axis. Backwards it may visit others.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols).
+    tails, heads
+        int64 (n, 2), cells of the grid.
+    """
+    clear = np.ones(len(tails), np.bool_)
+    for i in range(len(tails)):
+        row, col = tails[i, 0], tails[i, 1]
+        down, across = abs(heads[i, 0] - row), abs(heads[i, 1] - col)
+        up, right = (1 if heads[i, 0] >= row else -1), (1 if heads[i, 1] >= col else -1)
+        steps = max(down, across, 1)
+        for k in range(max(down, across) + 1):
+            here = row + up * ((steps // 2 + k * down) // steps)
+            if not free[here, col + right * ((steps // 2 + k * across) // steps)]:
+                clear[i] = False
+                break
+    return clear
+
+
+@njit(cache=True, nogil=True)
+def polyline_length(points):
+    """Return the length of a line through points, float64 (n, 2)."""
+    length = 0.0
+    for k in range(len(points) - 1):
+        length += math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
+    return length
+
+
+@njit(cache=True, nogil=True)
+def polyline_lengths(points, starts):
+    """Return the lengths of many lines, float64 (n,).
+
+    Line k is `points[starts[k]:starts[k + 1]]`; a line without points is infinitely long.
+    """
+    lengths = np.full(len(starts) - 1, np.inf)
+    for k in range(len(lengths)):
+        if starts[k + 1] > starts[k]:
+            lengths[k] = polyline_length(points[starts[k] : starts[k + 1]])
+    return lengths

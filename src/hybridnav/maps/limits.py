@@ -1,0 +1,16 @@
+"""Limits and defaults of grids and paths, known without numpy."""
+
+from __future__ import annotations
+
+MAX_CELLS = 178_956_970
+"""Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""
+
+DEFAULT_MAX_CELLS = 20_000_000
+"""Cells of a map that are read unless more are asked for: 4,472 x 4,472, or 224 m a side at 5 cm.
+Reading so many takes about 5 s and a gigabyte."""
+
+DEFAULT_ROBOT_RADIUS_M = 0.25
+"""Default radius of the robot in metres, for presets and for maps."""
+
+TOLERANCE = 1e-9
+"""Greatest loss, or difference of two losses, that counts as rounding."""

@@ -1,0 +1,13 @@
+from .instruction import (
+    Doorway as Doorway,
+    FloorChange as FloorChange,
+    Instruction as Instruction,
+    Landmark as Landmark,
+    Passed as Passed,
+    Space as Space,
+    Turn as Turn,
+)
+from .language import Language as Language
+from .write import check_language as check_language, languages as languages, sentences as sentences
+
+__all__: list[str]

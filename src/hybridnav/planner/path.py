@@ -1,0 +1,181 @@
+"""Paths: the cells and points of a plan, poses for a controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.messages import path_message
+from hybridnav._base.poses import Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import FloatArray, LongArray, SignArray
+
+    End = Sequence[float] | FloatArray
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A path through the grid, between the centres of two cells, or at any angle between two
+    points.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5)).path
+    >>> path.points
+    array([[0.5, 0.5],
+           [1.3, 1.2],
+           [1.4, 1.4],
+           [1.6, 1.9],
+           [2. , 2.5]])
+    >>> len(path.poses(spacing_m=0.25))
+    13
+    """
+
+    cells: LongArray
+    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
+    shortened by line of sight keeps the cells of the original path."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
+    where an any-angle path turns."""
+    length_m: float
+    """Length in metres; for a cell path it is counted as a + b sqrt 2 cells from the moves."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), heading at each point, counter-clockwise from the x axis; None if the state
+    space has none."""
+    is_curved: bool = False
+    """Whether the robot drives an arc of a circle from each point to the next, as in the spaces
+    `dubins` and `reeds-shepp`; else a straight line."""
+    start_heading_rad: float | None = None
+    """Heading from which the robot turns on the spot before it sets out; None for no turn."""
+    goal_heading_rad: float | None = None
+    """Heading to which the robot turns on the spot once it is there; None for no turn."""
+
+    def __post_init__(self) -> None:
+        self.cells.flags.writeable = False
+        self.points.flags.writeable = False
+        if self.headings_rad is not None:
+            self.headings_rad.flags.writeable = False
+
+    @cached_property
+    def _motion(self) -> Motion:
+        ends = self.start_heading_rad, self.goal_heading_rad
+        return Motion(self.points, self.headings_rad, self.is_curved, *ends)
+
+    def turned_at_ends(self, start: End, goal: End) -> Path:
+        """Return the path with turns on the spot from the yaw of its start, and to that of its
+        goal.
+
+        Parameters
+        ----------
+        start, goal
+            `(x, y)`, no turn, or `(x, y, yaw)`, metres and radians, map frame.
+        """
+        first, last = (float(end[2]) if len(end) > 2 else None for end in (start, goal))  # noqa: PLR2004
+        if first is None and last is None:
+            return self
+        return replace(self, start_heading_rad=first, goal_heading_rad=last)
+
+    @property
+    def headings_at_points(self) -> FloatArray:
+        """float64 (m,), `headings_rad`, or the direction of travel after each point, before the
+        last one; 0 without motion. At an endpoint with a heading of its own, that one."""
+        return self._motion.headings_at_points
+
+    def poses(self, spacing_m: float = 0.05) -> FloatArray:
+        """Return poses along the path for a controller, evenly spaced between the points where it
+        bends.
+
+        Parameters
+        ----------
+        spacing_m
+            Most metres from one pose to the next; every straight line or arc is divided into as few
+            equal parts as possible.
+
+        Returns
+        -------
+        FloatArray
+            float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first to
+            last point. Without `headings_rad` the yaw is the direction of travel: at a bend the one
+            after it, at the end the one before it, 0 without motion. With `headings_rad` it is the
+            heading of the robot, as it turns along the path. With `start_heading_rad` that is the
+            yaw of the first pose, with `goal_heading_rad` that of the last one. No pose occurs
+            twice in a row: a turn on the spot, and nothing else, is two poses at one point.
+
+        Raises
+        ------
+        InvalidValueError
+            When the spacing is not positive, or so small that there would be more than ten million
+            poses.
+        """
+        return self._motion.spread(spacing_m)[0]
+
+    def directions(self, spacing_m: float = 0.05) -> SignArray:
+        """Return the direction, ahead or backwards, in which the robot leaves each of the `poses`.
+
+        Parameters
+        ----------
+        spacing_m
+            As in `poses`.
+
+        Returns
+        -------
+        SignArray
+            int8 (n,), 1 for ahead, -1 for backwards, which is more than 90 degrees off the heading;
+            the last one is that of the step before.
+        """
+        return self._motion.spread(spacing_m)[1]
+
+    def to_message(
+        self, frame_id: str = "map", *, spacing_m: float = 0.05, stamp_ns: int = 0
+    ) -> dict[str, Any]:
+        """Return the `poses` as a `nav_msgs/Path` of ROS 2, in plain dictionaries and lists, which
+        `hybridnav._base.messages.fill_message` puts into a message.
+
+        Parameters
+        ----------
+        frame_id
+            Name of the map frame.
+        spacing_m
+            As in `poses`.
+        stamp_ns
+            Time in nanoseconds since 1970, of the path and of each pose.
+
+        Raises
+        ------
+        InvalidValueError
+            As for `poses`, or when the frame has no name or the time is out of range.
+
+        Examples
+        --------
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (1.5, 0.5)).path
+        >>> path.to_message(spacing_m=1.0)["poses"][1]["pose"]["position"]
+        {'x': 1.5, 'y': 0.5, 'z': 0.0}
+        """
+        return path_message(self.poses(spacing_m), frame_id, stamp_ns)
+
+    @property
+    def spot_turns(self) -> LongArray:
+        """int64, indices of points at which the robot turns on the spot: bends of straight lines,
+        points that differ from the next one in heading alone, and endpoints with another heading
+        than the path."""
+        return self._motion.spot_turns
+
+    @property
+    def max_curvature_per_m(self) -> float:
+        """Largest curvature, 1 / the least radius of an arc, 1 / m; 0 for straight lines."""
+        return self._motion.max_curvature_per_m
+
+    @property
+    def reversals(self) -> LongArray:
+        """int64, indices of the points where the robot changes between ahead and backwards."""
+        return np.flatnonzero(np.diff(self._motion.directions)) + 1

@@ -1,0 +1,292 @@
+"""Results of a planner: statuses, routes, bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav.errors import PlanError
+from hybridnav.planner.guide import sentences
+from hybridnav.route.route import Route
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
+    from hybridnav.planner.guide import Instruction
+    from hybridnav.planner.path import Path
+
+Metric = Literal[
+    "octile",
+    "weighted",
+    "any-angle",
+    "any-angle-weighted",
+    "clearance-weighted",
+    "dubins",
+    "reeds-shepp",
+]
+"""What a path is judged by: the kind of its length, or of its cost."""
+COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
+"""Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
+
+
+class PlanStatus(StrEnum):
+    """Outcome of a plan, as a value, not an error.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> print(hn.HybridPlanner(topology).plan((-1.0, 0.0), (0.5, 0.5)).status)
+    start outside the map
+    """
+
+    SOLVED = "solved"
+    START_OUTSIDE = "start outside the map"
+    GOAL_OUTSIDE = "goal outside the map"
+    START_OCCUPIED = "start occupied"
+    GOAL_OCCUPIED = "goal occupied"
+    START_UNEXPLORED = "start unexplored"
+    GOAL_UNEXPLORED = "goal unexplored"
+    START_BLOCKED = "start blocked"
+    GOAL_BLOCKED = "goal blocked"
+    NO_PATH = "no path"
+    APPROXIMATE = "approximate"
+    """A sampling-based planner came near the goal but did not reach it."""
+    TIMEOUT = "timeout"
+    """A sampling-based planner found nothing in its time."""
+
+
+class RouteSource(Protocol):
+    """Data from which a route is found when somebody reads it: naming it takes longer than to plan
+    some paths."""
+
+    def route(self) -> Route:
+        """Find the route."""
+        ...
+
+
+class InstructionSource(Protocol):
+    """Data from which instructions are found when somebody reads them."""
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions."""
+        ...
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """History of the path of a sampling-based planner."""
+
+    steps: tuple[str, ...]
+    """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
+    by_grid: bool
+    """Whether the path is the grid's, shortened by line of sight, because all attempts failed."""
+    trace: tuple[tuple[float, float], ...]
+    """Seconds and cost of each better path."""
+    iterations: int
+    """Iterations of planners and simplification."""
+
+
+@dataclass(frozen=True)
+class PlanStats:
+    """Effort of a query."""
+
+    expanded: int = 0
+    """Number of cells that the refiner expanded."""
+    expanded_places: int = 0
+    """Number of places that the coarse search expanded."""
+    expanded_border_cells: int = 0
+    """Number of border cells that the search on the overlay expanded."""
+    expanded_intervals: int = 0
+    """Number of intervals that the search on the mesh expanded."""
+    corridor_cells: int = 0
+    """Number of cells in the corridor; 0 for the whole map."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall-clock seconds per stage."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class PlanBatch:
+    """Outcomes of many queries, arrays of n.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology)
+    >>> batch = planner.plan_many([(0.5, 0.5), (0.5, 0.5)], [(2.0, 2.5), (1.5, 0.5)])
+    >>> batch.cost.round(3)
+    array([2.546, 1.   ])
+    """
+
+    status: AnyArray
+    """str (n,), the values of `PlanStatus`."""
+    cost: FloatArray
+    """float64 (n,), metres; infinite where there is no path."""
+    lower_bound: FloatArray
+    """float64 (n,), metres."""
+    path_start: LongArray
+    """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), the heading at each point; None in spaces without headings."""
+
+    @property
+    def gap(self) -> FloatArray:
+        """float64 (n,), proved distances from the optimum; NaN where there is no path."""
+        gap = np.full(len(self.cost), np.nan)
+        solved = np.isfinite(self.cost)
+        np.divide(self.cost, self.lower_bound, out=gap, where=solved & (self.lower_bound > 0))
+        gap[solved & (self.lower_bound <= 0)] = 1.0
+        return gap - 1
+
+    def path(self, query: int) -> FloatArray:
+        """Return the points of one path, float64 (k, 2); none where there is no path."""
+        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
+        return points
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """Outcome of one query; `path` and `route` are None unless it is solved.
+
+    The path of an approximate result ends short of the goal.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> result = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5))
+    >>> result.solved, round(result.cost, 3), result.gap
+    (True, 2.546, 0.0)
+    """
+
+    status: PlanStatus
+    metric: Metric = "octile"
+    path: Path | None = None
+    route_source: RouteSource | Route | None = field(default=None, repr=False)
+    """The route, or the data to find it from; nothing of the planner."""
+    lower_bound: float = math.inf
+    """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
+    stats: PlanStats = field(default_factory=PlanStats)
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Preset, and settings of the pyramid."""
+    weighted_cost: float | None = None
+    """Cost in a metric other than the length, as with costs of cells; None for the length."""
+    refinement: Refinement | None = None
+    """History of the path, with OMPL only."""
+    start: tuple[float, ...] | None = None
+    """Start of the plan, `(x, y)` or `(x, y, yaw)`, metres and radians, map frame; in a room the
+    chosen point."""
+    goal: tuple[float, ...] | None = None
+    """Goal of the plan, like `start`."""
+    grid_bound: float | None = None
+    """Proved bound on the cost of all paths of cells, metres, of an any-angle path by costs."""
+    instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
+    """The instructions, or the data to find them from."""
+
+    @cached_property
+    def route(self) -> Route | None:
+        """The places and arcs of the path: chosen before it (`paper`), or derived from it (all
+        other presets); None unless there is a path."""
+        source = self.route_source
+        return source if source is None or isinstance(source, Route) else source.route()
+
+    @cached_property
+    def instructions(self) -> tuple[Instruction, ...]:
+        """What a person does along the path; none without a path, and on a map without rooms."""
+        source = self.instruction_source
+        return source if isinstance(source, tuple) else source.instructions()
+
+    def words(self, language: str = "en") -> list[str]:
+        """Return a description of the path for a person, as `Tour.words`; no lines without a path,
+        and on a map without rooms."""
+        return sentences(self.instructions, language)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with what is found on demand, so that copies hold no map."""
+        found = {"route", "instructions"}
+        state = {name: value for name, value in vars(self).items() if name not in found}
+        return state | {"route_source": self.route, "instruction_source": self.instructions}
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a path."""
+        return self.status is PlanStatus.SOLVED
+
+    @property
+    def cost(self) -> float:
+        """Cost in the metric, metres; infinite where there is no path to the goal."""
+        if self.path is None or not self.solved:
+            return math.inf
+        return self.path.length_m if self.weighted_cost is None else self.weighted_cost
+
+    @property
+    def gap(self) -> float:
+        """Proved distance from the optimum, cost / lower bound - 1; NaN where there is no path."""
+        if self.path is None or not self.solved:
+            return math.nan
+        return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
+
+    @property
+    def grid_gap(self) -> float:
+        """Proved distance from the cheapest path of cells, cost / `grid_bound` - 1, below 0 for a
+        cheaper path; NaN without that bound."""
+        if self.grid_bound is None or not self.solved:
+            return math.nan
+        return self.cost / self.grid_bound - 1 if self.grid_bound > 0 else 0.0
+
+    def raise_for_status(self) -> Self:
+        """Return the result itself if it is solved.
+
+        Raises
+        ------
+        PlanError
+            When the result is not solved; the text names the status.
+        """
+        if not self.solved:
+            raise PlanError(f"no path was planned: {self.status}")
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for strict JSON, under the names of the attributes.
+
+        Infinite or missing values are None. If the path has no headings, `headings_rad` holds the
+        direction of travel at each point.
+        """
+        return {
+            "status": str(self.status),
+            "metric": self.metric,
+            "start": None if self.start is None else list(self.start),
+            "goal": None if self.goal is None else list(self.goal),
+            "length_m": self.path.length_m if self.path else None,
+            "cost": self.cost if self.solved else None,
+            "lower_bound": self.lower_bound if self.solved else None,
+            "gap": self.gap if self.solved else None,
+            "grid_bound": self.grid_bound,
+            "grid_gap": self.grid_gap if self.grid_bound is not None else None,
+            "places": list(self.route.places) if self.route else None,
+            "arcs": list(self.route.arcs) if self.route else None,
+            "points": np.round(self.path.points, 6).tolist() if self.path else None,
+            "headings_rad": np.round(self.path.headings_at_points, 6).tolist()
+            if self.path
+            else None,
+            "steps": list(self.refinement.steps) if self.refinement else None,
+            "expanded": self.stats.expanded,
+            "expanded_places": self.stats.expanded_places,
+            "expanded_border_cells": self.stats.expanded_border_cells,
+            "expanded_intervals": self.stats.expanded_intervals,
+            "corridor_cells": self.stats.corridor_cells,
+            "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
+            "settings": _finite(self.settings),
+        }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,12 @@
+from .client import (
+    Query as Query,
+    Reply as Reply,
+    Search as Search,
+    Setup as Setup,
+    Worker as Worker,
+    require_ompl as require_ompl,
+)
+from .problem import Clearance as Clearance
+from .settings import OmplSettings as OmplSettings
+
+__all__: list[str]

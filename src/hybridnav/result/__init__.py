@@ -1,8 +1,0 @@
-"""Results of a planner: what was planned, and the path.
-
-Names load on first use.
-"""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,394 @@
+"""Kernels that contract a graph of corners into a hierarchy.
+
+R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. Corners are
+removed one by one. A shortcut is added between two neighbours of a removed corner if the path
+through it may be the only shortest one.
+
+The arcs from one corner are adjacent in a pool, int64 (n, 3): the cost; the head and the classes at
+both endpoints (see `pack`); the middle, which is the corner that a shortcut leads past or -1, and
+the number of legs. Each arc comes with its reverse.
+
+A *class* groups arcs by the way they leave a corner, and a table states which two classes a
+shortest path may join there: a bend to the wrong side is never on one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import pop, push
+
+SLACK = 6000
+"""Delay with which a corner may still be contracted, in thousandths of a level. With 0 there are 3
+% fewer shortcuts, in twice the time."""
+_UNKNOWN = -(1 << 40)
+_MOST_ARCS = 1 << 16
+"""Most arcs from a corner, whose positions have 16 bits, see `contract`."""
+HEAD_SHIFT = 12
+"""Bits of the two classes of an arc, see `pack`."""
+
+
+@njit(cache=True, nogil=True)
+def pack(head, near, far):
+    """Return an arc's head, its class at its tail, and its class at its head, in one number.
+
+    Classes are below 64 and describe how the arc leads away from the corner.
+    """
+    return head << HEAD_SHIFT | near << 6 | far
+
+
+@njit(cache=True, nogil=True)
+def have_reverses(first, heads):
+    """Return whether each arc of a graph occurs once, and once in the other direction.
+
+    Parameters
+    ----------
+    first, heads
+        Offsets of the arcs of each corner, and the corner at which each arc ends.
+    """
+    n = first.size - 1
+    begin = np.zeros(n + 1, np.int64)
+    for arc in range(heads.size):
+        begin[heads[arc] + 1] += 1
+    for node in range(n):
+        begin[node + 1] += begin[node]
+    tails, at = np.empty(heads.size, np.int64), begin.copy()
+    for node in range(n):
+        for arc in range(first[node], first[node + 1]):
+            tails[at[heads[arc]]] = node
+            at[heads[arc]] += 1
+    seen = np.full(n, -1, np.int64)
+    for node in range(n):
+        for arc in range(first[node], first[node + 1]):
+            if seen[heads[arc]] == node:
+                return False
+            seen[heads[arc]] = node
+        if begin[node + 1] - begin[node] != first[node + 1] - first[node]:
+            return False
+        for arc in range(begin[node], begin[node + 1]):
+            if seen[tails[arc]] != node:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _pool_of(first, arcs):
+    """Return a pool of the arcs of a graph, with room for more.
+
+    The result holds begin, size and room of each corner's part, the pool, and the used number of
+    its rows.
+    """
+    n = first.size - 1
+    begin, size, room = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
+    pool = np.empty((2 * arcs.shape[0] + 4 * n, 3), np.int64)
+    used = 0
+    for node in range(n):
+        begin[node], size[node] = used, first[node + 1] - first[node]
+        for k in range(size[node]):
+            arc = first[node] + k
+            pool[used + k, 0], pool[used + k, 1] = arcs[arc, 0], arcs[arc, 1]
+            pool[used + k, 2] = -1 << 32 | 1
+        room[node] = size[node] + 2
+        used += room[node]
+    return begin, size, room, pool, used
+
+
+@njit(cache=True, nogil=True)
+def _search(graph, node, source, limit, n_wanted, stamp, work):
+    """Search for paths from a neighbour of a corner that avoid the corner (witness search).
+
+    Parameters
+    ----------
+    graph
+        Begin and size of parts of the pool, the pool, kinds of corners, classes that may follow:
+        see `contract`.
+    node
+        The corner that paths must avoid.
+    source
+        The neighbour.
+    limit
+        Greatest cost of a path.
+    n_wanted
+        Number of corners whose record has the stamp in column 2: the search ends when it has
+        settled them.
+    stamp
+        Number of this search.
+    work
+        Records, int64 (n, 3): distance, stamp and class of the path back, stamp of the wanted
+        corners; a heap; the most corners to settle. The heap has room for that number times the
+        greatest number of arcs from a corner.
+    """
+    begin, size, pool, kinds, follow = graph
+    records, heap, most_settled = work
+    records[node, 0], records[node, 1] = -1, stamp << 8
+    records[source, 0], records[source, 1] = 0, stamp << 8 | 255
+    heap[0, 0], heap[0, 1] = 0, source
+    waiting, settled = 1, 0
+    while waiting > 0 and settled < most_settled and n_wanted > 0:
+        cost = heap[0, 0]
+        at = pop(heap, waiting)
+        waiting -= 1
+        if cost != records[at, 0]:
+            continue
+        settled += 1
+        n_wanted -= records[at, 2] == stamp
+        last = records[at, 1] & 255
+        may_follow = np.int64(-1) if last == 255 else follow[kinds[at], last]
+        for arc in range(begin[at], begin[at] + size[at]):
+            packed = pool[arc, 1]
+            further = cost + pool[arc, 0]
+            if further > limit or may_follow >> (packed >> 6 & 63) & 1 == 0:
+                continue
+            there = packed >> HEAD_SHIFT
+            if records[there, 1] >> 8 != stamp or further < records[there, 0]:
+                records[there, 0], records[there, 1] = further, stamp << 8 | packed & 63
+                push(heap, waiting, further, there)
+                waiting += 1
+
+
+@njit(cache=True, nogil=True)
+def _shortcuts(graph, node, stamp, work, pairs):
+    """Find the shortcuts that the removal of a corner needs.
+
+    Parameters
+    ----------
+    graph, work
+        See `_search`.
+    node
+        The corner.
+    stamp
+        Number of the last search.
+    pairs
+        int64 (n, 2), room for all pairs of arcs from the corner; filled with the pairs that a
+        shortcut joins.
+
+    Returns
+    -------
+    tuple
+        Number of shortcuts, number of legs in them, stamp of the last search.
+    """
+    begin, size, pool, kinds, follow = graph
+    records = work[0]
+    n_pairs = n_legs = 0
+    end = begin[node] + size[node]
+    for one in range(begin[node], end - 1):
+        cost, packed = pool[one, 0], pool[one, 1]
+        may_follow = follow[kinds[node], packed >> 6 & 63]
+        stamp += 1
+        n_wanted, limit = 0, np.int64(0)
+        for two in range(one + 1, end):
+            if may_follow >> (pool[two, 1] >> 6 & 63) & 1:
+                records[pool[two, 1] >> HEAD_SHIFT, 2] = stamp
+                limit = max(limit, cost + pool[two, 0])
+                n_wanted += 1
+        if n_wanted == 0:
+            continue
+        _search(graph, node, packed >> HEAD_SHIFT, limit, n_wanted, stamp, work)
+        for two in range(one + 1, end):
+            if may_follow >> (pool[two, 1] >> 6 & 63) & 1 == 0:
+                continue
+            there = pool[two, 1] >> HEAD_SHIFT
+            if records[there, 1] >> 8 != stamp or records[there, 0] > cost + pool[two, 0]:
+                pairs[n_pairs, 0], pairs[n_pairs, 1] = one, two
+                n_pairs += 1
+                n_legs += (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
+    return n_pairs, n_legs, stamp
+
+
+@njit(cache=True, nogil=True)
+def _take_out(begin, size, pool, node):
+    """Remove the arcs to a corner from the parts of its neighbours."""
+    for arc in range(begin[node], begin[node] + size[node]):
+        other = pool[arc, 1] >> HEAD_SHIFT
+        last = begin[other] + size[other] - 1
+        for at in range(begin[other], last + 1):
+            if pool[at, 1] >> HEAD_SHIFT == node:
+                for k in range(3):
+                    pool[at, k] = pool[last, k]
+                size[other] -= 1
+                break
+
+
+@njit(cache=True, nogil=True)
+def _put_in(parts, pool, used, tail, arc):
+    """Put an arc into a corner's part of the pool, or improve the one that has its head.
+
+    Return the pool, a new one if there was no room, and the used number of its rows.
+    """
+    begin, size, room = parts
+    cost, packed, past = arc
+    for at in range(begin[tail], begin[tail] + size[tail]):
+        if pool[at, 1] >> HEAD_SHIFT == packed >> HEAD_SHIFT:
+            if cost < pool[at, 0]:
+                pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
+            return pool, used
+    if size[tail] == room[tail]:
+        room[tail] = 2 * size[tail] + 2
+        while used + room[tail] > pool.shape[0]:
+            larger = np.empty((2 * pool.shape[0], 3), np.int64)
+            larger[:used] = pool[:used]
+            pool = larger
+        pool[used : used + size[tail]] = pool[begin[tail] : begin[tail] + size[tail]]
+        begin[tail] = used
+        used += room[tail]
+    at = begin[tail] + size[tail]
+    pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
+    size[tail] += 1
+    return pool, used
+
+
+@njit(cache=True, nogil=True)
+def _packed_arcs(begin, size, pool):
+    """Return the arcs left in the pool, packed.
+
+    The result holds the offsets of each corner's arcs, their costs and heads, and their middles
+    (see `contract`).
+    """
+    n = begin.size
+    first = np.zeros(n + 1, np.int32)
+    for node in range(n):
+        first[node + 1] = first[node] + size[node]
+    arcs, middles = np.empty((first[n], 2), np.int64), np.full(first[n], np.int64(-1))
+    for node in range(n):
+        for k in range(size[node]):
+            arc = pool[begin[node] + k]
+            arcs[first[node] + k, 0], arcs[first[node] + k, 1] = arc[0], arc[1]
+            middle = arc[2] >> 32
+            if middle >= 0:
+                to_tail = to_head = np.int64(0)
+                for at in range(size[middle]):
+                    other = pool[begin[middle] + at, 1] >> HEAD_SHIFT
+                    to_tail = at if other == node else to_tail
+                    to_head = at if other == arc[1] >> HEAD_SHIFT else to_head
+                middles[first[node] + k] = middle << 32 | to_tail << 16 | to_head
+    return first, arcs, middles
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def contract(kinds, first, arcs, follow, effort):
+    """Contract all corners of a graph, first those that leave few and short shortcuts.
+
+    Parameters
+    ----------
+    kinds
+        uint8 (n,), kinds of corners.
+    first, arcs
+        The graph: offsets of the arcs of each corner; int64 (m, 2), the cost of each, and the
+        result of `pack`. Each arc comes with its reverse; a graph with one that does not is given
+        up at once.
+    follow
+        int64 (kinds, classes): bit c is set where a shortest path that passes a corner of this kind
+        along an arc of the one class may continue along one of class c. If the bit is not set, the
+        two must cost more than another path, by more than the rounding of costs.
+    effort
+        Most corners that a witness search settles; most arcs to examine before contraction is given
+        up, as it also is for a corner with more than `_MOST_ARCS` arcs.
+
+    Returns
+    -------
+    tuple
+        int32 (n + 1,), where the arcs of each corner to those contracted after it begin; int64 (u,
+        2), these arcs; int64 (u,), the corner that each leads past, in the high half, and the
+        positions among its arcs of those to the tail and to the head, 16 bits each, -1 for an arc
+        of the graph; int32 (n,), the corners in the order of their removal. If contraction is given
+        up, there are no arcs.
+    """
+    n = first.size - 1
+    most_settled, most_looked = effort
+    begin, size, room, pool, used = _pool_of(first, arcs)
+    level, taken = np.zeros(n, np.int64), np.empty(n, np.int32)
+    queue = np.empty((n, 2), np.int64)
+    most = np.int64(1)
+    for node in range(n):
+        push(queue, node, _UNKNOWN + size[node], node)
+        most = max(most, size[node])
+    records = np.zeros((n, 3), np.int64)
+    heap = np.empty((most_settled * most + 1, 2), np.int64)
+    pairs = np.empty((most, 2), np.int64)
+    stamp = looked = np.int64(0)
+    waiting = n
+    is_given_up = not have_reverses(first, arcs[:, 1] >> HEAD_SHIFT)
+    while waiting > 0:
+        node = pop(queue, waiting)
+        waiting -= 1
+        legs = np.int64(0)
+        for arc in range(begin[node], begin[node] + size[node]):
+            legs += pool[arc, 2] & 0xFFFFFFFF
+            looked += size[node] + most_settled * size[pool[arc, 1] >> HEAD_SHIFT]
+        if is_given_up or looked > most_looked or size[node] > _MOST_ARCS:
+            size[:] = 0
+            return *_packed_arcs(begin, size, pool), taken
+        if most_settled * most >= heap.shape[0]:
+            heap = np.empty((2 * most_settled * most + 1, 2), np.int64)
+        if size[node] * size[node] > pairs.shape[0]:
+            pairs = np.empty((2 * size[node] * size[node], 2), np.int64)
+        graph, work = (begin, size, pool, kinds, follow), (records, heap, most_settled)
+        n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, pairs)
+        key = 1000 * level[node]
+        if size[node] > 0:
+            key += 1000 * n_pairs // size[node] + 1000 * n_legs // legs
+        if waiting > 0 and key > queue[0, 0] + SLACK:
+            push(queue, waiting, key, node)
+            waiting += 1
+            continue
+        taken[n - waiting - 1] = node
+        _take_out(begin, size, pool, node)
+        for arc in range(begin[node], begin[node] + size[node]):
+            other = pool[arc, 1] >> HEAD_SHIFT
+            level[other] = max(level[other], level[node] + 1)
+        for i in range(n_pairs):
+            one, two = pairs[i, 0], pairs[i, 1]
+            cost = pool[one, 0] + pool[two, 0]
+            past = node << 32 | (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
+            for there, back in ((one, two), (two, one)):
+                tail, head = pool[there, 1] >> HEAD_SHIFT, pool[back, 1] >> HEAD_SHIFT
+                packed = pack(head, pool[there, 1] & 63, pool[back, 1] & 63)
+                arc = cost, packed, past
+                pool, used = _put_in((begin, size, room), pool, used, tail, arc)
+                most = max(most, size[tail])
+    return *_packed_arcs(begin, size, pool), taken
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def renumbered(first, arcs, middles, order):
+    """Renumber the corners of a hierarchy.
+
+    Every search climbs to the corners that were removed last: if these have the first numbers, so
+    that their arcs are adjacent, they stay in the processor's cache.
+
+    Parameters
+    ----------
+    first, arcs, middles
+        Results of `contract`.
+    order
+        int32 (n,), the new number of each corner.
+
+    Returns
+    -------
+    tuple
+        The three arrays in the new order.
+    """
+    n = order.size
+    new_first = np.zeros(n + 1, np.int32)
+    for node in range(n):
+        new_first[order[node] + 1] = first[node + 1] - first[node]
+    for node in range(n):
+        new_first[node + 1] += new_first[node]
+    new_arcs, new_middles = np.empty_like(arcs), np.empty_like(middles)
+    for node in range(n):
+        at = new_first[order[node]]
+        for arc in range(first[node], first[node + 1]):
+            packed = arcs[arc, 1]
+            new_arcs[at, 0] = arcs[arc, 0]
+            new_arcs[at, 1] = pack(
+                np.int64(order[packed >> HEAD_SHIFT]), packed >> 6 & 63, packed & 63
+            )
+            past = middles[arc]
+            if past >= 0:
+                past = np.int64(order[past >> 32]) << 32 | past & 0xFFFFFFFF
+            new_middles[at] = past
+            at += 1
+    return new_first, new_arcs, new_middles

@@ -1,0 +1,12 @@
+from .build import ConvexMesh as ConvexMesh, build_mesh as build_mesh
+from .corner_graph import CornerGraph as CornerGraph, CornerHierarchy as CornerHierarchy
+from .cut import (
+    DetourSearch as DetourSearch,
+    MeshPaths as MeshPaths,
+    renew_mesh as renew_mesh,
+    shortest_paths as shortest_paths,
+)
+from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
+from .trace import SearchTrace as SearchTrace, trace_search as trace_search
+
+__all__: list[str]

@@ -1,0 +1,388 @@
+"""A convex mesh of changed cells: only the polygons beside them are cut anew."""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
+from hybridnav.search.mesh.kernels import closures as kernels
+from hybridnav.search.mesh.kernels import corners as _corner_kernels
+from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
+from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
+from hybridnav.search.mesh.kernels.polyanya import WORK_FULL
+from hybridnav.search.mesh.kernels.queries import ANSWERS_FULL, many
+from hybridnav.search.mesh.search import NO_LIMIT, SURE, MeshPath, MeshSearch, rounded_into
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+
+
+# Shortest any-angle paths between many pairs, on all cores.
+
+_ROOM = 16
+"""Initial room for positions, per path."""
+_LEAST = 64
+"""Least number of queries that justifies a thread."""
+_MANY = 1000
+"""Least number of queries that justifies the graph of corners."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPaths:
+    """The shortest paths of many queries, arrays of n."""
+
+    length_cells: FloatArray
+    """float64 (n,), infinite where there is no path."""
+    lower_bound_cells: FloatArray
+    """float64 (n,)."""
+    path_start: LongArray
+    """int64 (n + 1,), offsets of the positions of each path."""
+    positions: FloatArray
+    """float64 (m, 2), (row, col) in grid units, of all paths."""
+
+
+def shortest_paths(
+    search: MeshSearch,
+    cells: tuple[LongArray, LongArray],
+    positions: tuple[FloatArray, FloatArray],
+    *,
+    epsilon: float = 0.0,
+) -> MeshPaths:
+    """Find a shortest path for each of many pairs, as `MeshSearch.path` does.
+
+    Parameters
+    ----------
+    search
+        The search of the map.
+    cells
+        int64 (n, 2), the free cells (row, col) of the starts, and of the goals.
+    positions
+        float64 (n, 2), starts and goals, (row, col) in grid units, in the closed squares of these
+        cells.
+    epsilon
+        As for `MeshSearch.path`.
+
+    Returns
+    -------
+    MeshPaths
+        The paths in the order of the pairs.
+
+    Examples
+    --------
+    >>> from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
+    >>> search = MeshSearch(build_mesh(np.ones((3, 4), dtype=bool)))
+    >>> starts, goals = np.array([[0, 0], [0, 0]]), np.array([[0, 3], [2, 0]])
+    >>> shortest_paths(search, (starts, goals), (starts + 0.5, goals + 0.5)).length_cells
+    array([3., 2.])
+    """
+    where = np.concatenate(cells, axis=1)
+    endpoints = np.concatenate(
+        [rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1
+    )
+    endpoints = np.ascontiguousarray(endpoints[:, [1, 0, 3, 2]])
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    n_parts = max(1, min(cores or 1, len(where) // _LEAST))
+    parts = np.array_split(np.arange(len(where)), n_parts)
+
+    def answer(part: LongArray) -> MeshPaths:
+        return _one_by_one(search, where[part], endpoints[part], epsilon)
+
+    if len(where) >= _MANY:
+        search.prepare()
+    if n_parts == 1:
+        return answer(parts[0])
+    with ThreadPoolExecutor(n_parts) as pool:
+        found = list(pool.map(answer, parts))
+    before = np.cumsum([0, *(len(of.positions) for of in found)])
+    starts = [of.path_start[:-1] + base for of, base in zip(found, before, strict=False)]
+    return MeshPaths(
+        np.concatenate([of.length_cells for of in found]),
+        np.concatenate([of.lower_bound_cells for of in found]),
+        np.concatenate([*starts, before[-1:]]),
+        np.concatenate([of.positions for of in found]),
+    )
+
+
+def _one_by_one(
+    search: MeshSearch, where: LongArray, endpoints: FloatArray, epsilon: float
+) -> MeshPaths:
+    """Return the answers of one thread; arrays are doubled until they are large enough."""
+    count = len(where)
+    length, bound = np.empty(count), np.empty(count)
+    starts = np.zeros(count + 1, dtype=np.int64)
+    positions = np.empty((_ROOM * max(count, 4), 2))
+    effort = math.inf, 1.0 + epsilon, NO_LIMIT
+    mesh, graph = search.mesh, search.graph
+    place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
+    arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
+    at = n = 0
+    with (search.works if graph is None else search.corner_works).lent() as work:
+        while at < count:
+            rest = place, asked, work.arrays, work.bounds, effort
+            found = (length, bound, starts, positions), at, n
+            at, n, short = many(search.arrays, arrays, *rest, *found)
+            if short == WORK_FULL:
+                work.make_room()
+            elif short == ANSWERS_FULL:
+                positions = np.concatenate([positions, np.empty_like(positions)])
+    bound = np.where(bound >= length, length, bound * SURE)
+    return MeshPaths(length, bound, starts, positions[:n])
+
+
+def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
+    """Return the mesh of free cells of which some have changed.
+
+    The polygons that share a point with a closed cell, or with a cell beside a freed one, are
+    triangulated and merged again together with the freed cells; all others stay, with their
+    numbers. Only the blocks are always found again.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the free cells before; unchanged.
+    free
+        bool (rows, cols), the free cells now.
+    changed
+        int64 (m,), flat cells that were free and are not, or are free and were not.
+
+    Returns
+    -------
+    ConvexMesh
+        The polygons that were removed stay as walled-in ones, with -1 as their `component`; those
+        in their place come last. `polygon_at` is that of `mesh`: a search looks for cells of
+        removed polygons, and for freed ones, among the last polygons. The mesh itself if nothing
+        has changed.
+
+    Examples
+    --------
+    >>> from hybridnav.search.mesh import build_mesh, renew_mesh
+    >>> free = np.ones((3, 4), dtype=bool)
+    >>> free[1, 2] = False
+    >>> mesh = build_mesh(free)
+    >>> free[1, 2] = True
+    >>> renewed = renew_mesh(mesh, free, np.array([6]))
+    >>> mesh.n_polygons, int((renewed.component >= 0).sum())
+    (4, 1)
+    """
+    if not len(changed):
+        return mesh
+    freed, beside = _corner_kernels.freed_cells(free, changed)
+    sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
+    looked = np.concatenate([changed[~free.ravel()[changed]], beside])
+    place = mesh.polygon_at, mesh.component
+    is_cut, cut = _corner_kernels.touched_polygons(mesh.corners, sides, place, looked)
+    hole = _Hole(cut, _corner_kernels.doors_of(sides, is_cut, cut), freed)
+    slots = np.concatenate(
+        [np.empty(0, np.int64), *(np.arange(*mesh.first[number : number + 2]) for number in cut)]
+    )
+    vertices = _vertices_of(mesh, slots, free, changed)
+    anew = _polygons_in(mesh, hole, vertices, free)
+    polygons = _with_hole_filled(mesh, hole, slots, anew)
+    blocks = blocks_of(polygons[0], *polygons[2:])
+    is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
+    is_gone[cut] = True
+    blocks[3][is_gone] = -1  # without a component
+    arrays = (vertices.corners, vertices.kinds, *polygons, mesh.polygon_at, *blocks)
+    for array in arrays:
+        array.flags.writeable = False
+    return ConvexMesh(*arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class _Hole:
+    """Polygons that are removed, their slots that lead to others, and freed cells."""
+
+    polygons: IntArray
+    doors: LongArray
+    freed: LongArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Vertices:
+    """Vertices of the polygons in a hole, and all corners of the mesh with their kinds, new ones
+    last.
+
+    The vertices are flat lattice points, sorted, with their corners.
+    """
+
+    points: LongArray
+    number_of: IntArray
+    corners: IntArray
+    kinds: ByteArray
+
+
+def _vertices_of(
+    mesh: ConvexMesh, slots: LongArray, free: BoolArray, changed: LongArray
+) -> _Vertices:
+    """Return the corners in a hole: those at which walls turn now, as in a fresh mesh.
+
+    Points at changed cells where walls have begun to run straight on are left out. No other polygon
+    has them: all free cells round them belong to the hole.
+    """
+    wide = free.shape[1] + 1
+    at, kinds_at = _corner_kernels.corners_of_cells(free, changed)
+    turns = kinds_at != NO_CORNER
+    old = np.unique(mesh.begins[slots])
+    known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
+    is_straight = np.isin(known, at[~turns])
+    made = np.setdiff1d(at[turns], known)
+    points = np.concatenate([known[~is_straight], made])
+    number_of = np.concatenate([old[~is_straight], len(mesh.corners) + np.arange(len(made))])
+    order = np.argsort(points, kind="stable")
+    points, number_of = points[order], number_of[order].astype(np.int32)
+    corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
+    kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
+    kinds[old[is_straight]] = MANY
+    kinds[number_of[np.searchsorted(points, at[turns])]] = kinds_at[turns]
+    return _Vertices(points, number_of, corners.astype(np.int32), kinds)
+
+
+def _polygons_in(
+    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Fill a hole; return first slots, corners, twins and polygons of slots of the new polygons."""
+    ends = np.stack([mesh.begins[hole.doors], mesh.finishes[hole.doors]], axis=1)
+    around = mesh.corners[ends] @ np.array([free.shape[1] + 1, 1], dtype=np.int64)
+    doors = np.searchsorted(vertices.points, around)
+    walls = np.concatenate([doors, _corner_kernels.walls_between(free, vertices.points)])
+    local = vertices.corners[vertices.number_of]
+    triangles, neighbours = triangulate(local, walls)
+    kept = are_free(local, triangles, free)
+    triples = local[triangles[kept]].sum(axis=1, dtype=np.int64)
+    inside = _corner_kernels.are_inside(
+        mesh.corners, mesh.first, mesh.begins, hole.polygons, triples
+    )
+    middles = triples // 3 @ np.array([free.shape[1], 1])
+    kept[kept] = inside | np.isin(middles, hole.freed)
+    first, begins, twins, polygon_of = merge_triangles(
+        local, *select_triangles(triangles, neighbours, kept)
+    )
+    return first, vertices.number_of[begins], twins, polygon_of
+
+
+def _with_hole_filled(
+    mesh: ConvexMesh,
+    hole: _Hole,
+    slots: LongArray,
+    anew: tuple[IntArray, IntArray, IntArray, IntArray],
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Return the polygons of a mesh, those in a hole last; the removed ones are walled in."""
+    first, begins, twins, polygon_of = anew
+    n_slots = len(mesh.begins)
+    all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])
+    all_twins[slots] = -1
+    behind, before = _joined(mesh, hole.doors, (first, begins, twins))
+    all_twins[behind], all_twins[n_slots + before] = n_slots + before, behind
+    return (
+        np.concatenate([mesh.first, n_slots + first[1:]]),
+        np.concatenate([mesh.begins, begins]),
+        all_twins.astype(np.int32),
+        np.concatenate([mesh.polygon_of, mesh.n_polygons + polygon_of]).astype(np.int32),
+    )
+
+
+def _joined(
+    mesh: ConvexMesh, doors: LongArray, anew: tuple[IntArray, IntArray, IntArray]
+) -> tuple[IntArray, LongArray]:
+    """Return the slots of the rest of a mesh, and the slots of new polygons that replace their
+    twins."""
+    first, begins, twins = anew
+    after = np.arange(1, len(begins) + 1)
+    after[first[1:] - 1] = first[:-1]
+    rim = np.flatnonzero(twins < 0)
+    n = np.int64(len(mesh.corners) + len(begins))
+    keys = begins[rim] * n + begins[after[rim]]
+    # The slot on the far side of a door runs the other way.
+    beyond = mesh.twins[doors]
+    wanted = mesh.finishes[beyond] * n + mesh.begins[beyond]
+    order = np.argsort(keys, kind="stable")
+    place = np.searchsorted(keys, wanted, sorter=order)
+    return beyond, rim[order[place]].astype(np.int64)
+
+
+# Shortest any-angle paths round closed cells.
+
+Cell = tuple[int, int]
+Position = tuple[float, float]
+
+
+@copies_alike
+class DetourSearch:
+    """Exact shortest any-angle paths round closed cells; threads may share it.
+
+    The closed cells are cut out of the mesh, by the first query that needs it.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the map with these cells open.
+    free
+        bool (rows, cols), its free cells.
+    closed
+        int64 (m,), flat cells that are closed, sorted, each once; those that are not free change
+        nothing.
+
+    Examples
+    --------
+    >>> from hybridnav.search.mesh import DetourSearch, build_mesh
+    >>> free = np.ones((3, 5), dtype=bool)
+    >>> detour = DetourSearch(build_mesh(free), free, np.array([2, 7]))
+    >>> detour.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
+    array([[0.5, 0.5],
+           [2. , 2. ],
+           [2. , 3. ],
+           [0.5, 4.5]])
+    """
+
+    def __init__(self, mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> None:
+        self._mesh, self._free = mesh, free
+        self._closed = closed[free.ravel()[closed]]
+        self._closure = kernels.closure_of(self._closed, free.shape[1])
+        self._search: MeshSearch | None = None
+
+    def is_met_by(self, path: MeshPath) -> bool:
+        """Return whether a shortest path between open cells is illegal with these cells closed.
+
+        The result is also True if the path alone does not decide: if an end of it, or a bend, is a
+        corner of a closed cell.
+
+        Parameters
+        ----------
+        path
+            A path of the search with these cells open, between ends that stay open.
+        """
+        if path.positions is None:
+            return False
+        return bool(kernels.path_crosses(self._closure, self._free, path.positions))
+
+    def are_met_by(self, paths: MeshPaths) -> BoolArray:
+        """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
+        along = paths.positions, paths.path_start
+        met: BoolArray = kernels.paths_cross(self._closure, self._free, *along)
+        return met
+
+    def path(
+        self,
+        cells: tuple[Cell, Cell],
+        positions: tuple[Position, Position],
+        *,
+        epsilon: float = 0.0,
+        budget_s: float | None = None,
+    ) -> MeshPath:
+        """Find a shortest path between two positions, as `MeshSearch.path` does."""
+        until = math.inf if budget_s is None else perf_counter() + budget_s
+        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
+        if self._search is None:
+            free = self._free.copy()
+            free.ravel()[self._closed] = False
+            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
+        left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
+        return self._search.path(cells, positions, epsilon=epsilon, budget_s=left_s)

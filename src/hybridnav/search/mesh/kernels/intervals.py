@@ -1,0 +1,294 @@
+"""Kernels of intervals: the part of a side seen from a root, and the intervals behind it.
+
+Points are x = column, y = row in grid units: corners are whole numbers, the two endpoints of a
+query are rounded to 2^-24 of a cell, so that every side test is exact (see `turn_of`). An interval
+on a side is never computed: it is the part of the side between two rays from its root. A ray is the
+root and a corner that limits the view, or the mirror image of a root in a corner.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybridnav._base.exact import turn_of
+from hybridnav._base.jit import njit
+
+# Columns of a node's whole numbers.
+SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3
+# Bits of ENDS: the interval ends at the left, at the right corner of its side. Below zero the root
+# is an end of its side, and the path also bends at corner -1 - ENDS on its way to the root.
+_LEFT, _RIGHT = 1, 2
+WHOLE_SIDE = _LEFT | _RIGHT
+# Columns of a node's reals: cost of the root, points on the rays.
+G, _LX, _LY, _RX, _RY = 0, 1, 2, 3, 4
+# Indices in `mesh`, the arrays of a mesh.
+_CX, _CY, _KINDS, _FIRST, _BEGINS, _STOPS, _TWINS, _POLYGON_OF = 0, 1, 2, 3, 4, 5, 6, 7
+
+
+@njit(cache=True, nogil=True)
+def turns(kind, dx, dy, hand):
+    """Return whether a path may bend round a corner to a hand, 1 for the left.
+
+    The path arrives in the direction (dx, dy); the one blocked cell of the corner must lie on that
+    hand.
+    """
+    if kind >= 4:
+        return False
+    ex = 1.0 if kind & 1 else -1.0
+    ey = 1.0 if kind & 2 else -1.0
+    return dx * ey * hand >= 0.0 and -dy * ex * hand >= 0.0
+
+
+@njit(cache=True, nogil=True)
+def _cut(px, py, qx, qy, ax, ay, bx, by):
+    """Return where the line from p through q meets the line from a to b, rounded: for estimates
+    only.
+
+    Parameters
+    ----------
+    px, py, qx, qy
+        Two points of the first line, in cells.
+    ax, ay, bx, by
+        Ends of the second.
+    """
+    ux, uy = qx - px, qy - py
+    vx, vy = bx - ax, by - ay
+    cross = ux * vy - uy * vx
+    if cross == 0.0:
+        return ax, ay
+    share = ((px - ax) * uy - (py - ay) * ux) / -cross
+    share = min(max(share, 0.0), 1.0)
+    return ax + share * vx, ay + share * vy
+
+
+@njit(cache=True, nogil=True)
+def estimate(x, y, lx, ly, rx, ry, tx, ty):
+    """Return the length of the shortest path from a root through an interval to the goal.
+
+    Parameters
+    ----------
+    x, y
+        The root, in cells.
+    lx, ly, rx, ry
+        Left and right end of the interval.
+    tx, ty
+        The goal.
+    """
+    # The goal on the near side is seen in the mirror of the side.
+    vx, vy = lx - rx, ly - ry
+    near = vx * (y - ry) - vy * (x - rx)
+    far = vx * (ty - ry) - vy * (tx - rx)
+    if near * far > 0.0:
+        share = 2.0 * far / (vx * vx + vy * vy)
+        tx, ty = tx + share * vy, ty - share * vx
+    if (lx - x) * (ty - y) - (ly - y) * (tx - x) > 0.0:
+        return math.hypot(lx - x, ly - y) + math.hypot(tx - lx, ty - ly)
+    if (rx - x) * (ty - y) - (ry - y) * (tx - x) < 0.0:
+        return math.hypot(rx - x, ry - y) + math.hypot(tx - rx, ty - ry)
+    return math.hypot(tx - x, ty - y)
+
+
+@njit(cache=True, nogil=True)
+def estimate_of(mesh, endpoints, whole, real, node):
+    """Return the estimate of the rest of a path from a node's root."""
+    cx, cy = mesh[_CX], mesh[_CY]
+    sx, sy, tx, ty = endpoints
+    slot, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
+    x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
+    a, b = mesh[_BEGINS][slot], mesh[_STOPS][slot]
+    if root in (a, b):
+        return math.hypot(tx - x, ty - y)
+    lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
+    if not marks & _LEFT:
+        lx, ly = _cut(x, y, lx, ly, cx[a], cy[a], cx[b], cy[b])
+    if not marks & _RIGHT:
+        rx, ry = _cut(x, y, rx, ry, cx[a], cy[a], cx[b], cy[b])
+    return estimate(x, y, lx, ly, rx, ry, tx, ty)
+
+
+@njit(cache=True, nogil=True)
+def put(nodes, n, slot, root, parent, marks, g, lx, ly, rx, ry):
+    """Write node n and return the number of nodes.
+
+    Parameters
+    ----------
+    nodes
+        int32 (m, 4) and float64 (m, 5); the other arguments are their columns.
+    n
+        Number of nodes before.
+    slot, root, parent, marks
+        Slot of the node's side, corner number of its root, node before, and `ENDS`.
+    g
+        Cost of the root, in cells.
+    lx, ly, rx, ry
+        Points on the left and right ray, in cells.
+    """
+    whole, real = nodes
+    whole[n, SLOT], whole[n, ROOT], whole[n, PARENT], whole[n, ENDS] = slot, root, parent, marks
+    real[n, G] = g
+    real[n, _LX], real[n, _LY], real[n, _RX], real[n, _RY] = lx, ly, rx, ry
+    return n + 1
+
+
+@njit(cache=True, nogil=True)
+def _put_goal(nodes, n, root, parent, length):
+    """Write a node for the goal, reached from a root."""
+    return put(nodes, n, -1, root, parent, 0, length, 0.0, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def along(mesh, x, y, u, w):
+    """Return the end of a side nearer to a point on its line, and the hand to which a path bends
+    there.
+
+    A path that continues behind the side bends to the right at its right end.
+    """
+    cx, cy = mesh[_CX], mesh[_CY]
+    from_u = abs(cx[u] - x) + abs(cy[u] - y)
+    from_w = abs(cx[w] - x) + abs(cy[w] - y)
+    return (u, -1) if from_u < from_w else (w, 1)
+
+
+@njit(cache=True, nogil=True)
+def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
+    """Write the successors of a node and return the number of nodes.
+
+    Parameters
+    ----------
+    mesh
+        float64 x and y of corners, uint8 kinds, int32 first, begins, finishes, twins, polygon_of.
+    blocks
+        int32 block of each slot, and bool whether the search may enter each block.
+    endpoints
+        sx, sy, tx, ty.
+    is_goal
+        Whether the goal is in the polygon behind the node's side.
+    nodes
+        int32 (m, 4) and float64 (m, 5), with room for three more nodes a side, and the goal.
+    node, n
+        Number of the node, and of all nodes.
+    """
+    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
+    block_of, is_open = blocks
+    sx, sy, tx, ty = endpoints
+    whole, real = nodes
+    entry, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
+    g = real[node, G]
+    x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
+    polygon = polygon_of[entry]
+    low, high = first[polygon], first[polygon + 1]
+    a, b = begins[entry], finishes[entry]
+    if root in (a, b):
+        return _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n)
+    lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
+    turns_right = marks & _RIGHT and turns(kinds[b], cx[b] - x, cy[b] - y, -1)
+    turns_left = marks & _LEFT and turns(kinds[a], cx[a] - x, cy[a] - y, 1)
+    g_right = g + math.hypot(cx[b] - x, cy[b] - y) if turns_right else math.inf
+    g_left = g + math.hypot(cx[a] - x, cy[a] - y) if turns_left else math.inf
+    if is_goal:
+        to_right, to_left = turn_of(x, y, rx, ry, tx, ty), turn_of(x, y, lx, ly, tx, ty)
+        if to_right >= 0 and to_left <= 0:
+            n = _put_goal(nodes, n, root, node, g + math.hypot(tx - x, ty - y))
+        elif to_right < 0 and turns_right:
+            n = _put_goal(nodes, n, b, node, g_right + math.hypot(tx - cx[b], ty - cy[b]))
+        elif to_left > 0 and turns_left:
+            n = _put_goal(nodes, n, a, node, g_left + math.hypot(tx - cx[a], ty - cy[a]))
+    right_u, left_u = 0 if marks & _RIGHT else -1, -1
+    slot = entry
+    for _ in range(high - low - 1):
+        slot = low if slot + 1 == high else slot + 1
+        u, w, twin = begins[slot], finishes[slot], twins[slot]
+        ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
+        right_w = turn_of(x, y, rx, ry, wx, wy)
+        left_w = turn_of(x, y, lx, ly, wx, wy)
+        if twin >= 0 and is_open[block_of[slot]]:
+            if right_w > 0 and left_u < 0:
+                # Seen from the root, between the rays.
+                seen = 0
+                plx, ply, prx, pry = lx, ly, rx, ry
+                if left_w <= 0:
+                    plx, ply, seen = wx, wy, seen | _LEFT
+                if right_u >= 0:
+                    prx, pry, seen = ux, uy, seen | _RIGHT
+                n = put(nodes, n, twin, root, node, seen, g, plx, ply, prx, pry)
+            elif right_u == 0 and right_w == 0:
+                if (u == b and turns_right) or (u != b and turns(kinds[u], ux - x, uy - y, -1)):
+                    cost = g + math.hypot(ux - x, uy - y)
+                    n = put(nodes, n, twin, u, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
+            elif left_u == 0 and left_w == 0:
+                if (w == a and turns_left) or (w != a and turns(kinds[w], wx - x, wy - y, 1)):
+                    cost = g + math.hypot(wx - x, wy - y)
+                    n = put(nodes, n, twin, w, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
+            if turns_right and (right_u < 0 or (u == b and right_w < 0)):
+                by, more, seen = _hidden(mesh, b, u, w, right_w > 0, -1)
+                if by >= 0:
+                    plx, ply = (wx, wy) if right_w <= 0 else (2 * cx[b] - x, 2 * cy[b] - y)
+                    seen = seen if seen < 0 else seen | _RIGHT
+                    n = put(nodes, n, twin, by, node, seen, g_right + more, plx, ply, ux, uy)
+            if turns_left and (left_w > 0 or (w == a and left_u > 0)):
+                by, more, seen = _hidden(mesh, a, w, u, left_u < 0, 1)
+                if by >= 0:
+                    prx, pry = (ux, uy) if left_u >= 0 else (2 * cx[a] - x, 2 * cy[a] - y)
+                    seen = seen if seen < 0 else seen | _LEFT
+                    n = put(nodes, n, twin, by, node, seen, g_left + more, wx, wy, prx, pry)
+        right_u, left_u = right_w, left_w
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _hidden(mesh, corner, near, far, is_cut, hand):
+    """Return how a path bends round a corner to a side behind it, with the end `near` closer to the
+    wall.
+
+    The result holds the root of the interval, -1 if the path may not bend; the distance from the
+    corner to the root; the marks of the interval, without that of its near end if the far end is
+    cut off.
+    """
+    cx, cy = mesh[_CX], mesh[_CY]
+    if is_cut:
+        return corner, 0.0, 0
+    if (
+        near != corner
+        and turn_of(cx[corner], cy[corner], cx[near], cy[near], cx[far], cy[far]) == 0
+    ):
+        # Behind a wall on one line with it: two bends at once.
+        dx, dy = cx[near] - cx[corner], cy[near] - cy[corner]
+        if not turns(mesh[_KINDS][near], dx, dy, hand):
+            return -1, 0.0, 0
+        return near, math.hypot(dx, dy), -1 - corner
+    return corner, 0.0, WHOLE_SIDE
+
+
+@njit(cache=True, nogil=True)
+def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
+    """Write the successors of a node whose root is an end of its side, so that it sees all of the
+    polygon.
+
+    Parameters
+    ----------
+    mesh, blocks, endpoints, is_goal, nodes, node, n
+        See `successors`.
+    """
+    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
+    block_of, is_open = blocks
+    _, _, tx, ty = endpoints
+    whole, real = nodes
+    entry, root, g = whole[node, SLOT], whole[node, ROOT], real[node, G]
+    x, y = cx[root], cy[root]
+    polygon = polygon_of[entry]
+    if is_goal:
+        n = _put_goal(nodes, n, root, node, g + math.hypot(tx - x, ty - y))
+    for slot in range(first[polygon], first[polygon + 1]):
+        twin = twins[slot]
+        if slot == entry or twin < 0 or not is_open[block_of[slot]]:
+            continue
+        u, w = begins[slot], finishes[slot]
+        ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
+        by, cost = root, g
+        if root not in (u, w) and turn_of(x, y, ux, uy, wx, wy) == 0:
+            by, hand = along(mesh, x, y, u, w)
+            if not turns(kinds[by], cx[by] - x, cy[by] - y, hand):
+                continue
+            cost += math.hypot(cx[by] - x, cy[by] - y)
+        n = put(nodes, n, twin, by, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
+    return n

@@ -1,0 +1,279 @@
+"""Kernels of views: the corners seen from a point of a mesh at which a path may bend.
+
+A view spreads over the polygons from side to side, between two rays. A corner that lies on a line
+behind another one is left out if a path may bend at the other: the path to it consists of two
+edges.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybridnav._base.exact import turn_of
+from hybridnav._base.jit import njit
+
+# Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
+_LEFT, _RIGHT = 1, 2
+_BENDING = 4
+"""Paths may bend round corners of kinds below this one."""
+
+
+@njit(cache=True, nogil=True)
+def distance(ax, ay, bx, by):
+    """Return the distance between two points."""
+    return math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+
+
+@njit(cache=True, nogil=True)
+def touches(kind, dx, dy):
+    """Return whether a line through a corner in a direction touches the one blocked cell there.
+
+    A path in that direction may bend round the cell.
+    """
+    if kind >= _BENDING:
+        return False
+    ex = 1.0 if kind & 1 else -1.0
+    ey = 1.0 if kind & 2 else -1.0
+    return dx * ex * dy * ey <= 0.0
+
+
+@njit(cache=True, nogil=True)
+def lobe_of(kind, dx, dy):
+    """Return the quadrant, 0 or 1, beside a corner's blocked cell that contains a direction.
+
+    The direction touches the cell. A shortest path leaves the corner into the quadrant in which it
+    arrives there.
+    """
+    ex = 1.0 if kind & 1 else -1.0
+    ey = 1.0 if kind & 2 else -1.0
+    return 0 if dx * ex >= 0.0 and dy * ey <= 0.0 else 1
+
+
+@njit(cache=True, nogil=True)
+def _axes(kind, lobe):
+    """Return the right and the left limit of a quadrant of `lobe_of`, as directions."""
+    ex = 1.0 if kind & 1 else -1.0
+    ey = 1.0 if kind & 2 else -1.0
+    qx, qy = (ex, -ey) if lobe == 0 else (-ex, ey)
+    return (qx, 0.0, 0.0, qy) if qx * qy > 0.0 else (0.0, qy, qx, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _pend(room, n, slot, marks, lx, ly, rx, ry):
+    """Append an interval to those pending, and return their number.
+
+    Parameters
+    ----------
+    room
+        int32 (m, 2) slots and marks, float64 (m, 4) points on the left and right ray.
+    n
+        Number of intervals before.
+    slot, marks
+        Slot of the interval's side, and marks of its endpoints.
+    lx, ly, rx, ry
+        Points on the left and right ray, in cells.
+    """
+    whole, real = room[0], room[1]
+    whole[n, 0], whole[n, 1] = slot, marks
+    real[n, 0], real[n, 1], real[n, 2], real[n, 3] = lx, ly, rx, ry
+    return n + 1
+
+
+@njit(cache=True, nogil=True)
+def see_from_point(mesh, x, y, starts, target, room, found):
+    """Find the corners seen from a point.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    x, y
+        The point.
+    starts
+        int32 polygons that contain it.
+    target
+        x and y of another point, and int32 polygons that contain it, none of which contains the
+        first point.
+    room
+        int32 (n, 2) and float64 (n, 4) for pending intervals, int32 for the corners.
+    found
+        Number of corners already in the room.
+
+    Returns
+    -------
+    tuple
+        Number of corners afterwards, -1 if the room is too small; whether the other point is seen.
+    """
+    cx, cy, kinds, first, begins, finishes, twins, _ = mesh
+    seen = room[2]
+    n = 0
+    for polygon in starts:
+        low, high = first[polygon], first[polygon + 1]
+        if found + high - low > len(seen) or n + high - low > len(room[0]):
+            return -1, False
+        for slot in range(low, high):
+            u, w = begins[slot], finishes[slot]
+            if touches(kinds[u], cx[u] - x, cy[u] - y):
+                seen[found] = u
+                found += 1
+            if twins[slot] >= 0 and turn_of(x, y, cx[u], cy[u], cx[w], cy[w]) > 0:
+                marks = _LEFT * (kinds[w] < _BENDING) + _RIGHT * (kinds[u] < _BENDING)
+                n = _pend(room, n, twins[slot], marks, cx[w], cy[w], cx[u], cy[u])
+    return _spread(mesh, x, y, target, room, n, found)
+
+
+@njit(cache=True, nogil=True)
+def see_from_corner(mesh, corner, slot, lobe, target, room, found):
+    """Find the corners seen from a corner in one of the quadrants beside its blocked cell.
+
+    Parameters
+    ----------
+    mesh, target, room, found
+        See `see_from_point`.
+    corner
+        One that paths may bend round.
+    slot
+        The wall that begins there: its polygon is the first one round the corner.
+    lobe
+        See `lobe_of`.
+
+    Returns
+    -------
+    int
+        Number of corners afterwards, -1 if the room is too small.
+    """
+    cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
+    x, y = cx[corner], cy[corner]
+    rx, ry, lx, ly = _axes(kinds[corner], lobe)
+    quadrant = (x + rx, y + ry, x + lx, y + ly)
+    n = 0
+    while slot >= 0:
+        polygon = polygon_of[slot]
+        low, high = first[polygon], first[polygon + 1]
+        if found + high - low > len(room[2]) or n + high - low > len(room[0]):
+            return -1
+        last = slot - 1 if slot > low else high - 1
+        sides = (slot, begins[last], twins[last] < 0)
+        n, found = _see_round(mesh, x, y, quadrant, sides, room, n, found)
+        slot = twins[last]
+    found, _ = _spread(mesh, x, y, target, room, n, found)
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _see_round(mesh, x, y, quadrant, sides, room, n, found):
+    """Note the view in a quadrant of a polygon, from one of its corners.
+
+    The view holds the corners of the polygon, except those behind others, and pending intervals on
+    the sides opposite to the point.
+
+    Parameters
+    ----------
+    mesh, x, y, room, found
+        See `see_from_point`.
+    quadrant
+        rx, ry, lx, ly, points on the right and left limit.
+    sides
+        Slots of the sides beside the corner, and whether the polygon is the last one round it.
+    n
+        Number of pending intervals.
+    """
+    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
+    rx, ry, lx, ly = quadrant
+    # The corners beside the point; the far one is the near one of the next polygon.
+    slot, far, is_last = sides
+    near = finishes[slot]
+    low, high = first[polygon_of[slot]], first[polygon_of[slot] + 1]
+    ux, uy, u = x, y, -1
+    right_u, is_u = 0, False
+    for _ in range(high - low - 1):
+        w = finishes[slot]
+        wx, wy = cx[w], cy[w]
+        right_w, left_w = turn_of(x, y, rx, ry, wx, wy), turn_of(x, y, lx, ly, wx, wy)
+        is_w = right_w >= 0 and left_w <= 0
+        if (
+            is_w
+            and touches(kinds[w], wx - x, wy - y)
+            and (w == near or not _is_behind(mesh, x, y, near, w))
+            and (w == far or not _is_behind(mesh, x, y, far, w))
+            and (w != far or is_last)
+        ):
+            room[2][found] = w
+            found += 1
+        twin = twins[slot]
+        is_seen = (is_u and turn_of(x, y, lx, ly, ux, uy) < 0) or (right_u < 0 < right_w)
+        if u >= 0 and twin >= 0 and is_seen and turn_of(x, y, ux, uy, wx, wy) > 0:
+            plx, ply, prx, pry, marks = lx, ly, rx, ry, 0
+            if is_w:
+                plx, ply, marks = wx, wy, marks | _LEFT * (kinds[w] < _BENDING)
+            if is_u:
+                prx, pry, marks = ux, uy, marks | _RIGHT * (kinds[u] < _BENDING)
+            n = _pend(room, n, twin, marks, plx, ply, prx, pry)
+        ux, uy, u, right_u, is_u = wx, wy, w, right_w, is_w
+        slot = low if slot + 1 == high else slot + 1
+    return n, found
+
+
+@njit(cache=True, nogil=True)
+def _is_behind(mesh, x, y, corner, other):
+    """Return whether a corner lies, seen from a point, behind another that paths may bend round."""
+    cx, cy = mesh[0], mesh[1]
+    ux, uy, wx, wy = cx[corner], cy[corner], cx[other], cy[other]
+    if mesh[2][corner] >= _BENDING or turn_of(x, y, ux, uy, wx, wy) != 0:
+        return False
+    return (ux - x) * (wx - x) + (uy - y) * (wy - y) > 0.0
+
+
+@njit(cache=True, nogil=True)
+def _spread(mesh, x, y, target, room, n, found):
+    """Follow the pending intervals; return the result of `see_from_point`.
+
+    Parameters
+    ----------
+    mesh, x, y, target, room, found
+        See `see_from_point`.
+    n
+        Number of pending intervals.
+    """
+    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
+    whole, real, seen = room
+    tx, ty, goals = target
+    is_target_seen = False
+    while n:
+        n -= 1
+        entry, marks = whole[n, 0], whole[n, 1]
+        lx, ly, rx, ry = real[n, 0], real[n, 1], real[n, 2], real[n, 3]
+        polygon = polygon_of[entry]
+        low, high = first[polygon], first[polygon + 1]
+        if found + high - low > len(seen) or n + high - low > len(whole):
+            return -1, False
+        for goal in goals:
+            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
+                is_target_seen = is_target_seen or turn_of(x, y, lx, ly, tx, ty) <= 0
+        right_u = left_u = -1
+        bends_u = 0
+        ux, uy = lx, ly
+        slot = entry
+        for left_over in range(high - low - 2, -1, -1):
+            slot = low if slot + 1 == high else slot + 1
+            w = finishes[slot]
+            wx, wy = cx[w], cy[w]
+            bends_w = kinds[w] < _BENDING
+            right_w = turn_of(x, y, rx, ry, wx, wy)
+            left_w = turn_of(x, y, lx, ly, wx, wy) if right_w >= 0 else -1
+            if bends_w and left_over and right_w >= 0 >= left_w:
+                is_behind = (right_w == 0 and marks & _RIGHT) or (left_w == 0 and marks & _LEFT)
+                if not is_behind and touches(kinds[w], wx - x, wy - y):
+                    seen[found] = w
+                    found += 1
+            if right_w > 0 > left_u and twins[slot] >= 0:
+                plx, ply, prx, pry, kept = lx, ly, rx, ry, marks
+                if left_w < 0 or (left_w == 0 and bends_w):
+                    plx, ply, kept = wx, wy, (kept & _RIGHT) | _LEFT * bends_w
+                if right_u > 0 or (right_u == 0 and bends_u):
+                    prx, pry, kept = ux, uy, (kept & _LEFT) | _RIGHT * bends_u
+                n = _pend(room, n, twins[slot], kept, plx, ply, prx, pry)
+            if left_w > 0:
+                break
+            ux, uy, bends_u, right_u, left_u = wx, wy, bends_w, right_w, left_w
+    return found, is_target_seen

@@ -1,0 +1,13 @@
+from .build import (
+    JumpGraph as JumpGraph,
+    build_jump_graph as build_jump_graph,
+    contract_graph as contract_graph,
+)
+from .search import (
+    JumpPatch as JumpPatch,
+    JumpPath as JumpPath,
+    JumpPaths as JumpPaths,
+    JumpSearch as JumpSearch,
+)
+
+__all__: list[str]

@@ -1,0 +1,263 @@
+"""Rooms that the map itself shows: segmentation of free space at its narrow passages."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+from scipy import ndimage
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.maps.names import Segmentation
+from hybridnav.maps.room_labels import MAX_ROOMS
+from hybridnav.topology.rooms.cutting import Ground, fine_segments
+from hybridnav.topology.rooms.growing import Likely, Small, contract
+from hybridnav.topology.rooms.judging import Forest, JudgedSegments
+from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
+from hybridnav.topology.rooms.merging import Segments, grown, least_cells
+from hybridnav.topology.rooms.segments import LEAST_SEGMENT_M2, walled_segments, watershed_segments
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from hybridnav._base.typing import BoolArray, IntArray
+    from hybridnav.maps import OccupancyGrid
+
+Cell = tuple[int, int]
+
+_UNEXPLORED_RIM = 0.8
+"""Share of the cells round free space that must be unexplored for them to count as walls."""
+_LEAST_INSIDE = 0.1
+"""Area cut off inside free space that reaches all sides of the map, as a share of it, from which
+on that is the outside."""
+_SIDES = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
+"""Indices of the first and last row and column."""
+_LARGEST_LEAST_M2 = 1e9
+"""Least areas beyond it are taken for a mistake."""
+_SPLINTER_M2 = 0.5
+"""Smaller segments are merged first: they would be convex with anything."""
+SPECK_M2 = 0.25
+"""Segments below it go to a neighbour before boundaries are judged."""
+LEAST_LIKELY = 0.5
+"""Segments of one room: the least probability at which they merge."""
+_SOLIDITY = 0.8
+_OPEN = 0.65
+_STRAIGHT = 0.35
+"""Solidity of two parts of one corridor."""
+WALL_REACH_M = 0.25
+"""How far rooms reach into walls, and into the unexplored cells of their own side: outlines that
+people edit then run inside walls, not along the free cells' steps."""
+
+
+def find_rooms(
+    grid: OccupancyGrid, *, method: Segmentation = "judged", least_area_m2: float = 1.0
+) -> RoomLabels:
+    """Find the rooms of a map.
+
+    Parameters
+    ----------
+    grid
+        The map. Its cells count as they were measured: the robot's radius changes no room.
+    method
+        How free space is cut and merged again. `"judged"`: finely, along the lines of walls in
+        every local direction and at narrow passages; segments then merge where a small forest,
+        learnt from people's rooms, judges by the evidence on a boundary that both lie in one room.
+        The other methods merge segments where their union is nearly convex and hardly walled; they
+        cut `"walls"` along the lines of walls that continue behind an opening, and at pinched
+        passages; `"watershed"` along the watersheds of the distance transform.
+    least_area_m2
+        In square metres of free cells, positive, at most 1e9. Smaller segments go to the neighbour
+        with the longest open border; without one they are no room. Free space outside the building
+        is no room either: it surrounds other free space, along most of the map's border.
+
+    Returns
+    -------
+    RoomLabels
+        Rooms `room-1`, `room-2`, ..., in reading order of their first cells: highest row first.
+
+    Raises
+    ------
+    InvalidValueError
+        When the method is not known, the area out of range, or there are too many rooms.
+
+    Examples
+    --------
+    >>> hn.find_rooms(hn.example_map("figure1")).names
+    ('room-1',)
+    """
+    if method not in get_args(Segmentation):
+        raise InvalidValueError(
+            f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
+        )
+    check_least_area(least_area_m2)
+    found = _judged if method == "judged" else _convex
+    least = least_cells(least_area_m2, grid.cell_area_m2)
+    labels = _in_reading_order(found(grid, method, least_area_m2), least)
+    n_rooms = int(labels.max(initial=NO_ROOM)) + 1
+    if n_rooms > MAX_ROOMS:
+        raise InvalidValueError(
+            f"the map falls into {n_rooms} rooms of {least_area_m2:g} square metres and more, "
+            f"at most {MAX_ROOMS} are kept: raise the least area"
+        )
+    names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
+    return RoomLabels(names, reaching(labels, grid))
+
+
+def check_least_area(least_area_m2: float) -> None:
+    """Raise `InvalidValueError` if the least area of a room is out of range, or no number."""
+    is_number = isinstance(least_area_m2, int | float | np.number)
+    if not is_number or not 0 < least_area_m2 <= _LARGEST_LEAST_M2:
+        raise InvalidValueError(
+            "least area must be a positive number of square metres, at most "
+            f"{_LARGEST_LEAST_M2:g}, got {least_area_m2!r:.40}"
+        )
+
+
+def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
+    """Divide rooms among the seeds that lie in them: each cell goes to the nearest by walking.
+
+    Parameters
+    ----------
+    room_of
+        int32 (rows, cols), -1 for cells of no room.
+    seeds
+        A label >= 0 and the cell (row, col) that it spreads from, inside a room.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), the labels; -1 where none spreads to: outside the rooms with seeds.
+        Distances are counted in steps along sides, ties go to the lower cell's label.
+    """
+    divided = np.full(room_of.shape, NO_ROOM, dtype=np.int32)
+    for label, cell in seeds.items():
+        divided[cell] = label
+    _segmentation_kernels.grow_labels(divided, room_of, room_of.size)
+    return divided
+
+
+def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> IntArray:
+    """Cut free space finely, and merge the segments by a judge of their boundaries.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured.
+    forest
+        The judge.
+    least_area_m2
+        As of `find_rooms`.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a room for each free cell of the building, -1 elsewhere.
+    """
+    outside = outside_of(grid)
+    ground = Ground.of(grid, outside)
+    segments = JudgedSegments(fine_segments(ground), ground)
+    specks = least_cells(min(SPECK_M2, least_area_m2), grid.cell_area_m2)
+    least = least_cells(least_area_m2, grid.cell_area_m2)
+    contract(segments, [Small(specks), Likely(forest.judge, LEAST_LIKELY), Small(least)])
+    free = (grid.measured == CellClass.FREE) & ~outside
+    return np.where(free, segments.label_of, np.int32(NO_ROOM))
+
+
+def _judged(grid: OccupancyGrid, _method: Segmentation, least_area_m2: float) -> IntArray:
+    return judged_rooms(grid, Forest.shipped(), least_area_m2)
+
+
+def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> IntArray:
+    """Merge segments where their union is nearly convex."""
+    outside = outside_of(grid)
+    grid = _walled(grid)
+    cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
+    segments = Segments(cut, grid.resolution_m)
+    segments.merge_small(min(least_area_m2, _SPLINTER_M2))
+    segments.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT)
+    segments.merge_small(least_area_m2)
+    return segments.label_of
+
+
+def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
+    """Return the segments into which free space is cut."""
+    if method == "walls":
+        return walled_segments(grid, least_m2=min(least_m2, LEAST_SEGMENT_M2))
+    return watershed_segments(grid)
+
+
+def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+    """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
+
+    They reach 0.25 m. On some maps only a wall of one cell separates two rooms: labels do not
+    spread through it into unexplored cells, or into free cells without a room.
+    """
+    reach = WALL_REACH_M / grid.resolution_m
+    wall = grid.measured == CellClass.OCCUPIED
+    into_walls = grown(label_of, reach)
+    inside = label_of.copy()
+    entered = (label_of >= 0) | (grid.measured == CellClass.UNEXPLORED)
+    _segmentation_kernels.grow_labels(
+        inside, np.where(entered, np.int32(0), np.int32(-1)), int(reach)
+    )
+    return np.where(wall, into_walls, inside)
+
+
+def outside_of(grid: OccupancyGrid) -> BoolArray:
+    """Return the free cells outside the building, which belong to no room.
+
+    They are connected along sides, reach all four sides of the map, and fill at least half of its
+    border. They surround free space that they cannot reach, at least a tenth of their own area. So
+    the margin of a building's image is outside, and so is the ground round a race track, but not a
+    hall that the map's border cuts off.
+    """
+    free = grid.measured == CellClass.FREE
+    if 2 * sum(np.count_nonzero(free[side]) for side in _SIDES) < sum(2 * n for n in free.shape):
+        return np.zeros_like(free)  # most maps: their border is unexplored
+    part_of, n_parts = ndimage.label(free)
+    borders = [part_of[side] for side in _SIDES]
+    on_border = [np.bincount(border, minlength=n_parts + 1) for border in borders]
+    n_border = sum(len(border) for border in borders)
+    around = np.all(np.stack(on_border) > 0, axis=0) & (2 * sum(on_border) >= n_border)
+    around[0] = False
+    areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
+    inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
+    around &= inside >= _LEAST_INSIDE * areas
+    found: BoolArray = around[part_of]
+    return found
+
+
+def _walled(grid: OccupancyGrid) -> OccupancyGrid:
+    """Return the map with the rim of its unexplored cells as walls if most of its free space ends
+    there.
+
+    A scan whose thresholds call most walls unexplored has no other ones. Where obstacles bound free
+    space, unexplored pockets are shadows of furniture, and no walls.
+    """
+    free = grid.measured == CellClass.FREE
+    beside = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
+    rim = beside & (grid.measured == CellClass.UNEXPLORED)
+    if np.count_nonzero(rim) <= _UNEXPLORED_RIM * np.count_nonzero(beside):
+        return grid
+    probability = grid.probability.copy()
+    probability[rim] = 1.0
+    return replace(grid, probability=probability)
+
+
+def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
+    """Return labels of at least some cells, renumbered by their first cells from the top row
+    down."""
+    areas = np.bincount(label_of[label_of >= 0])
+    upside_down = label_of[::-1].ravel()
+    cells = np.flatnonzero(upside_down >= 0)[::-1]
+    firsts = np.empty(len(areas), dtype=np.int64)
+    firsts[upside_down[cells]] = cells  # the last one that is written stays: the first cell
+    found = np.flatnonzero(areas)
+    first, large = firsts[found], areas[found] >= least
+    order = found[large][np.argsort(first[large], kind="stable")]
+    new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
+    new[order] = np.arange(len(order))
+    renumbered: IntArray = new[label_of]
+    return renumbered

@@ -1,0 +1,111 @@
+"""Which rooms and doors lists and pictures show: no rays of a scan, no nameless pockets."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.maps import CellClass
+from hybridnav.maps.clearance import clearance_cells
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import RoomLabels
+    from hybridnav.pyramid import Level
+
+LEAST_WIDTH_M = 1.0
+"""Mean width below which a space is listed only if the robot can enter it, in metres."""
+_LEAST_AREA_M2 = 1.0
+"""Area below which a space without a name is a pocket, in square metres: the least area of a room
+that is found."""
+_FOUND = re.compile(r"room-\d+")
+"""Names that `find_rooms` gives. Who gave another name wants to see it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Listing:
+    """Spaces of a map that are listed: rooms, and connected nameless free cells."""
+
+    space_of: IntArray
+    """int32 (rows, cols), the space of each free cell as measured: its room, or a number from
+    `n_rooms` on for each connected set of cells in no room; -1 for other cells."""
+    is_listed: BoolArray
+    """bool (n_spaces,), spaces that are listed."""
+
+    @classmethod
+    def of(cls, labels: RoomLabels, level: Level) -> Listing:
+        """Find what is listed.
+
+        A room is left out if it is narrower than 1 m in the mean and the robot cannot enter it:
+        such rooms are rays of a laser through glass. One with a name of its own is always listed.
+        A space without a name has to be wide enough and enterable, so that pockets between
+        outlines make no doors.
+
+        Parameters
+        ----------
+        labels
+            The rooms.
+        level
+            The room level of a pyramid that was built with them.
+        """
+        from scipy import ndimage  # noqa: PLC0415 - most imports of the package need no rooms
+
+        n_rooms = len(labels.names)
+        is_free = level.grid.measured == CellClass.FREE
+        nameless, n_nameless = ndimage.label(is_free & (labels.label_of < 0))
+        space_of = np.where(is_free, labels.label_of, -1).astype(np.int32)
+        space_of[nameless > 0] = nameless[nameless > 0] + (n_rooms - 1)
+        n_spaces = n_rooms + n_nameless
+        areas = np.bincount(space_of[is_free], minlength=n_spaces)
+        is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
+        begins = is_wide | (areas == areas.max(initial=0))
+        can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
+        is_large = areas * level.grid.resolution_m**2 >= _LEAST_AREA_M2
+        is_listed = is_wide & can_enter & is_large
+        is_own = np.array([_FOUND.fullmatch(name) is None for name in labels.names], dtype=np.bool_)
+        is_listed[:n_rooms] = (is_wide | can_enter)[:n_rooms] | is_own
+        return cls(space_of, is_listed)
+
+
+def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
+    """Return the mean width of each space in cells: four times the mean distance to its rim, which
+    is exact for a strip."""
+    padded = np.pad(space_of, 1, constant_values=-1)
+    inner = padded[1:-1, 1:-1]
+    is_rim = np.zeros(space_of.shape, dtype=np.bool_)
+    for beside in (padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]):
+        is_rim |= beside != inner
+    inside = space_of >= 0
+    depths = clearance_cells(is_rim)[inside] + 0.5
+    total = np.bincount(space_of[inside], weights=depths, minlength=len(areas))
+    widths: FloatArray = 4 * total / np.maximum(areas, 1)
+    return widths
+
+
+def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
+    """Return the spaces that free cells join with one in which a robot is, at the robot's radius.
+
+    Parameters
+    ----------
+    space_of
+        int32 (n_vertices,), the space of each vertex.
+    level
+        The room level.
+    begins
+        bool (n_spaces,), spaces in which a robot may begin: wide ones, and the largest.
+    """
+    from scipy.sparse import coo_array  # noqa: PLC0415
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    is_free = level.classes == CellClass.FREE
+    arcs = level.arcs[is_free[level.arcs].all(axis=1)]
+    shape = (level.n_vertices, level.n_vertices)
+    graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
+    parts = connected_components(graph, directed=False)[1][is_free]
+    spaces = space_of[is_free]
+    joined = np.bincount(parts, weights=begins[spaces], minlength=1) > 0
+    found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
+    return found

@@ -1,8 +1,0 @@
-from .building_opening import BuildingOpening as BuildingOpening
-from .floors import BuildingSession as BuildingSession
-from .opening import Opening as Opening
-from .saved import save_page as save_page
-from .serving import serve as serve
-from .session import Session as Session
-
-__all__: list[str]

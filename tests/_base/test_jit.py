@@ -1,0 +1,71 @@
+"""Compiled kernels: callable from Python and from each other, and compiled once."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from numba.core import event
+
+from hybridnav._base.jit import njit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+pytestmark = pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled"
+)
+
+
+class _Compiled(event.Listener):
+    """Names of the functions that were compiled."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def on_start(self, event: Any) -> None:
+        self.names.append(event.data["dispatcher"].__name__)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextmanager
+def compiled() -> Iterator[list[str]]:
+    """Take down what is compiled."""
+    listener = _Compiled()
+    with event.install_listener("numba:compile", listener):
+        yield listener.names
+
+
+@njit(nogil=True)
+def _times(values, k, is_halved):
+    total = values[k] * k
+    return total / 2 if is_halved else total
+
+
+@njit(nogil=True)
+def _sum_of_times(values):
+    """Call another kernel with several whole numbers and truths."""
+    return (
+        _times(values, 1, True) + _times(values, 2, False) + _times(values, len(values) - 1, True)
+    )
+
+
+def test_a_kernel_is_compiled_once_for_all_whole_numbers_it_is_called_with() -> None:
+    values = np.arange(5.0)
+    with compiled() as names:
+        found = _sum_of_times(values)
+    assert found == 0.5 + 4 + 8
+    assert names.count("_times") == 1
+
+
+def test_a_kernel_that_kernels_call_is_called_from_python_too() -> None:
+    values = np.arange(5.0)
+    assert _sum_of_times(values) == 12.5
+    assert _times(values, 3, True) == 4.5
+    assert _times(values, k=3, is_halved=False) == 9
+    assert _sum_of_times(values) == 12.5

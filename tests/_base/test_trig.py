@@ -1,0 +1,108 @@
+"""Sines, angles, exponentials and logarithms: right, and bit for bit the same everywhere."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from numba import njit
+
+import hybridnav.ext.live.mapping  # noqa: F401 - its kernels make the functions known to numba
+from hybridnav._base import trig as _trig
+from hybridnav._base.trig import acos, asin, atan2, cos, exp, log, sin, tan
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ODD = [0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e-300, -1e300, 5e-324]
+RANGES = [
+    (sin, np.sin, -1e5, 1e5),
+    (sin, np.sin, -4.0, 4.0),
+    (cos, np.cos, -1e5, 1e5),
+    (cos, np.cos, -4.0, 4.0),
+    (tan, np.tan, -1.5, 1.5),
+    (asin, np.arcsin, -1.0, 1.0),
+    (acos, np.arccos, -1.0, 1.0),
+    (exp, np.exp, -40.0, 40.0),
+    (log, np.log, 1e-9, 9.0),
+]
+
+
+@pytest.mark.parametrize(("ours", "theirs", "low", "high"), RANGES)
+def test_values_are_right_to_two_units_in_the_last_place(
+    ours: Callable[[float], float], theirs: np.ufunc, low: float, high: float
+) -> None:
+    x = np.random.default_rng(0).uniform(low, high, 20_000)
+    wanted = theirs(x.astype(np.longdouble))
+    off = np.abs(np.array([ours(value) for value in x.tolist()]) - wanted)
+    assert (off <= 2 * np.spacing(np.abs(wanted.astype(np.float64)))).all()
+
+
+def test_directions_are_right_and_along_axes_exact() -> None:
+    for y, x in itertools.product(ODD, ODD):
+        found, wanted = atan2(y, x), math.atan2(y, x)
+        assert found == wanted or math.isnan(found + wanted), (y, x)
+        assert math.copysign(1, found) == math.copysign(1, wanted) or math.isnan(wanted)
+    y, x = np.random.default_rng(0).normal(size=(2, 20_000))
+    wanted = np.arctan2(y.astype(np.longdouble), x.astype(np.longdouble))
+    off = np.abs(_trig.directions(y, x) - wanted)
+    assert (off <= 2 * np.spacing(np.abs(wanted.astype(np.float64)))).all()
+
+
+def test_values_at_the_ends_of_their_ranges() -> None:
+    assert (exp(0.0), exp(-800.0), exp(800.0), log(1.0), sin(0.0), cos(0.0)) == (
+        1,
+        0,
+        np.inf,
+        0,
+        0,
+        1,
+    )
+    for x in (-745.0, 709.7):
+        assert exp(x) == pytest.approx(math.exp(x))
+    assert log(5e-324) == pytest.approx(math.log(5e-324))
+    for function in (sin, cos, tan, exp):
+        assert math.isnan(function(math.nan))
+    assert abs(sin(1e300)) <= 1
+
+
+@njit()
+def _in_a_kernel(x, y, out):
+    for i in range(len(x)):
+        out[i, 0], out[i, 1], out[i, 2] = sin(x[i]), cos(x[i]), tan(x[i])
+        out[i, 3], out[i, 4], out[i, 5] = atan2(x[i], y[i]), asin(y[i]), acos(y[i])
+        out[i, 6], out[i, 7] = exp(x[i]), log(abs(y[i]))
+
+
+def test_numbers_arrays_and_kernels_have_the_same_bits_on_every_machine() -> None:
+    rng = np.random.default_rng(5)
+    x, y = rng.uniform(-60, 60, 3000), rng.uniform(-1, 1, 3000)
+    x[:3] = 3e9, -(2.0**20), 1e18
+    numbers = np.array(
+        [
+            (sin(a), cos(a), tan(a), atan2(a, b), asin(b), acos(b), exp(a), log(abs(b)))
+            for a, b in zip(x.tolist(), y.tolist(), strict=True)
+        ]
+    )
+    kernel = np.empty_like(numbers)
+    _in_a_kernel(x, y, kernel)
+    assert kernel.tobytes() == numbers.tobytes()
+    arrays = np.stack([*_trig.sines_and_cosines(x), _trig.directions(x, y)], axis=1)
+    assert arrays.tobytes() == np.ascontiguousarray(numbers[:, [0, 1, 3]]).tobytes()
+    assert hashlib.sha256(numbers.tobytes()).hexdigest()[:16] == "699c19ad8be17907"
+
+
+@njit()
+def _differences(x, squares):
+    return x * x - squares
+
+
+def test_kernels_do_not_fuse_products_and_sums() -> None:
+    x = np.random.default_rng(0).uniform(-1, 1, 1000)
+    assert not _differences(
+        x, x * x
+    ).any()  # a fused difference is what the product's rounding lost

@@ -1,0 +1,340 @@
+"""Graphs that others have made: what is read is what was written, in each format."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from tests.ext.graphs.files import graph_writers as writers
+from tests.ext.graphs.files.graph_writers import Plain
+from tests.nav2_reader import read_nav2
+from tests.strategies import examples
+
+_NUMBERS = st.floats(-1e6, 1e6, allow_nan=False)
+_TEXTS = st.text(st.characters(codec="utf-8", categories=("L", "N", "P", "S")), max_size=20)
+_NESTED = st.recursive(
+    st.one_of(st.booleans(), st.integers(-(2**40), 2**40), _NUMBERS, _TEXTS),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(_TEXTS, inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+_WORDS = st.text("abcdefghäß0123456789_-", min_size=1, max_size=12).filter(
+    lambda word: word not in {"node", "edges", "vertices", "waypoint"}
+)
+
+
+@st.composite
+def plain_graphs(draw, names=_WORDS):
+    nodes = draw(st.lists(names, min_size=1, max_size=8, unique=True))
+    points = {node: draw(st.tuples(_NUMBERS, _NUMBERS)) for node in nodes}
+    pairs = st.tuples(st.sampled_from(nodes), st.sampled_from(nodes))
+    edges = draw(st.lists(pairs, max_size=12, unique=True))
+    return Plain(points, edges, draw(st.dictionaries(_TEXTS, _NESTED, max_size=3)))
+
+
+def means(graph):
+    """What a graph states: a point for each node, and ends for each edge."""
+    points = dict(zip(graph.names, map(tuple, graph.points.tolist()), strict=True))
+    ends = [(graph.names[tail], graph.names[head]) for tail, head in graph.edges.tolist()]
+    return points, sorted(ends, key=str)
+
+
+def expected(plain):
+    return plain.points, sorted(plain.edges, key=str)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("graphs")
+
+
+@given(plain_graphs())
+@settings(max_examples=examples(60))
+def test_nav2(folder, plain):
+    ids = writers.write_nav2(folder / "a.geojson", plain)
+    graph = hn.load_graph(folder / "a.geojson")
+    assert (graph.format, graph.frame, graph.findings, graph.lines) == ("nav2", "map", (), {})
+    points = {ids[node]: point for node, point in plain.points.items()}
+    assert means(graph) == (points, sorted([(ids[a], ids[b]) for a, b in plain.edges], key=str))
+    assert all(facts["metadata"] == plain.facts for facts in graph.node_facts.values())
+    assert all(facts == {"operations": {"go": plain.facts}} for facts in graph.edge_facts.values())
+    assert graph.costs.tolist() == [k / 7 for k in range(len(ids), len(ids) + graph.n_edges)]
+
+
+@given(plain_graphs())
+@settings(max_examples=examples(40))
+def test_strands_yaml(folder, plain):
+    writers.write_strands(folder / "a.tplg", plain)
+    graph = hn.load_graph(folder / "a.tplg")
+    assert (graph.format, graph.name, graph.findings) == ("strands", "drawn", ())
+    assert means(graph) == expected(plain)
+    assert all(facts["properties"] == plain.facts for facts in graph.node_facts.values())
+    assert all(facts["goal"] == plain.facts for facts in graph.edge_facts.values())
+
+
+@given(plain_graphs())
+@settings(max_examples=examples(40))
+def test_tmap2_with_anchors_and_aliases(folder, plain):
+    writers.write_tmap2(folder / "a.tmap2", plain)
+    graph = hn.load_graph(folder / "a.tmap2")
+    assert (graph.format, graph.name, graph.findings) == ("tmap2", "drawn", ())
+    assert means(graph) == expected(plain)
+    assert all(facts["properties"] == plain.facts for facts in graph.node_facts.values())
+
+
+@given(plain_graphs())
+@settings(max_examples=examples(60))
+def test_older_text(folder, plain):
+    writers.write_text(folder / "a.tmap", plain)
+    graph = hn.load_graph(folder / "a.tmap")
+    assert (graph.format, graph.name, graph.findings) == ("strands-text", "a", ())
+    assert means(graph) == expected(plain)
+    assert all(facts["pose"]["qw"] == 1.0 for facts in graph.node_facts.values())
+    assert all(facts == {"action": "move_base"} for facts in graph.edge_facts.values())
+
+
+@given(plain_graphs(st.text("abc<>&'\" ]", min_size=1, max_size=8)))
+@settings(max_examples=examples(60))
+def test_graphml(folder, plain):
+    writers.write_graphml(folder / "a.graphml", plain)
+    graph = hn.load_graph(folder / "a.graphml")
+    assert (graph.format, graph.name, graph.findings) == ("graphml", "drawn", ())
+    assert means(graph) == expected(plain)
+
+
+@given(plain_graphs(st.one_of(_TEXTS, st.integers())))
+@settings(max_examples=examples(60))
+def test_node_link(folder, plain):
+    writers.write_node_link(folder / "a.json", plain)
+    graph = hn.load_graph(folder / "a.json")
+    assert (graph.format, graph.name, graph.findings) == ("node-link", "drawn", ())
+    assert means(graph) == expected(plain)
+
+
+@given(plain_graphs(st.one_of(_TEXTS, st.integers())))
+@settings(max_examples=examples(60))
+def test_networkx_there_and_back(plain):
+    graph = hn.WaypointGraph.from_networkx(plain.directed)
+    assert means(graph) == expected(plain)
+    back = graph.to_networkx()
+    assert dict(back.nodes("x")) == {node: x for node, (x, _) in plain.points.items()}
+    assert sorted(((a, b) for a, b in back.edges()), key=str) == expected(plain)[1]
+    assert means(hn.WaypointGraph.from_networkx(back)) == means(graph)
+
+
+@given(plain_graphs())
+@settings(max_examples=examples(60))
+def test_nav2_written_again_means_the_same(folder, plain):
+    writers.write_nav2(folder / "a.geojson", plain)
+    if not plain.edges:
+        return
+    graph = hn.load_graph(folder / "a.geojson")
+    hn.export_nav2(graph, folder / "b.geojson")
+    before, after = (read_lenient(folder / name) for name in ("a.geojson", "b.geojson"))
+    assert before == after
+    assert means(hn.load_graph(folder / "b.geojson")) == means(graph)
+
+
+def read_lenient(path):
+    """What Nav2 holds of a file: nodes and edges by id, with all their properties."""
+    nodes: dict[int, Any] = {}
+    edges: dict[int, Any] = {}
+    for feature in json.loads(path.read_text())["features"]:
+        properties = {"frame": "map", **feature["properties"]}
+        geometry = feature["geometry"]
+        if geometry["type"] == "Point":
+            properties["at"] = geometry["coordinates"]
+            nodes[properties["id"]] = properties
+        elif geometry["type"] in {"LineString", "MultiLineString"}:
+            properties.pop("frame")
+            edges.setdefault(properties.pop("id"), []).append(properties)
+    return nodes, edges
+
+
+NAV2 = (
+    "nav2_bringup/depot_graph.geojson",
+    "nav2_bringup/turtlebot3_graph.geojson",
+    "nav2_route/aws_graph.geojson",
+    "nav2_route/sample_graph.geojson",
+    "nav2_route/turtlebot3_graph.geojson",
+    "nav2_route/turtlebot4_graph.geojson",
+    "nav2_route_test/error_codes.geojson",
+    "nav2_route_test/no_frame.json",
+)
+
+
+@pytest.mark.parametrize("name", NAV2)
+def test_nav2s_own_graphs_mean_the_same_again(data, tmp_path, name):
+    file = data / "nav2" / "graphs" / name
+    graph = hn.load_graph(file)
+    hn.export_nav2(graph, tmp_path / "again.geojson")
+    nodes, edges = read_lenient(tmp_path / "again.geojson")
+    old_nodes, old_edges = read_lenient(file)
+    assert nodes == old_nodes
+
+    def contents(of):
+        return sorted(json.dumps(one, sort_keys=True) for each in of.values() for one in each)
+
+    # Ids that two edges have in a sample are replaced for one of them: Nav2 wants them unique.
+    assert contents(edges) == contents(old_edges)
+    assert old_edges.keys() <= edges.keys()
+    if all(len(each) == 1 for each in old_edges.values()):
+        assert edges == old_edges
+    strict = read_nav2(tmp_path / "again.geojson", costs=False, lines=False)
+    assert len(strict.edges) == graph.n_edges
+
+
+def test_nav2s_damaged_graph_ends_in_one_line(data):
+    with pytest.raises(hn.MapError, match="line 1, column 1: no JSON"):
+        hn.load_graph(data / "nav2" / "graphs" / "nav2_route_test" / "invalid.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [
+        ("tsc_y3/tsc_y3_final.tplg", ("strands", 82, 239)),
+        ("tsc_y4/tsc_y4_final.tplg.tpl", ("strands", 91, 249)),
+        ("g4s/g4s_sim.tplg", ("strands-text", 18, 34)),
+        ("g4s/g4s_y2.tmap", ("strands-text", 40, 84)),
+    ],
+)
+def test_maps_of_strands(data, tmp_path, name, form):
+    file = data / "strands" / name
+    graph = hn.load_graph(file)
+    assert (graph.format, graph.n_nodes, graph.n_edges) == form
+    assert graph.findings == ()
+    text = file.read_text()
+    word = "\n  node:\n" if graph.format == "strands" else "node:"
+    assert text.count(word) == graph.n_nodes
+    # For Nav2, with the names and facts of STRANDS as metadata.
+    hn.export_nav2(graph, tmp_path / "strands.geojson")
+    again = read_nav2(tmp_path / "strands.geojson", costs=False)
+    assert [facts["name"] for facts in again.node_facts.values()] == list(graph.names)
+    assert list(again.points.values()) == [tuple(point) for point in graph.points.tolist()]
+
+
+def test_what_is_wrong_in_a_file_is_read_around_and_found(tmp_path):
+    def node(number, at, **facts):
+        geometry = {"type": "Point", "coordinates": at} if at is not None else None
+        return {"type": "Feature", "properties": {"id": number, **facts}, "geometry": geometry}
+
+    def edge(number, tail, head, line=None, **facts):
+        geometry = {"type": "LineString", "coordinates": line or []}
+        properties = {"id": number, "startid": tail, "endid": head, **facts}
+        return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+    polygon = {
+        "type": "Feature",
+        "properties": {"class": "zone"},
+        "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]},
+    }
+    features = [
+        node(0, [0, 0], metadata={"region": {"x": [1, 2], "deep": {"er": "yes"}}}),
+        node(1, [5, 0]),
+        node(1, [6, 0]),
+        node(2, []),
+        node(3, None),
+        node(4, [math.nan, 1]),
+        node(5, [1, 2], metadata={"gone": None}),
+        node(-7, [2, 2]),
+        node("seven", [2, 3]),
+        edge(10, 0, 1),
+        edge(10, 1, 0, cost=-1),
+        edge(11, 0, 99),
+        edge(12, 0, 2),
+        edge(13, 0, 5, [[0, 0], [9, 9]]),
+        edge(5, 0, 5),
+        polygon,
+    ]
+    path = tmp_path / "bad.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    graph = hn.load_graph(path)
+    assert {found.kind: found.count for found in graph.findings} == {
+        "no-coordinates": 3,
+        "repeated-id": 3,  # node 1, edge 10, and 5 of a node and an edge
+        "bad-id": 2,
+        "unknown-node": 2,
+        "bad-cost": 1,
+        "null": 1,
+        "line-elsewhere": 1,
+    }
+    # The last node of an id has the edges, as in Nav2.
+    assert graph.points[graph.edges[0, 1]].tolist() == [6.0, 0.0]
+    assert graph.others == (polygon,)
+    assert graph.node_facts[0]["metadata"]["region"]["deep"] == {"er": "yes"}
+    hn.export_nav2(graph, path)
+    again = json.loads(path.read_text())["features"]
+    assert polygon in again
+    clean = hn.load_graph(path)
+    assert {found.kind for found in clean.findings} == {"line-elsewhere", "bad-cost"}
+
+
+def test_columns_of_drawing_programs_that_are_null_are_no_facts(tmp_path):
+    columns = {"id": None, "startid": None, "endid": None, "cost": None, "note": None}
+    line = {"type": "MultiLineString", "coordinates": [[[0, 0], [1, 0]]]}
+    features = [
+        {"properties": columns | {"id": 1}, "geometry": {"type": "Point", "coordinates": [0, 0]}},
+        {"properties": columns | {"id": 2}, "geometry": {"type": "Point", "coordinates": [1, 0]}},
+        {"properties": columns | {"id": 3, "startid": 1, "endid": 2}, "geometry": line},
+        {"properties": {"id": 4, "startid": 2, "endid": 1}},
+    ]
+    path = tmp_path / "columns.geojson"
+    path.write_text(json.dumps({"features": features}))
+    graph = hn.load_graph(path)
+    assert (graph.names, graph.edges.tolist()) == ((1, 2), [[0, 1], [1, 0]])
+    assert {found.kind: found.count for found in graph.findings} == {"null": 3}
+    hn.export_nav2(graph, path)
+    assert len(read_nav2(path, costs=False).edges) == 2
+    assert hn.load_graph(path).findings == ()
+
+
+def test_points_in_a_frame_of_their_own_are_turned_and_moved(tmp_path):
+    turn = {"w": math.cos(math.pi / 4), "x": 0.0, "y": 0.0, "z": math.sin(math.pi / 4)}
+    place = {"child": "topo", "parent": "map", "rotation": turn, "translation": {"x": 10, "y": 20}}
+    nodes = [
+        {"node": {"name": frame, "parent_frame": frame, "pose": {"position": {"x": 3, "y": 1}}}}
+        for frame in ("topo", "map")
+    ]
+    path = tmp_path / "a.tmap2"
+    path.write_text(json.dumps({"transformation": place, "nodes": nodes}))  # JSON is YAML
+    graph = hn.load_graph(path)
+    assert graph.points[0].tolist() == pytest.approx([9.0, 23.0])
+    assert graph.points[1].tolist() == [3.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        {"x": 1.5, "y": -2},
+        {"pos": (1.5, -2.0)},
+        {"pos": "1.5, -2"},
+        {"point": np.array([1.5, -2.0])},
+        {"world": [1.5, -2.0, 0.0], "pos": (300, 400)},
+        {"x": "1.5", "y": "-2"},
+    ],
+)
+def test_attributes_that_hold_a_point(facts):
+    graph: nx.Graph[Any] = nx.Graph()
+    graph.add_node("a", **facts)
+    assert hn.WaypointGraph.from_networkx(graph).points.tolist() == [[1.5, -2.0]]
+
+
+def test_undirected_graphs_and_loops_have_the_edges_that_they_mean(tmp_path):
+    plain: nx.MultiGraph[Any] = nx.MultiGraph()
+    plain.add_nodes_from([("a", {"x": 0, "y": 0}), ("b", {"x": 3, "y": 4})])
+    plain.add_edges_from([("a", "b"), ("a", "b"), ("a", "a")])
+    here = hn.WaypointGraph.from_networkx(plain)
+    nx.write_graphml(plain, tmp_path / "a.graphml")
+    (tmp_path / "a.json").write_text(json.dumps(nx.node_link_data(plain, edges="edges")))
+    for graph in (here, *map(hn.load_graph, (tmp_path / "a.graphml", tmp_path / "a.json"))):
+        assert means(graph)[1] == [("a", "a"), *[("a", "b")] * 2, *[("b", "a")] * 2]
+        assert set(graph.lengths_m.tolist()) == {0.0, 5.0}

@@ -1,0 +1,64 @@
+"""A page of a little map, served for one test."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+pytest.importorskip("uvicorn", reason="the page needs the extra view")
+pytest.importorskip("starlette", reason="the page needs the extra view")
+
+from tests.ext.page.browser import WINDOW, Shown, browsing
+from tests.ext.page.server import building_session_of, folder_in, served, session_of, write_building
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from tests.ext.page.server import Client
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser for all tests of a file."""
+    with browsing() as browser:
+        yield browser
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The folder of a map, with another one beside it that nothing may touch."""
+    return folder_in(tmp_path)
+
+
+@pytest.fixture
+def client(folder: Path) -> Iterator[Client]:
+    """A client of a server of the page."""
+    with served(session_of(folder / "four.yaml"), folder) as client:
+        yield client
+
+
+@pytest.fixture
+def building(folder: Path) -> Iterator[Client]:
+    """A client of a server of a building of two floors."""
+    session = building_session_of(write_building(folder))
+    with served(session, folder) as client:
+        yield client
+
+
+@pytest.fixture
+def context(browser: Any) -> Iterator[Any]:
+    """A person of its own, with a window of 1280 pixels."""
+    context = browser.new_context(**WINDOW)
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def shown(context: Any, client: Client) -> Iterator[Shown]:
+    """The page of four rooms; nothing on it may fail, or ask another server."""
+    shown = Shown(context, client.address)
+    yield shown
+    assert shown.errors == []
+    assert all(url.startswith((client.address, "blob:", "data:")) for url in shown.requests)

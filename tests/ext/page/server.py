@@ -1,0 +1,188 @@
+"""A page's server in a thread, and a client that sends what browsers and attackers would."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass
+from http.client import HTTPConnection
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import hybridnav as hn
+from hybridnav.ext.page import BuildingSession, Session
+from hybridnav.ext.page.app import make_app
+from hybridnav.ext.page.command import building_session
+from hybridnav.ext.page.connections import make_server
+from hybridnav.ext.page.rooms_file import RoomsFile
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+TOKEN = "0123456789abcdef"  # noqa: S105 - of a test
+MAP = """\
+####################
+#........#.........#
+#........#.........#
+#..................#
+#........#.........#
+#........#.........#
+####.#########.#####
+#........#.........#
+#........#.........#
+#..................#
+#........#.........#
+####################
+"""
+"""Four rooms in a ring; a letter is a square metre."""
+FINE = 4
+FRAME = hn.Frame(resolution_m=0.25, origin_m=(-3.0, 2.0), yaw_rad=0.3)
+
+
+def write_map(
+    folder: Path,
+    name: str = "four",
+    rooms: tuple[str, str, str, str] = ("a", "b", "c", "d"),
+    rooms_file: str = "rooms.yaml",
+    frame: hn.Frame = FRAME,
+) -> Path:
+    """Write the map of four rooms, turned and off the origin, and its rooms with names."""
+    walls = np.array([[letter == "#" for letter in line] for line in MAP.split()], dtype=float)
+    probability = np.kron(walls, np.ones((FINE, FINE)))[::-1]
+    grid = hn.OccupancyGrid(probability, frame=frame, robot_radius_m=0.2)
+    hn.write_ros_map(grid, folder / f"{name}.yaml")
+    rows, cols = np.indices(grid.shape)
+    labels = 2 * (rows < grid.shape[0] // 2 - 2) + (cols >= 9 * FINE + 2)
+    hn.save_rooms(folder / rooms_file, hn.RoomLabels(rooms, labels), grid)
+    return folder / f"{name}.yaml"
+
+
+BUILDING = """\
+speed_m_s: 0.5
+floors:
+- {name: ground, map: four.yaml, rooms: rooms.yaml}
+- {name: "2: upper", map: upper.yaml, rooms: more/rooms-2.yaml, elevation_m: 3.0}
+links:
+- name: lift
+  kind: lift
+  wait_s: 10
+  ends: [{floor: ground, room: a}, {floor: "2: upper", room: e}]
+- name: stairs
+  kind: stairs
+  cost_m: 4
+  ends: [{floor: ground, room: d}, {floor: "2: upper", door: 3, room: f}]
+- name: hatch
+  kind: ramp
+  max_radius_m: 0.1
+  ends: [{floor: ground, room: b}, {floor: "2: upper", room: h}]
+"""
+
+
+def write_building(folder: Path) -> Path:
+    """Write a building of two floors in a folder with the map of four rooms."""
+    (folder / "more").mkdir()
+    frame = hn.Frame(resolution_m=0.25, origin_m=(10.0, -4.0), yaw_rad=-0.7)
+    write_map(folder, "upper", ("e", "f", "g", "h"), "more/rooms-2.yaml", frame)
+    (folder / "building.yaml").write_text(BUILDING, encoding="utf-8")
+    return folder / "building.yaml"
+
+
+def folder_in(above: Path) -> Path:
+    """Make the folder of a map, with a file above it that no page may read or change."""
+    inside = above / "maps"
+    inside.mkdir()
+    (above / "secret.txt").write_text("secret", encoding="utf-8")
+    write_map(inside)
+    return inside
+
+
+def session_of(file: Path) -> Session:
+    """Return the session that the command would make."""
+    model = hn.load(file, robot_radius_m=0.2)
+    settings = model.fitted(None)
+    rooms_path = file.parent / "rooms.yaml"
+    rooms = hn.load_rooms(rooms_path, model.grid) if rooms_path.exists() else None
+    topology = model.grown(settings.pyramid, rooms or hn.find_rooms(model.grid))
+    return Session(model, topology, settings, file=RoomsFile(file.parent, "rooms.yaml"))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the server answered."""
+
+    code: int
+    body: bytes
+    headers: dict[str, str]
+
+    @property
+    def value(self) -> Any:
+        """The JSON in the body."""
+        return json.loads(self.body)
+
+
+@dataclass(frozen=True)
+class Client:
+    """A client of one server."""
+
+    port: int
+    session: Any
+    """What it shows."""
+
+    @property
+    def address(self) -> str:
+        """The address of the page."""
+        return f"http://127.0.0.1:{self.port}/{TOKEN}/"
+
+    def send(
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        headers: dict[str, str] | None = None,
+    ) -> Answer:
+        """Send any request; the path is that after the server's name."""
+        connection = HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            connection.request(method, path, body, headers or {})
+            response = connection.getresponse()
+            named = {name.lower(): value for name, value in response.getheaders()}
+            return Answer(response.status, response.read(), named)
+        finally:
+            connection.close()
+
+    def get(self, name: str, **headers: str) -> Answer:
+        """Get a file of the page."""
+        return self.send("GET", f"/{TOKEN}/{name}", None, headers)
+
+    def post(self, name: str, value: Any, **headers: str) -> Answer:
+        """Send a request of the page."""
+        kind = {"content-type": "application/json"}
+        return self.send("POST", f"/{TOKEN}/{name}", json.dumps(value).encode(), kind | headers)
+
+
+def building_session_of(file: Path) -> BuildingSession:
+    """Return what the command would show of a building."""
+    given = {"map_file": file, "preset": None, "overrides": None}
+    return building_session(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+
+
+@contextmanager
+def served(session: Any, folder: Path) -> Iterator[Client]:
+    """Serve a session until the end of the block."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        port = listening.getsockname()[1]
+        app = make_app(session, token=TOKEN, port=port, folder=folder)
+        server = make_server(app)
+        thread = threading.Thread(target=lambda: server.run(sockets=[listening]), daemon=True)
+        thread.start()
+        try:
+            yield Client(port, session)
+        finally:
+            server.should_exit = True
+            thread.join(20)

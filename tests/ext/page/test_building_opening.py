@@ -1,0 +1,122 @@
+"""A building opens with the cells of its lowest floor; the rest follows."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import pytest
+
+import hybridnav as hn
+from hybridnav.ext.page import BuildingOpening, BuildingSession, serve
+from hybridnav.ext.page.command import building_opening
+from tests.ext.page.browser import WINDOW, browsing
+from tests.ext.page.server import building_session_of, folder_in, served, write_building
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+QUERY = {
+    "start": {"floor": 0, "point": [20.5, 40.5]},
+    "goal": {"floor": 1, "point": [60.5, 8.5]},
+    "preset": "shortest",
+}
+
+
+class _Held:
+    """A building that is read when the test lets it."""
+
+    def __init__(self, file: Path) -> None:
+        self.go_on = threading.Event()
+        self.file = file
+        grid = hn.load(file.parent / "four.yaml", robot_radius_m=0.2).grid
+        self.opening = BuildingOpening("building", ["ground", "2: upper"], grid, self._make)
+
+    def _make(self, tell: Callable[[str], None]) -> BuildingSession:
+        tell("reading 2 floors")
+        assert self.go_on.wait(60)
+        return building_session_of(self.file)
+
+
+def test_cells_of_the_lowest_floor_are_there_first(folder: Path) -> None:
+    held = _Held(write_building(folder))
+    whole = building_session_of(held.file)
+    with served(held.opening, folder) as client:
+        held.opening.begin()
+        found = client.get("map.json").value
+        assert (found["ready"], found["floors"]) == (False, ["ground", "2: upper"])
+        assert client.get("floor/0/map.json").value["ready"] is False
+        tile = client.get("floor/0/tile/map/0/0/0.png")
+        assert tile.body == whole.sessions[0].layer("map").png(0, 0, 0, "light")
+        assert client.get("floor/0/state.json").value["stage"] == "reading 2 floors"
+        assert client.get("floor/1/map.json").code == 503
+        assert client.get("floor/7/map.json").code == 503
+        for name in ("plan", "optimum", "alternatives", "export/model", "floor/0/save"):
+            value = {"version": 0} if name.endswith("save") else QUERY
+            assert client.post(name, None if "export" in name else value).code == 503
+        held.go_on.set()
+        held.opening.wait()
+        assert client.get("map.json").value == whole.describe()
+        assert client.get("floor/1/map.json").value == whole.sessions[1].describe()
+        assert client.get("floor/0/state.json").value["stage"] == ""
+        assert client.get("floor/7/map.json").code == 422
+        plan = client.post("plan", QUERY).value
+        assert plan["solved"]
+        assert plan["seconds"] < 1  # nothing is left to prepare on either floor
+
+
+def test_what_is_wrong_with_a_building_ends_the_server(folder: Path) -> None:
+    file = write_building(folder)
+    file.write_text(file.read_text("utf-8").replace("room: e}", "room: nowhere}"), "utf-8")
+    given = {"map_file": file, "preset": None, "overrides": None}
+    opening = building_opening(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+    with pytest.raises(hn.MapError, match="nowhere"):
+        serve(opening, folder)
+
+
+def test_a_wrong_lowest_floor_is_refused_before_the_page_opens(folder: Path) -> None:
+    file = write_building(folder)
+    (folder / "four.yaml").unlink()
+    given = {"map_file": file, "preset": None, "overrides": None}
+    with pytest.raises(hn.MapError, match=r"floor ground.*four\.yaml"):
+        building_opening(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+
+
+def test_a_model_has_all_its_floors_at_once(folder: Path, tmp_path: Path) -> None:
+    model = tmp_path / "building.hnm"
+    hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
+    given = {"map_file": model, "preset": None, "overrides": None}
+    shown = building_opening(given | {"robot_radius_m": None, "max_cells": 10**6})
+    assert isinstance(shown, BuildingSession)
+
+
+@pytest.mark.full
+def test_the_page_goes_on_when_all_floors_are_there(tmp_path: Path) -> None:
+    folder = folder_in(tmp_path)
+    held = _Held(write_building(folder))
+    with served(held.opening, folder) as client, browsing() as browser:
+        held.opening.begin()
+        page = browser.new_context(**WINDOW).new_page()
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(client.address)
+        page.wait_for_selector("canvas[data-open=true]")
+        page.wait_for_selector("text=Reading 2 floors")
+        # Whatever people try meanwhile does no harm.
+        page.mouse.move(300, 300)
+        page.mouse.down()
+        page.mouse.move(350, 350)
+        page.mouse.up()
+        page.mouse.click(300, 400)
+        page.focus("#map")
+        for key in ("PageUp", "Control+z", "Space", "Enter", "Escape"):
+            page.keyboard.press(key)
+        assert page.locator("#status").inner_text() == ""
+        held.go_on.set()
+        page.wait_for_selector("canvas[data-ready=true]")
+        assert page.locator("#close-link option").count() == 4
+        page.select_option("#floor", "1")
+        page.wait_for_selector("text=Floor 2: upper")
+        assert page.locator("#start").input_value() == ""
+        assert errors == []

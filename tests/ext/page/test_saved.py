@@ -1,0 +1,130 @@
+"""The page as one file: it opens by double click and asks nobody for anything."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.ext.page.browser import Shown, browsing
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def _save(cli: Any, folder: Path, *more: object) -> Any:
+    out = folder.parent / "page.html"
+    settings = ("--robot-radius", "0.2", "--save", out, *more)
+    return cli("view", folder / "four.yaml", *settings), out
+
+
+def _data(out: Path) -> Any:
+    found = re.search(
+        r'<script type="application/json" id="saved">(.*?)</script>', out.read_text("utf-8")
+    )
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_the_file_holds_the_map_the_rooms_and_the_routes(cli: Any, folder: Path) -> None:
+    done, out = _save(cli, folder, "--route", "0,4:9,12", "--route", "9,12:0,4")
+    assert (done.code, done.err) == (0, "")
+    assert "2 routes" in done.out
+    data = _data(out)
+    assert [room["name"] for room in data["map"]["rooms"]["rooms"]] == ["a", "b", "c", "d"]
+    planned = [
+        cli("plan", folder / "four.yaml", "--robot-radius", 0.2, *ends, "--json").answer
+        for ends in (
+            ("--start", "0,4", "--goal", "9,12"),
+            ("--start", "9,12", "--goal", "0,4"),
+        )
+    ]
+    lengths = [route["length_m"] for route in data["routes"]]
+    assert lengths == pytest.approx([plan["length_m"] for plan in planned])
+
+
+def test_the_file_names_no_address_and_holds_no_path(cli: Any, folder: Path) -> None:
+    _, out = _save(cli, folder)
+    text = out.read_text("utf-8")
+    assert not re.search(r"(src|href)=\"(?!data:)", text)
+    assert "import " not in text.split('type="module">')[1]
+    assert str(folder) not in text
+
+
+def test_a_name_cannot_end_the_script(cli: Any, folder: Path) -> None:
+    rooms = folder / "rooms.yaml"
+    text = rooms.read_text("utf-8").replace("name: a", "name: </script><b>")
+    rooms.write_text(text, encoding="utf-8")
+    _, out = _save(cli, folder)
+    assert _data(out)["map"]["rooms"]["rooms"][0]["name"] == "</script><b>"
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--route", "1,2"), "X,Y:X,Y"),
+        (("--route", "1,2:3,inf"), "X,Y:X,Y"),
+        (("--route", "1,2:3,4:5,6"), "X,Y:X,Y"),
+        (("--save", "page.txt"), "must end in .html"),
+    ],
+)
+def test_what_cannot_be_saved_is_refused(
+    cli: Any, folder: Path, more: tuple[str, ...], words: str
+) -> None:
+    done, _ = _save(cli, folder, *more)
+    assert done.refuses(2, words)
+
+
+def test_routes_are_for_saved_pages(cli: Any, folder: Path) -> None:
+    assert cli("view", folder / "four.yaml", "--route", "0,4:9,12").refuses(2, "--save")
+
+
+@pytest.mark.full
+def test_the_file_opens_in_a_browser_without_a_server(cli: Any, folder: Path) -> None:
+    with browsing() as browser:
+        routes = ("0,4:9,12", "9,12:0,4", "0,4:-50,-50")
+        _, out = _save(cli, folder, *(part for text in routes for part in ("--route", text)))
+        context = browser.new_context(viewport={"width": 1280, "height": 800}, offline=True)
+        shown = Shown(context, out.as_uri())
+        assert f"{_data(out)['routes'][0]['length_m']:.2f} m" in shown.text("#figures")
+        assert "you are at" in shown.text("#words")
+        shown.page.locator(".route-card").nth(1).click()
+        assert not shown.page.locator("#rename").is_visible()
+        shown.page.locator(".route-card").nth(2).click()
+        assert shown.text("#status").startswith("No route: ")
+        assert not shown.page.locator("#route-title").is_visible()  # nothing stands below it
+        for colours in ("map", "level", "rooms"):
+            shown.page.select_option("#colours", colours)
+        shown.page.select_option("#theme", "dark")
+        shown.page.check("#show-graph")
+        shown.page.click("#zoom-in")
+        shown.wait("document.getElementById('map').dataset.waiting === '0'")
+        assert shown.errors == []
+        assert all(url.startswith(("file:", "data:")) for url in shown.requests)
+
+
+@pytest.mark.full
+def test_the_whole_map_stays_in_view_when_the_window_changes(cli: Any, folder: Path) -> None:
+    phone = {"width": 390, "height": 844}
+    with browsing() as browser:
+        _, out = _save(cli, folder)
+        known = _data(out)["map"]["known"]
+        shown = Shown(browser.new_context(viewport={"width": 1280, "height": 800}), out.as_uri())
+        shown.page.set_viewport_size(phone)
+        shown.wait("document.getElementById('map').clientWidth === 390")
+        shown.wait(f"{0.95 * 390} > {known[1] - known[0]} * {_SCALE}")
+        fitted = float(shown.fact("view").split()[2])
+        shown.page.click("#zoom-in")  # a person's own view stays
+        shown.wait(f"{_SCALE} > {fitted}")
+        scale = float(shown.fact("view").split()[2])
+        shown.page.set_viewport_size({"width": 800, "height": 844})
+        shown.wait("document.getElementById('map').clientWidth > 390")
+        shown.wait("(map => map.width === map.clientWidth)(document.getElementById('map'))")
+        shown.wait_painted()
+        assert float(shown.fact("view").split()[2]) == scale
+        assert shown.errors == []
+
+
+_SCALE = "Number(document.getElementById('map').dataset.view.split(' ')[2])"

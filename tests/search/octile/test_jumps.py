@@ -1,0 +1,235 @@
+"""Paths on the jump-point graph are legal and as short as any, contracted or not."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from benchmarks.worlds import office_world
+from hybridnav.maps import CellClass
+from hybridnav.search.octile import JumpPaths, JumpSearch, build_jump_graph, contract_graph
+from tests.oracle.grid import assert_legal, distances, move_graph, recounted
+from tests.search.test_movingai_optima import problem_set, scenario_files
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from hybridnav.search.octile import JumpPath
+
+Cell = tuple[int, int]
+
+seeds = st.integers(0, 2**32 - 1)
+QUICK_FILES = 4
+
+
+def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
+    """One of the graph of free cells, and one of the contracted graph."""
+    graph = build_jump_graph(free)
+    return JumpSearch(graph), JumpSearch(contract_graph(graph))
+
+
+def assert_shortest(
+    found: JumpPath, free: NDArray[np.bool_], endpoints: tuple[Cell, Cell], optimum: float
+) -> None:
+    """Assert that an answer is right, by the length of a shortest path."""
+    if math.isinf(optimum):
+        assert found.cells is None
+        assert found.length_cells == math.inf
+        return
+    assert found.cells is not None
+    assert_legal(found.cells, free)
+    assert (tuple(found.cells[0]), tuple(found.cells[-1])) == endpoints
+    assert found.length_cells == recounted(found.cells)
+    assert found.length_cells == pytest.approx(optimum, abs=1e-9)
+
+
+def assert_all_pairs(free: NDArray[np.bool_]) -> None:
+    """Assert that the paths between all pairs of free cells are shortest."""
+    both, moves = searches(free), move_graph(free)
+    cells = [(row, col) for row, col in np.argwhere(free).tolist()]
+    for start in cells:
+        optima = distances(moves, free.shape, start)
+        for search, goal in itertools.product(both, cells):
+            assert_shortest(search.path(start, goal), free, (start, goal), optima[goal])
+
+
+def map_of(*lines: str) -> NDArray[np.bool_]:
+    free: NDArray[np.bool_] = drawn(*lines) == CellClass.FREE
+    return free
+
+
+@settings(max_examples=examples(30), deadline=None)
+@given(class_grids(max_side=6))
+def test_paths_between_all_pairs_of_small_maps_are_shortest(classes: Any) -> None:
+    assert_all_pairs(classes == CellClass.FREE)
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(class_grids(), seeds)
+def test_paths_are_shortest(classes: Any, seed: int) -> None:
+    free = classes == CellClass.FREE
+    assume(free.any())
+    both, moves = searches(free), move_graph(free)
+    cells = [(row, col) for row, col in np.argwhere(free).tolist()]
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        start = cells[rng.integers(len(cells))]
+        optima = distances(moves, free.shape, start)
+        for goal in [cells[i] for i in rng.integers(len(cells), size=8)]:
+            for search in both:
+                assert_shortest(search.path(start, goal), free, (start, goal), optima[goal])
+
+
+@pytest.mark.parametrize(
+    "free",
+    [
+        map_of("."),
+        map_of("....."),
+        map_of(".", ".", "."),
+        map_of(".#", "#."),
+        map_of("#.#", "...", "#.#"),
+        map_of("...", ".#.", "..."),
+        map_of("....", ".##.", "...."),
+        map_of("..#..", ".#.#.", "#...#", ".#.#.", "..#.."),
+        map_of("....#....", ".........", "####.####", "....#...."),
+        map_of("#######", "#.....#", "#.###.#", "#.#.#.#", "#.###.#", "#.....#", "#######"),
+        map_of(".#.#.#.", ".......", ".#.#.#.", ".......", ".#.#.#."),
+        np.ones((5, 9), np.bool_),
+    ],
+)
+def test_paths_between_all_pairs_of_corners_corridors_and_islands(free: NDArray[np.bool_]) -> None:
+    assert_all_pairs(free)
+
+
+def test_a_map_without_free_cells_has_an_empty_graph() -> None:
+    graph = build_jump_graph(np.zeros((3, 4), np.bool_))
+    assert graph.n_corners == 0
+    assert len(graph.ahead) == 0
+
+
+def test_the_map_given_is_not_changed_and_the_graph_cannot_be() -> None:
+    free = map_of("...", ".#.", "...")
+    before = free.copy()
+    graph = build_jump_graph(free)
+    assert (free == before).all()
+    for array in (graph.index, graph.ahead, graph.places, graph.first, graph.arcs):
+        assert not array.flags.writeable
+
+
+def speckled(seed: int) -> NDArray[np.bool_]:
+    free = np.random.default_rng(seed).random((MAX_SIDE, MAX_SIDE)) > 0.15
+    free[0, 0] = free[-1, -1] = True
+    return free
+
+
+def pairs_of(free: NDArray[np.bool_], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    cells = np.argwhere(free)
+    starts, goals = cells[np.random.default_rng(1).integers(len(cells), size=(2, n))]
+    return starts, goals
+
+
+def path_of(found: JumpPaths, i: int) -> list[list[int]]:
+    cells: list[list[int]] = found.cells[found.path_start[i] : found.path_start[i + 1]].tolist()
+    return cells
+
+
+def test_many_pairs_get_the_answers_that_each_gets_alone() -> None:
+    free = speckled(2)
+    starts, goals = pairs_of(free, 200)
+    for search in searches(free):
+        found = search.many(starts, goals)
+        for i in range(200):
+            alone = search.path(tuple(starts[i].tolist()), tuple(goals[i].tolist()))
+            assert alone.length_cells == found.length_cells[i]
+            assert alone.expanded == found.expanded[i]
+            assert path_of(found, i) == ([] if alone.cells is None else alone.cells.tolist())
+
+
+def test_no_pairs_get_no_answers() -> None:
+    none = np.empty((0, 2), np.int64)
+    found = JumpSearch(build_jump_graph(speckled(2))).many(none, none)
+    assert len(found.length_cells) == len(found.cells) == 0
+    assert found.path_start.tolist() == [0]
+
+
+def test_a_contracted_graph_of_a_building_expands_less_than_a_third() -> None:
+    free = office_world().grid(robot_radius_m=0.25).classes == CellClass.FREE
+    starts, goals = pairs_of(free, 200)
+    flat, contracted = searches(free)
+    assert contracted.graph.is_contracted
+    before, found = flat.many(starts, goals), contracted.many(starts, goals)
+    assert found.length_cells.tolist() == before.length_cells.tolist()
+    assert 0 < 3 * found.expanded.sum() < before.expanded.sum()
+
+
+def test_noise_is_not_contracted_for_minutes() -> None:
+    graph = build_jump_graph(np.random.default_rng(0).random((300, 300)) > 0.1)
+    assert contract_graph(graph) is graph
+
+
+def test_a_graph_with_an_arc_without_its_reverse_is_not_contracted() -> None:
+    graph = build_jump_graph(drawn("......", "..##..", "......", ".##...", "......") == 1)
+    assert contract_graph(graph).is_contracted
+    for arc in range(len(graph.arcs)):
+        first = (graph.first - (graph.first > arc)).astype(graph.first.dtype)
+        halved = replace(graph, first=first, arcs=np.delete(graph.arcs, arc, axis=0))
+        assert contract_graph(halved) is halved
+
+
+def test_threads_that_share_a_search_get_the_answers_of_one() -> None:
+    free = speckled(4)
+    starts, goals = pairs_of(free, 400)
+    for search in searches(free):
+        expected = search.many(starts, goals)
+        with ThreadPoolExecutor(4) as pool:
+            alone = list(
+                pool.map(search.path, map(tuple, starts.tolist()), map(tuple, goals.tolist()))
+            )
+        assert [path.length_cells for path in alone] == expected.length_cells.tolist()
+        for i, path in enumerate(alone):
+            assert path_of(expected, i) == ([] if path.cells is None else path.cells.tolist())
+
+
+@pytest.mark.full
+def test_a_map_with_a_side_too_long_for_16_bits_is_searched_too() -> None:
+    free = np.ones((3, 40_000), np.bool_)
+    free[1, 20_000] = free[:2, 30_000] = False
+    for search in searches(free):
+        found = search.path((0, 0), (0, 39_999))
+        assert found.length_cells == pytest.approx(39_999 - 4 + 4 * math.sqrt(2))
+        assert found.cells is not None
+        assert_legal(found.cells, free)
+
+
+def assert_states(data: Path, name: str, step: int) -> None:
+    grid, problems = problem_set(data / "movingai" / name)
+    free = grid.classes == CellClass.FREE
+    both = searches(free)
+    for problem, search in itertools.product(problems[::step], both):
+        scenario = problem.scenario
+        found = search.path(scenario.start, scenario.goal)
+        assert found.cells is not None
+        assert_legal(found.cells, free)
+        assert problem.states(found.cells), scenario
+
+
+@pytest.mark.parametrize("name", scenario_files()[::8][:QUICK_FILES])
+def test_lengths_are_those_that_some_scenarios_state(data: Path, name: str) -> None:
+    assert_states(data, name, step=4)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", scenario_files())
+def test_lengths_are_those_that_all_scenarios_state(data: Path, name: str) -> None:
+    assert_states(data, name, step=1)
