@@ -109,7 +109,9 @@ def test_a_notebook_holds_on_another_map(path: Path, tmp_path: Path) -> None:
 
 
 def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> None:
-    (tmp_path / "profile_default" / "startup" / "without_ompl.py").write_text(WITHOUT_OMPL)
+    startup = tmp_path / "profile_default" / "startup"
+    startup.mkdir(parents=True)
+    (startup / "without_ompl.py").write_text(WITHOUT_OMPL)
     outputs = executed(nbformat.read(NEEDS_OMPL, as_version=4))
     assert written(outputs).count("not installed") == 1
     assert "Error" not in written(outputs)

@@ -10,7 +10,8 @@ from ompl import base, util
 
 from hybridnav.refine.ompl import chain
 from hybridnav.refine.ompl.attempts import Attempts
-from hybridnav.refine.ompl.problem import IMPROVING, Problem, search_area_of, solve
+from hybridnav.refine.ompl.problem import search_area_of
+from hybridnav.refine.ompl.solve import IMPROVING, Problem, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable

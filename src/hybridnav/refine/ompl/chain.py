@@ -15,7 +15,8 @@ import numpy as np
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.refine.ompl.attempts import Simplifier
-from hybridnav.refine.ompl.problem import IMPROVING, Problem, bounds_of, solve
+from hybridnav.refine.ompl.problem import bounds_of
+from hybridnav.refine.ompl.solve import IMPROVING, Problem, solve
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
