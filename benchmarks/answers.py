@@ -43,8 +43,15 @@ EXPLORED = ROOT / "maps" / "office-explored" / "office-explored.yaml"
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
 PRESETS = ("shortest", "octile", "grid-astar", "paper", "robot", "ompl-rrtconnect")
 BY_SECONDS = ("ompl-bitstar", "ompl-informed-rrtstar", "ompl-rrtstar")
-"""Presets that stop by a clock; they are asked for 200 rounds instead, on few maps. PRM* grows its
+"""Planners that stop by a clock; they are asked for 200 rounds instead, on few maps. PRM* grows its
 roadmap in threads, so that no two answers are equal."""
+OF_OMPL = {
+    "ompl-rrtconnect": "RRTConnect",
+    "ompl-bitstar": "BITstar",
+    "ompl-informed-rrtstar": "InformedRRTstar",
+    "ompl-rrtstar": "RRTstar",
+}
+"""The planner of the preset `ompl` for each line; the lines keep the names of the first freeze."""
 N_PAIRS = 16
 N_CLOSED = 4
 """Of these pairs are planned again with a disc closed on the way."""
@@ -104,7 +111,9 @@ def map_answers(one: StudyMap, name: str) -> Answers:
     for preset in PRESETS + (BY_SECONDS if few else ()):
         over = ["planner.ompl.budget_s=100"] if preset.startswith("ompl") else []
         over += ["planner.ompl.iterations=200"] if preset in BY_SECONDS else []
-        chosen = hn.load_preset(preset, overrides=over)
+        of_ompl = preset in OF_OMPL
+        over += [f"planner.ompl.planner={OF_OMPL[preset]}"] if of_ompl else []
+        chosen = hn.load_preset("ompl" if of_ompl else preset, overrides=over)
         planner = hn.HybridPlanner(topology, preset=chosen)
         count = N_PAIRS if not preset.startswith("ompl") else 4
         with contextlib.closing(planner):

@@ -4,7 +4,8 @@ The layers of this package look up by name what stands above them. The wing, `hy
 registered like a package of others, in `pyproject.toml`:
 
 * `hybridnav.commands`: a function, or a `typer.Typer`, by the name of the command;
-* `hybridnav.formats`: a module that opens, saves or recognises files of a kind;
+* `hybridnav.formats`: a function that reads a map, by its suffix, such as `.hnm`, with the
+  parameters of `load_map`; or a module that recognises and reads files of a kind;
 * `hybridnav.methods`: a class of routes or of methods of the harness.
 """
 

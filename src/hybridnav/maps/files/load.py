@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav._base.extension import extension
-from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav._base.extension import extension, extensions
+from hybridnav._base.files import printable
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.files.movingai import load_movingai_map
@@ -36,7 +36,8 @@ def load_map(
     ----------
     path
         A ROS map (.yaml or .yml, beside its image), a MovingAI map (.map, cells of 1 m), or the
-        map of a model (.hnm).
+        map of a model (.hnm). Other packages add formats: a function with these parameters, as the
+        entry point of its suffix in `hybridnav.formats`.
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
         occupied cell. 0 for a robot that is a point; None is the default: 0.25 m, or for a model
@@ -80,10 +81,9 @@ def load_map(
     array([[1, 2, 0]], dtype=uint8)
     """
     suffix = Path(path).suffix.lower()
-    if suffix == MODEL_SUFFIX:
-        loader: Callable[..., OccupancyGrid] | None = extension("formats", "model").load_grid
-    else:
-        loader = _LOADERS.get(suffix)
+    loader: Callable[..., OccupancyGrid] | None = _LOADERS.get(suffix)
+    if loader is None and suffix in extensions("formats"):
+        loader = extension("formats", suffix)
     if loader is None:
         hint = (
             "pass the YAML file that names this image"

@@ -1,0 +1,54 @@
+"""Entry points: what other packages add is found by name; what is not there is said in a line."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav._base import extension
+from hybridnav.maps.files import load as loading
+
+
+def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:
+    """A format of another package: rows of digits, 1 for occupied."""
+    lines = Path(path).read_text(encoding="utf-8").split()
+    rows = [[float(digit) for digit in line] for line in lines]
+    return hn.OccupancyGrid(np.array(rows), robot_radius_m=reading["robot_radius_m"])
+
+
+@pytest.fixture
+def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that registers the suffix `.txt`, installed for one test."""
+    point = EntryPoint(".txt", f"{__name__}:read_text", "hybridnav.formats")
+    known = extension.extensions
+    everything = {".txt": point} | known("formats")
+
+    def extensions(group: str) -> Any:
+        return everything if group == "formats" else known(group)
+
+    monkeypatch.setattr(loading, "extensions", extensions)
+    monkeypatch.setattr(extension, "extensions", extensions)
+
+
+@pytest.mark.usefixtures("text_maps")
+def test_a_map_format_of_another_package_is_read_by_its_suffix(tmp_path: Any) -> None:
+    (tmp_path / "cells.txt").write_text("010\n000\n")
+    grid = hn.load_map(tmp_path / "cells.txt", robot_radius_m=0)
+    assert grid.classes.tolist() == [[1, 0, 1], [1, 1, 1]]
+
+
+def test_the_wing_is_registered() -> None:
+    commands = {"check", "explore", "export", "map", "replay", "view"}
+    assert set(extension.extensions("commands")) >= commands
+    assert {".hnm", "building", "bag"} <= set(extension.extensions("formats"))
+    assert {"graph", "homotopy"} <= set(extension.extensions("methods"))
+
+
+def test_what_nothing_registers_is_said_in_one_line() -> None:
+    with pytest.raises(hn.InvalidValueError, match=r"^nothing is registered as svg in hybridnav"):
+        extension.extension("formats", "svg")
