@@ -7,18 +7,18 @@ from tests.product.house import figures
 LIMITS = {
     "code": 56_400,
     "lines": 93_100,
-    "files": 471,
+    "files": 473,
     "code outside ext": 39_100,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 62,
     "arrows, with single modules": 78,
-    "files visited by paper": 55,
+    "files visited by paper": 56,
     "lines visited by paper": 11_300,
     "modules of a plan and a picture": 157,
     "imports, % of the code": 10.1,
-    "lines of tests": 56_900,
+    "lines of tests": 57_000,
 }
 
 

@@ -35,7 +35,7 @@ _SAMPLES = 9
 """Points per side of a name's box that are looked up in the map."""
 
 
-class Numbered(Protocol):
+class NumberedDoor(Protocol):
     """A door with a number, of a map or of one that changes."""
 
     @property
@@ -71,7 +71,7 @@ class RoomWriter:
         self.unnamed: list[int] = []
         """Rooms whose names did not fit, the largest first."""
 
-    def number_doors(self, doors: Sequence[Numbered], *, always: bool = False) -> None:
+    def number_doors(self, doors: Sequence[NumberedDoor], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
 
         Parameters
