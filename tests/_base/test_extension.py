@@ -11,7 +11,6 @@ import pytest
 
 import hybridnav as hn
 from hybridnav._base import extension
-from hybridnav.maps.files import load as loading
 
 
 def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:
@@ -31,7 +30,6 @@ def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     def extensions(group: str) -> Any:
         return everything if group == "formats" else known(group)
 
-    monkeypatch.setattr(loading, "extensions", extensions)
     monkeypatch.setattr(extension, "extensions", extensions)
 
 
