@@ -11,6 +11,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav._base import extension
+from hybridnav.maps.files import load as loading
 
 
 def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:
@@ -30,6 +31,7 @@ def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     def extensions(group: str) -> Any:
         return everything if group == "formats" else known(group)
 
+    monkeypatch.setattr(loading, "extensions", extensions)
     monkeypatch.setattr(extension, "extensions", extensions)
 
 

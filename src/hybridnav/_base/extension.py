@@ -12,7 +12,7 @@ registered like a package of others, in `pyproject.toml`:
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from hybridnav.errors import InvalidValueError
@@ -25,19 +25,6 @@ def extensions(group: str) -> dict[str, EntryPoint]:
 
 
 @cache
-def _own() -> dict[tuple[str, str], EntryPoint]:
-    """Return what this package registers: one file, where all packages are a tenth of a plan."""
-    try:
-        return {(one.group, one.name): one for one in distribution("hybridnav").entry_points}
-    except PackageNotFoundError:  # a copy of the sources
-        return {}
-
-
-def registered(group: str, name: str) -> EntryPoint | None:
-    """Return what is registered under a name in `hybridnav.GROUP`, None if nothing is."""
-    return _own().get((f"hybridnav.{group}", name)) or extensions(group).get(name)
-
-
 def extension(group: str, name: str) -> Any:
     """Load what is registered under a name in `hybridnav.GROUP`.
 
@@ -46,7 +33,7 @@ def extension(group: str, name: str) -> Any:
     InvalidValueError
         When nothing is: this package was not installed whole.
     """
-    found = registered(group, name)
+    found = extensions(group).get(name)
     if found is None:
         raise InvalidValueError(
             f"nothing is registered as {name} in hybridnav.{group}: install hybridnav again"

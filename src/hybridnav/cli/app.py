@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 import hybridnav as hn
-from hybridnav._base.extension import extensions, registered
+from hybridnav._base.extension import extension, extensions
 from hybridnav.cli.common import answer, complain
 from hybridnav.cli.compiling import notice_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
@@ -46,14 +46,15 @@ class _Commands(TyperGroup):
             if cmd_name in _HOME_OF:
                 home = getattr(import_module(f"hybridnav.cli.{_HOME_OF[cmd_name]}"), cmd_name)
                 self.add_command(_command(cmd_name, home), cmd_name)
-            elif found := registered("commands", cmd_name):
-                self.add_command(_command(cmd_name, found.load()), cmd_name)
+            elif cmd_name in extensions("commands"):
+                home = extension("commands", cmd_name)
+                self.add_command(_command(cmd_name, home), cmd_name)
         return super().get_command(ctx, cmd_name)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse an unknown command before Typer loads what checks the options of a known one."""
         known = not args or args[0].startswith("-") or args[0] in _HOME_OF
-        if not known and not registered("commands", args[0]):
+        if not known and args[0] not in extensions("commands"):
             for name in self.list_commands(ctx):  # one of them may have been meant
                 self.get_command(ctx, name)
             self.resolve_command(ctx, args)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav._base.extension import registered
+from hybridnav._base.extension import extension, extensions
 from hybridnav._base.files import printable
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -82,8 +82,8 @@ def load_map(
     """
     suffix = Path(path).suffix.lower()
     loader: Callable[..., OccupancyGrid] | None = _LOADERS.get(suffix)
-    if loader is None and (found := registered("formats", suffix)):
-        loader = found.load()
+    if loader is None and suffix in extensions("formats"):
+        loader = extension("formats", suffix)
     if loader is None:
         hint = (
             "pass the YAML file that names this image"
