@@ -145,7 +145,7 @@ def soak(plans: int, *, seed: int = 0) -> dict[str, float]:
         "ompl", overrides=["planner.ompl.planner=BITstar", "planner.ompl.budget_s=0.25"]
     )
     planner = hn.HybridPlanner(topology, preset=preset)
-    worker: Any = planner._ompl._worker  # type: ignore[union-attr]  # noqa: SLF001
+    worker: Any = planner._now.ompl._worker  # type: ignore[union-attr]  # noqa: SLF001
     free = np.argwhere(grid.classes == hn.CellClass.FREE)
     pairs = np.random.default_rng(seed).choice(free, (plans, 2))
     unsolved, longest, before = 0, 0.0, 0

@@ -17,7 +17,7 @@ from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment, map_digest
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.planner import load_preset
-from hybridnav.planner.ompl_plans import OmplPlanner
+from hybridnav.planner.methods.ompl import OmplPlanner
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -132,7 +132,8 @@ class Bench:
         """The planner of a method; its process runs until it is dropped."""
         whole = method.scope == "whole map"
         field_of = None if whole else self._coarse.topology.level.field_of
-        return OmplPlanner(self.grid, method.settings, field_of)
+        settings: Any = method.settings
+        return OmplPlanner(self.grid, settings, field_of)
 
     def records(self, method: Method, there: set[str]) -> Iterator[Record]:
         """Records of a method that are not there yet."""

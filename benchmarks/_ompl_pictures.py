@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import hybridnav as hn
 from benchmarks.worlds import office_world
 from hybridnav.planner import load_preset
-from hybridnav.planner.ompl_plans import OmplPlanner
+from hybridnav.planner.methods.ompl import OmplPlanner
 from hybridnav.viz import plot_search
 
 if TYPE_CHECKING:
@@ -43,7 +43,8 @@ def draw(out: Path) -> list[Path]:
             settings = f"planner.ompl={{planner: {planner}, confine: {confine}}}"
             preset = load_preset("ompl", overrides=[settings])
             is_whole = scope == "whole map"
-            plan = OmplPlanner(grid, preset.planner, None if is_whole else field_of).plan(
+            section: Any = preset.planner
+            plan = OmplPlanner(grid, section, None if is_whole else field_of).plan(
                 path.cells, (poses[0], poses[1]), None, tells_search=True
             )
             assert plan.path is not None  # noqa: S101 - the office is easy

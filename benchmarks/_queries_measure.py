@@ -134,7 +134,8 @@ def measure(
     for name in answers:
         is_line = bool(answers[name]["is_line"].any())
         best_m = any_angle_m if is_line else octile_m
-        faults[name] += _broken(solved, answers[name], best_m, presets[name].planner.epsilon)
+        epsilon = getattr(presets[name].planner, "epsilon", None)
+        faults[name] += _broken(solved, answers[name], best_m, epsilon)
         rows[name] |= {
             "metric": "any-angle" if is_line else "octile",
             **_figures(answers[name], answers[YARDSTICK]["us"], best_m),

@@ -32,7 +32,7 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.planner.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 
 if TYPE_CHECKING:
@@ -69,8 +69,8 @@ def planner_of(file: Path) -> hn.HybridPlanner:
 
 def forget(planner: hn.HybridPlanner) -> None:
     """Drop the searches round what was closed."""
-    assert isinstance(planner._cells, OverMesh)  # noqa: S101, SLF001
-    planner._cells._detours.clear()  # noqa: SLF001
+    assert isinstance(planner.method, OverMesh)  # noqa: S101
+    planner.method._detours.clear()  # noqa: SLF001
 
 
 def on_path(path: hn.Path, rng: np.random.Generator) -> shapely.Polygon:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
-_OVERLAY = "planner.coarse=overlay"
+_OVERLAY = "planner.method=cheapest"
 CHOICES = [
     ("paper", ()),
     ("grid-astar", ()),
@@ -87,8 +87,8 @@ def check_plan(planner: hn.HybridPlanner, start: Any, goal: Any, optimum: float)
     grid, setting = planner.topology.grid, planner.preset.planner
     result = planned(planner, start, goal)
     # All presets but the paper's promise the optimum, or what epsilon leaves of it.
-    epsilon = None if setting.coarse == "max-distance" else setting.epsilon or 0
-    assert_proved(result, optimum, epsilon, ROUNDING if setting.coarse == "overlay" else 0.0)
+    epsilon = None if setting.method == "paper" else getattr(setting, "epsilon", None) or 0
+    assert_proved(result, optimum, epsilon, ROUNDING if setting.method == "cheapest" else 0.0)
     if result.path is not None:
         enterable = grid.enterable(allow_unexplored=setting.allow_unexplored)
         cells = result.path.cells

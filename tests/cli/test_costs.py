@@ -70,7 +70,10 @@ def test_masks_are_read_and_joined(cli: Any, tmp_path: Path) -> None:
         (("--costs", "clearance:scaling=high"), "scaling must be a number, got 'high'"),
         (("--costs", "clearance:scaling=-1"), "planner.costs.clearance.scaling"),
         (("--costs", "speed"), "--costs speed: expected speed:FILE, got 'speed'"),
-        (("--costs", "clearance", "--preset", "shortest"), "coarse: mesh knows lengths only"),
+        (
+            ("--costs", "clearance", "--preset", "shortest"),
+            "planner.costs: unknown key; shortest has ",
+        ),
     ],
 )
 def test_wrong_costs_are_wrong_usage_in_one_line(cli: Any, options: Any, message: str) -> None:

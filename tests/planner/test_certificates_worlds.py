@@ -92,7 +92,7 @@ def test_bounds_are_lengths_in_metres_whatever_the_frame() -> None:
 
 def test_a_smaller_epsilon_proves_more(office: list[hn.HybridPlanner]) -> None:
     by_epsilon = {
-        p.preset.planner.epsilon: p for p in office if p.preset.planner.coarse == "overlay"
+        p.preset.planner.epsilon: p for p in office if p.preset.planner.method == "cheapest"
     }
     steps = [0.1, 0.01, None]
     gaps = []

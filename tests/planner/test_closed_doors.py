@@ -451,13 +451,13 @@ def test_what_is_closed_again_is_not_searched_for_again(
 
     cells = [closed(form) for form in forms]
     # What is asked for again and again stays, whatever else is closed between.
-    searched, cells_of = [], Blocked.cells_of
+    searched, cells_of = [], Blocked.cells_on
 
     def counted(*given: Any) -> Any:
         searched.append(given)
         return cells_of(*given)
 
-    monkeypatch.setattr(Blocked, "cells_of", counted)
+    monkeypatch.setattr(Blocked, "cells_on", counted)
     for col in range(20):
         assert closed({"cells": [(col % 10, col // 10)]}) == [col % 10 * 15 + col // 10]
         assert [closed(form) for form in forms] == cells

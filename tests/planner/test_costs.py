@@ -259,11 +259,11 @@ def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
 def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) -> None:
     topology = topology_of(hn.example_map("figure1"))
     layer = layer_of(np.ones(topology.grid.shape))
-    message = f"preset {preset} cannot plan by costs: coarse: "
+    message = f"preset {preset} cannot plan by costs: method "
     with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
         hn.HybridPlanner(topology, preset=preset, costs=layer)
-    assert "preset grid-astar" in str(refused.value)
-    with pytest.raises(hn.PresetError, match="knows lengths only"):
+    assert "with grid-astar and" in str(refused.value)
+    with pytest.raises(hn.PresetError, match=r"planner\.costs: unknown key"):
         hn.load_preset(preset, overrides=["planner.costs.clearance={}"])
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SEEDS = st.integers(0, 2**32 - 1)
 FOLLOWING = "shortest", "octile", "grid-astar"
-REBUILT = "paper", hn.load_preset("octile", overrides=["planner.coarse=overlay"])
+REBUILT = "paper", hn.load_preset("octile", overrides=["planner.method=cheapest"])
 
 
 def topology_of(grid: hn.OccupancyGrid) -> hn.TopologicalMap:

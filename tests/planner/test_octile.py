@@ -182,5 +182,5 @@ def test_a_preset_file_that_names_portals_plans_the_shortest_path_of_cells(
         done = cli(*query, "--preset", old, "--json")
     assert done.answer["length_m"] == pytest.approx(expected["length_m"])
     assert done.answer["gap"] == 0
-    told = "portals are gone, coarse: jumps plans instead, as in preset octile: write that"
+    told = "portals are gone, method: octile plans instead: write that"
     assert done.err == f"hybridnav: warning: {told}\n"

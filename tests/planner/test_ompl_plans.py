@@ -20,7 +20,7 @@ from benchmarks._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.planner import load_preset
-from hybridnav.planner.cell_planner import CellQuery
+from hybridnav.search.found import Query
 from tests.strategies import drawn, occupancy_grid
 
 if TYPE_CHECKING:
@@ -94,10 +94,9 @@ def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> No
     settings = f"{{planner: {planner}, confine: {confine}, simplify: false}}"
     preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(topology, preset=preset)
-    inner: Any = made._ompl
+    inner: Any = made._now.ompl
     endpoints = grid.frame.points_of(np.array([(3, 3), (56, 76)]))
-    cells: Any = made._cells
-    coarse = cells.plan(CellQuery.between(grid.frame, (3, 3), (56, 76)))
+    coarse = made.method.find(Query(((3, 3), (56, 76)), (endpoints[0], endpoints[1])))
     poses = tuple(np.append(end, 0.0) for end in endpoints)
     found = inner.plan(coarse.cells, (poses[0], poses[1]), None, tells_search=True)
     assert found.refinement.steps[-1].startswith("corridor: solved")
@@ -151,8 +150,8 @@ def test_equal_seeds_give_equal_paths_when_iterations_are_counted(planner_of: An
 def test_the_whole_map_and_the_places_are_corridors_too(
     office: hn.TopologicalMap,
 ) -> None:
-    for coarse in ("none", "max-distance", "jumps", "overlay"):
-        preset = load_preset("ompl", overrides=[f"planner.coarse={coarse}"])
+    for coarse in ("grid-astar", "paper"):
+        preset = load_preset("ompl", overrides=[f"planner.along={coarse}"])
         result = hn.HybridPlanner(office, preset=preset).plan(*ENDS)
         assert result.solved
         assert segment_faults(office.grid, result.path.points) == ()  # type: ignore[union-attr]
@@ -183,7 +182,9 @@ def test_clearance_weighs_more_than_length(planner_of: Any) -> None:
     assert wide.metric == "clearance-weighted"
     assert wide.cost > wide.path.length_m > short.cost
     assert wide.lower_bound <= wide.cost
-    weigh = planner_of("ompl", "planner=RRTstar", "objective=clearance")._ompl._clearance.cost_of
+    weigh = planner_of(
+        "ompl", "planner=RRTstar", "objective=clearance"
+    )._now.ompl._clearance.cost_of
     assert wide.cost == pytest.approx(weigh(wide.path.points))
     assert wide.cost < weigh(short.path.points)
 
@@ -352,7 +353,7 @@ def test_two_thousand_plans_leak_and_hang_nowhere(
     planner_of: Any, office: hn.TopologicalMap
 ) -> None:
     made = planner_of("ompl", "budget_s=0.25")
-    pids = (os.getpid(), made._ompl._worker._running.process.pid)
+    pids = (os.getpid(), made._now.ompl._worker._running.process.pid)
     rng = np.random.default_rng(0)
     free = np.argwhere(office.grid.classes == hn.CellClass.FREE)
 

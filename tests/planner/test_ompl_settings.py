@@ -108,9 +108,9 @@ def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
     )
     assert preset.planner.ompl is not None
     assert preset.planner.ompl.parameters == {"rewire_factor": 1.5}
-    plain = load_preset("octile", overrides=["planner.refine=ompl"])
+    plain = load_preset("octile", overrides=["planner.method=ompl"])
     assert plain.planner.ompl == OmplSettings()
-    with pytest.raises(hn.PresetError, match="refine: ompl"):
+    with pytest.raises(hn.PresetError, match=r"planner\.ompl: unknown key; octile has"):
         load_preset("octile", overrides=["planner.ompl.budget_s=2"])
     with pytest.raises(hn.PresetError, match="smooth"):
         load_preset("ompl", overrides=["planner.smooth=line-of-sight"])

@@ -33,7 +33,7 @@ def office():
 def planner_of(topology, epsilon, *overrides):
     """A prepared planner with a part by which paths may be longer than the shortest; None for
     none."""
-    given = ["planner.coarse=overlay", *overrides]
+    given = ["planner.method=cheapest", *overrides]
     given += [] if epsilon is None else [f"planner.epsilon={epsilon}"]
     planner = hn.HybridPlanner(topology, preset=hn.load_preset("octile", overrides=given))
     planner.prepare()  # before that, A* answers

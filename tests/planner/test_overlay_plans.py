@@ -29,7 +29,7 @@ ROUNDING = 1e-4
 def preset_of(*, epsilon: float | None = None) -> hn.Preset:
     """`coarse: overlay`, without costs of its own."""
     given = [] if epsilon is None else [f"planner.epsilon={epsilon}"]
-    return hn.load_preset("octile", overrides=["planner.coarse=overlay", *given])
+    return hn.load_preset("octile", overrides=["planner.method=cheapest", *given])
 
 
 def check(result: hn.PlanResult, least: float, is_open: Any, *, epsilon: float = 0.0) -> None:

@@ -361,7 +361,7 @@ def test_in_the_office_the_sealed_archive_is_not_reached(office: hn.TopologicalM
 def test_a_preset_is_a_name_a_file_or_an_object(tmp_path: Path) -> None:
     topology, endpoints = map_of(SEALED, merge_distance_m=2.0), ((0.5, 2.5), (8.5, 2.5))
     file = tmp_path / "mine.yaml"
-    file.write_text("planner: {coarse: none}\n")
+    file.write_text("planner: {method: grid-astar}\n")
     whole = hn.HybridPlanner(topology, preset="grid-astar").plan(*endpoints)
     for preset in (file, str(file), hn.load_preset(file)):
         result = hn.HybridPlanner(topology, preset=preset).plan(*endpoints)

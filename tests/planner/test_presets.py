@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.planner import PlannerSettings, PyramidSettings
+from hybridnav.planner import PyramidSettings, planner_settings
 from hybridnav.planner.preset import is_preset_name
 
 PLANNERS = Path(__file__).parents[2] / "planners"
@@ -53,21 +53,22 @@ def test_every_file_in_planners_is_a_preset_and_valid():
 
 def test_paper_is_the_papers_rule_and_the_default():
     paper = hn.load_preset("paper")
-    assert paper.planner.coarse == "max-distance"
+    assert paper.planner.method == "paper"
     assert paper.planner.corridor == "route"
     assert paper.planner.refine == "grid-astar"
     assert not paper.planner.allow_unexplored
     assert paper.pyramid.linkage == "radius"
     assert paper.pyramid.merge_distance_m == 4
     # What a file leaves out is as in the paper.
-    assert (paper.pyramid, paper.planner) == (PyramidSettings(), PlannerSettings())
+    assert (paper.pyramid, paper.planner) == (PyramidSettings(), planner_settings("paper"))
 
 
 def test_grid_astar_differs_in_nothing_but_the_coarse_planner():
     paper, grid = hn.load_preset("paper"), hn.load_preset("grid-astar")
-    assert grid.planner.coarse == "none"
+    assert grid.planner.method == "grid-astar"
     assert grid.pyramid == paper.pyramid
-    assert grid.planner.model_copy(update={"coarse": "max-distance"}) == paper.planner
+    both = paper.planner.model_dump(exclude={"method", "corridor"})
+    assert grid.planner.model_dump(exclude={"method"}) == both
 
 
 @pytest.mark.parametrize("name", hn.preset_names())
@@ -87,14 +88,14 @@ def test_an_unknown_name_lists_the_names_there_are(monkeypatch, write):
     with pytest.raises(FileNotFoundError, match="''"):
         hn.load_preset("")
     assert hn.load_preset("mine.yaml").name == "mine"
-    assert hn.load_preset(Path("mine.yaml")).planner == PlannerSettings()
+    assert hn.load_preset(Path("mine.yaml")).planner == planner_settings("paper")
 
 
 def test_what_has_a_suffix_or_a_separator_is_a_path(write, monkeypatch):
-    path = write("planner: {coarse: none}\n", "plain")
+    path = write("planner: {method: grid-astar}\n", "plain")
     monkeypatch.chdir(path.parent)
-    assert hn.load_preset("./plain").planner.coarse == "none"
-    assert hn.load_preset(path).planner.coarse == "none"
+    assert hn.load_preset("./plain").planner.method == "grid-astar"
+    assert hn.load_preset(path).planner.method == "grid-astar"
     assert not any(map(is_preset_name, ("./paper", "paper.yaml", "a/paper", path)))
     assert is_preset_name("grid-astar")
     for gone in ("paper.yaml", "./paper", "no/such/paper"):
@@ -107,7 +108,7 @@ def test_what_a_file_leaves_out_has_its_default(write):
     assert preset.name == "mine"
     assert preset.description == ""
     assert preset.pyramid == PyramidSettings(merge_distance_m=2)
-    assert preset.planner == PlannerSettings()
+    assert preset.planner == planner_settings("paper")
     assert hn.load_preset(write("{}\n")).pyramid == PyramidSettings()
 
 
@@ -141,7 +142,7 @@ def test_a_preset_is_a_frozen_value(write):
     [
         ("speed: 3\n", ["speed: unknown key", "description, pyramid, planner"]),
         ("pyramid: {speed: 3}\n", ["pyramid.speed: unknown key", "merge_distance_m", "seed"]),
-        ("planner: {speed: 3}\n", ["planner.speed: unknown key", "coarse", "allow_unexplored"]),
+        ("planner: {speed: 3}\n", ["planner.speed: unknown key", "paper has", "allow_unexplored"]),
         ('planner: {"a\\nb": 3}\n', ["a\\nb", "unknown key"]),
         ("planner: {1: 3}\n", ["planner.1"]),
         ("name: octile\n", ["name: a preset is named after its file"]),
@@ -165,12 +166,8 @@ def test_a_preset_is_a_frozen_value(write):
         ("pyramid: {seed: " + "9" * 2000 + "}\n", ["pyramid.seed"]),
         ("pyramid: {linkage: average}\n", ["pyramid.linkage", "'radius'", "got 'average'"]),
         (
-            "planner: {coarse: fast}\n",
-            [
-                "planner.coarse",
-                "'max-distance', 'mesh', 'jumps', 'overlay' or 'none'",
-                "'fast'",
-            ],
+            "planner: {method: fast}\n",
+            ["planner.method", "'shortest', 'octile', 'cheapest', 'grid-astar'", "'fast'"],
         ),
         ("planner: {refine: rrt}\n", ["planner.refine", "'grid-astar'", "got 'rrt'"]),
         ("planner: {allow_unexplored: maybe}\n", ["planner.allow_unexplored", "got 'maybe'"]),
@@ -231,7 +228,7 @@ def test_settings_win_over_the_file_and_the_last_one_wins():
     preset = hn.load_preset("paper", overrides=(*settings, " pyramid.seed = 2"))
     assert preset.name == "paper"
     assert preset.pyramid == PyramidSettings(merge_distance_m=8, seed=2)
-    assert preset.planner == PlannerSettings(allow_unexplored=True)
+    assert preset.planner == planner_settings("paper", allow_unexplored=True)
     assert hn.load_preset("paper") == hn.load_preset("paper", overrides=[])
 
 
@@ -254,8 +251,8 @@ PRESETS = st.builds(
         robot_radius_m=st.floats(min_value=0, allow_infinity=False),
     ),
     planner=st.builds(
-        PlannerSettings,
-        coarse=st.sampled_from(["max-distance", "none"]),
+        planner_settings,
+        method=st.sampled_from(["paper", "ompl"]),
         corridor=st.sampled_from(["route", "neighbours"]),
         allow_unexplored=st.booleans(),
     ),
@@ -273,34 +270,29 @@ def test_a_preset_written_as_yaml_reads_back_equal(preset, tmp_path_factory):
 def test_to_yaml_gives_every_key():
     tree = yaml.safe_load(hn.load_preset("paper").to_yaml())
     assert tree["pyramid"].keys() == PyramidSettings.model_fields.keys()
-    assert tree["planner"].keys() == PlannerSettings.model_fields.keys()
+    assert tree["planner"].keys() == {*type(planner_settings("paper")).model_fields}
     assert list(tree) == ["description", "pyramid", "planner"]
     assert "description: Büro\n" in hn.Preset(description="Büro").to_yaml()
 
 
-def test_the_old_name_of_a_refinement_is_refused_with_the_new_one() -> None:
-    with pytest.raises(hn.PresetError, match=r"planner\.refine: gates is now called none: write"):
-        hn.load_preset("octile", overrides=["planner.refine=gates"])
-
-
 @pytest.mark.parametrize(
-    ("overrides", "coarse"),
+    ("overrides", "method"),
     [
-        ((), "jumps"),
-        (("planner.epsilon=0.01",), "jumps"),
-        (("planner.smooth=line-of-sight",), "jumps"),
-        (("planner.smooth=arcs",), "overlay"),
-        (("planner.costs.clearance.multiplier=3",), "overlay"),
-        (("planner.refine=ompl",), "mesh"),
+        ((), "octile"),
+        (("planner.epsilon=0.01",), "octile"),
+        (("planner.smooth=line-of-sight",), "octile"),
+        (("planner.smooth=arcs",), "cheapest"),
+        (("planner.costs.clearance.multiplier=3",), "cheapest"),
+        (("planner.refine=ompl",), "ompl"),
     ],
 )
 def test_another_method_stands_for_portals_with_a_warning(
-    overrides: tuple[str, ...], coarse: str
+    overrides: tuple[str, ...], method: str
 ) -> None:
-    with pytest.warns(FutureWarning, match=f"^portals are gone, coarse: {coarse} plans") as told:
+    with pytest.warns(FutureWarning, match=f"^portals are gone, method: {method} plans") as told:
         preset = hn.load_preset("portals", overrides=overrides)
     assert len(told) == 1
-    assert (preset.name, preset.planner.coarse, preset.planner.epsilon) == ("octile", coarse, None)
+    assert (preset.name, preset.planner.method) == ("octile", method)
     assert "portals" not in preset.to_yaml()
     with pytest.warns(FutureWarning, match="^portals are gone"):
         again = hn.load_preset("octile", overrides=["planner.coarse=portals", *overrides])

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.planner.methods.shortest import OverMesh
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
@@ -110,8 +110,8 @@ def test_searches_round_what_was_closed_are_kept_for_the_next_query() -> None:
         for col in range(1, 11)
     ] * 3
     assert ways == ways[:10] * 3
-    assert isinstance(planner._cells, OverMesh)
-    assert len(planner._cells._detours) == 8
+    assert isinstance(planner.method, OverMesh)
+    assert len(planner.method._detours) == 8
 
 
 def test_unexplored_cells_are_entered_where_that_is_allowed() -> None:
@@ -213,8 +213,8 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
 @pytest.mark.parametrize(
     ("preset", "built"),
     [
-        ("shortest", "planner.mesh_plans.build_mesh"),
-        ("octile", "planner.jump_plans.build_jump_graph"),
+        ("shortest", "planner.methods.shortest.build_mesh"),
+        ("octile", "planner.methods.octile.build_jump_graph"),
     ],
 )
 def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(

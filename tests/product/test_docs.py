@@ -126,7 +126,7 @@ def behaviour() -> dict[str, str]:
     seen = {}
     for name in hn.preset_names():
         preset = hn.load_preset(name)
-        if preset.planner.refine == "ompl":
+        if preset.planner.method == "ompl":
             continue  # as the preset whose fields they plan in
         result = hn.HybridPlanner(topology, preset=preset).plan((0.3, 0.3), (0.3, 2.7))
         assert result.solved

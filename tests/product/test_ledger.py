@@ -40,7 +40,11 @@ def keys_of(values, above=""):
 
 
 OPTIONS = set(options_of("hybridnav", typer.main.get_command(app)))
-KEYS = {f"preset {key}" for key in keys_of(hn.load_preset("robot").model_dump())}
+KEYS = {
+    f"preset {key}"
+    for name in hn.preset_names()
+    for key in keys_of(hn.load_preset(name).model_dump())
+}
 PRESETS = {f"preset-name {name}" for name in hn.preset_names()}
 
 

@@ -158,8 +158,7 @@ def test_the_reference_lists_every_preset_with_its_settings() -> None:
     assert sorted(rows) == hn.preset_names()
     for name, row in rows.items():
         planner = hn.load_preset(name).planner
-        assert f"`{planner.coarse}`" in row
-        assert f"`{planner.refine}`" in row
+        assert f"`{planner.method}`" in row
 
 
 @pytest.mark.parametrize("page", [*PAGES, "CHANGELOG.md", "CONTRIBUTING.md", "maps/README.md"])

@@ -80,7 +80,7 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
     grid = grid_with_rooms(seed=1)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0))
     planner = hn.HybridPlanner(topology, preset=preset)
-    by_overlay = planner.preset.planner.coarse == "overlay"
+    by_overlay = planner.preset.planner.method == "cheapest"
     if by_overlay:  # before that, A* may choose another one of equally good paths
         planner.prepare()
     pairs = free_pairs(grid, 24, seed=2)

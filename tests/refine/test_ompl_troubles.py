@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 ENDS = (1.0, 13.2), (40.6, 19.4)
 BUDGET_S = 1.0
 START_S = 60.0
-OVER_PLACES = "planner.coarse=max-distance"
+OVER_PLACES = "planner.along=paper"
 """For processes of their own, which would prepare a mesh."""
 LATE = "the worker did not answer in time"
 """What a busy machine can make of the first of these."""
@@ -55,8 +55,8 @@ def planner() -> Iterator[hn.HybridPlanner]:
 
 
 def worker_of(planner: hn.HybridPlanner) -> Any:
-    assert planner._ompl is not None
-    return planner._ompl._worker
+    assert planner._now.ompl is not None
+    return planner._now.ompl._worker
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def troubled(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         made = hn.refine.ompl.Query if trouble is None else partial(
             TroubledQuery, trouble=trouble, after_path=after_path
         )  # fmt: skip
-        monkeypatch.setattr("hybridnav.planner.ompl_plans.Query", made)
+        monkeypatch.setattr("hybridnav.planner.methods.ompl.Query", made)
 
     return arm
 
@@ -201,7 +201,7 @@ from tests.refine.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
 preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])
 planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
-print(planner._ompl._worker._running.process.pid, flush=True)
+print(planner._now.ompl._worker._running.process.pid, flush=True)
 ompl_plans.Query = TroubledQuery
 planner.plan(*{ENDS})
 """
@@ -259,11 +259,11 @@ def test_queries_of_two_threads_do_not_mix(planner: hn.HybridPlanner) -> None:
     found: list[tuple[Any, Any]] = []
 
     def ask(endpoints: Any) -> None:
-        assert planner._ompl is not None
+        assert planner._now.ompl is not None
         poses = tuple(np.append(end, 0.0) for end in endpoints)
         cells = cells_of[endpoints]
         for _ in range(4):
-            plan = planner._ompl.plan(cells, (poses[0], poses[1]), None)
+            plan = planner._now.ompl.plan(cells, (poses[0], poses[1]), None)
             assert plan.path is not None
             found.append((endpoints, plan.path.points[[0, -1]].tolist()))
 

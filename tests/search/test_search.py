@@ -1,4 +1,4 @@
-"""The searches against scipy's and networkx's: grid A*, distances in fields, cheapest arcs."""
+"""The searches against scipy's and networkx's: grid A* and its moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from hybridnav._base.fields import field_distances
 from hybridnav._base.moves import (
     DIAGONAL,
     STRAIGHT,
@@ -406,28 +405,3 @@ def test_without_obstacles_the_shortest_path_has_the_octile_distance(
     assert path_length_in_cells(found.cells) == expected
     cost = octile_cost(goal[0] - start[0], goal[1] - start[1])
     assert float(length_in_cells(cost)) == expected
-
-
-@given(class_grids(), seeds)
-@settings(max_examples=examples(60))
-def test_distances_inside_fields_are_those_that_dijkstra_finds(classes: Any, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    vertices = classes != CellClass.OCCUPIED
-    assume(vertices.any())
-    # Fields of one class each; they need not be connected: what is not reached has -1.
-    label = np.where(vertices, 2 * block_labels(classes.shape, rng) + classes - 1, -1)
-    names, dense = np.unique(label[vertices], return_inverse=True)
-    field_of = np.full(classes.shape, -1, dtype=np.int32)
-    field_of[vertices] = dense
-    sources = [random_cell(field_of == v, rng) for v in range(len(names))]
-    flat = np.array([row * classes.shape[1] + col for row, col in sources], dtype=np.int64)
-    found = field_distances(classes, field_of.ravel(), flat).reshape(classes.shape)
-    expected = np.full(classes.shape, np.inf)
-    for v, source in enumerate(sources):
-        free = classes[source] == CellClass.FREE
-        enterable = classes == CellClass.FREE if free else vertices
-        graph = move_graph(enterable, field_of == v)
-        expected = np.minimum(expected, distances(graph, classes.shape, source))
-    assert ((found == -1) == np.isinf(expected)).all()
-    reached = found >= 0
-    assert length_in_cells(found[reached]) == pytest.approx(expected[reached], rel=0, abs=1e-9)

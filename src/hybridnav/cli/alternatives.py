@@ -100,7 +100,7 @@ def wanted_of(
 
 def check_refiner(wanted: Wanted, settings: Preset) -> None:
     """Refuse alternatives of paths of cells with OMPL."""
-    if settings.planner.refine == "ompl" and wanted.needs_grid:
+    if settings.planner.method == "ompl" and wanted.needs_grid:
         option = "--by homotopy" if wanted.by == "homotopy" else "--inside-rooms"
         raise UsageError(f"{option} needs a preset without OMPL, not {settings.name}")
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("hybridnav.kernels")
 _PATIENCE_S = 2.0
 """Seconds of compiling after which a line informs the user."""
-SEARCHES = {"mesh": "shortest", "jumps": "octile", "none": "grid-astar", "max-distance": "paper"}
-"""A preset for each kind of search that can be compiled without a pyramid."""
+SEARCHES = ("shortest", "octile", "grid-astar", "paper")
+"""Methods whose search can be compiled without a pyramid."""
 _PACKAGES = Path(__file__).parents[2]
 _FIRST = "compiling kernels, each once, when a command first needs it; the next start is quick"
 
@@ -77,7 +77,7 @@ def compiling_beside(preset: Preset) -> Iterator[Callable[[], None]]:
     Callable
         Waits until it is compiled.
     """
-    job = preset.planner.coarse
+    job = preset.planner.underlying.method
     if job not in SEARCHES or processors() == 1 or not _is_cold(job):
         yield lambda: None
         return

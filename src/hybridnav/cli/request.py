@@ -21,15 +21,6 @@ if TYPE_CHECKING:
     from hybridnav.planner.alternatives import By
     from hybridnav.planner.named import At
 
-_GRID_SEARCH = {
-    "coarse": "none",
-    "smooth": "none",
-    "refine": "grid-astar",
-    "ompl": None,
-    "epsilon": None,
-}
-"""Settings of a plan on the whole grid."""
-
 
 @dataclass(frozen=True)
 class Wanted:
@@ -189,8 +180,13 @@ class Request:
         closed: hn.Blocked | None,
         costs: hn.CostLayer | None,
     ) -> hn.PlanResult:
+        # Loads pydantic, which help can do without.
+        from hybridnav.planner import CostSettings, planner_settings  # noqa: PLC0415
+
         settings = self.source.settings
-        whole = settings.planner.model_copy(update=_GRID_SEARCH)
+        own, by = settings.planner, CostSettings(clearance=settings.planner.clearance)
+        allowed = own.allow_unexplored
+        whole = planner_settings("grid-astar", allow_unexplored=allowed, costs=by)
         preset = settings.model_copy(update={"name": "grid-astar", "planner": whole})
         start, goal = (waypoint[:2] for waypoint in self.waypoints)
         planner = hn.HybridPlanner(topology, preset=preset, costs=costs)

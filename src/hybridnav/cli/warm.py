@@ -37,23 +37,24 @@ def small_grid(size: int = 64) -> hn.OccupancyGrid:
     return hn.OccupancyGrid(probability, frame=hn.Frame(resolution_m=0.5), robot_radius_m=0.25)
 
 
-def compile_search(coarse: str) -> None:
-    """Compile a kind of search, by a search of a small map."""
-    from hybridnav.planner.cell_planner import CellQuery  # noqa: PLC0415 - loads numba
-    from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415
-    from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
-    from hybridnav.refine import GridRefiner  # noqa: PLC0415
+def compile_search(method: str) -> None:
+    """Compile the search of a method, by a search of a small map."""
+    from hybridnav.planner import planner_settings  # noqa: PLC0415 - loads pydantic
+    from hybridnav.planner.methods import make_method  # noqa: PLC0415 - loads numba
+    from hybridnav.planner.methods.grid import Site  # noqa: PLC0415
+    from hybridnav.search.found import Query  # noqa: PLC0415
     from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
 
-    grid, settings = small_grid(), hn.load_preset(SEARCHES[coarse]).planner
-    refiner, query = GridRefiner(grid), CellQuery.between(grid.frame, *_ENDPOINTS)
-    if coarse == "mesh":
-        OverMesh(grid, refiner, settings).plan(query)
-    elif coarse == "jumps":
+    grid = small_grid()
+    if method == "octile":
         graph = build_jump_graph(grid.enterable())
         JumpSearch(contract_graph(graph)).path(*_ENDPOINTS)  # as on maps of buildings
-    else:
-        WholeMap(refiner).plan(query)
+        return
+    # On the cells alone, as `paper` searches inside its corridor.
+    settings = planner_settings("grid-astar" if method == "paper" else method)
+    start, goal = grid.frame.points_of(np.array(_ENDPOINTS))
+    found = make_method(Site(grid, None), settings).find(Query(_ENDPOINTS, (start, goal)))
+    _ = found.cells
 
 
 def compile_plan(preset: str) -> None:

@@ -13,6 +13,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner, PlanStatus
+from hybridnav.search import found as search
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray
@@ -78,6 +79,57 @@ class HybridMethod:
     def close(self) -> None:
         """End the process of a planner with OMPL."""
         self._planner.close()
+
+
+class FoundMethod:
+    """A search method, of which a preset can be made too, as a method of the harness.
+
+    Parameters
+    ----------
+    method
+        Answers a `Query` with a `Found`. Its `name`, `n_nodes`, `n_edges`, `memory_bytes`,
+        `version` and `settings` are shown if it has them.
+    grid
+        The map.
+    """
+
+    def __init__(self, method: search.Method, grid: OccupancyGrid) -> None:
+        self._method, self._frame = method, grid.frame
+        cells = int((grid.classes == CellClass.FREE).sum())
+        known = {"n_nodes": cells, "n_edges": 0, "memory_bytes": 0, "version": "", "settings": ""}
+        for name, default in {"name": type(method).__name__, **known}.items():
+            setattr(self, name, getattr(method, name, default))
+        self.region_of: IntArray | None = None
+
+    if TYPE_CHECKING:
+        name: str
+        n_nodes: int
+        n_edges: int
+        memory_bytes: int
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two free cells."""
+        ends = self._frame.points_of(np.array([start, goal]))
+        found = self._method.find(search.Query((start, goal), (ends[0], ends[1])))
+        stats, cost_m, least_m = found.stats, found.cost_m, found.lower_bound_m
+        counts: dict[str, Any] = {
+            "expanded": stats.expanded,
+            "expanded_nodes": stats.expanded_places,
+            "expanded_border_cells": stats.expanded_border_cells,
+            "expanded_intervals": stats.expanded_intervals,
+            "seconds": stats.seconds,
+        }
+        if not found.has_path:
+            gave_up = "" if math.isinf(least_m) else "no path, and no proof of none"
+            return MethodResult(None, gave_up=gave_up, **counts)
+        if self._method.metric == "any-angle" and found.points is not None:
+            line = AnyAngleResult(found.points, cost_m, lower_bound_m=least_m)
+            return MethodResult(None, any_angle=line, **counts)
+        if self._method.metric == "weighted":
+            claim = CostClaim(cost_m, least_m)
+            return MethodResult(found.cells, by_costs=claim, **counts)
+        bound = cost_m / least_m if least_m > 0 else math.inf
+        return MethodResult(found.cells, bound=bound if cost_m > 0 else 1.0, **counts)
 
 
 LINE_METRICS: frozenset[Metric] = frozenset({"any-angle", "any-angle-weighted"})

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.adapters import HybridMethod, OnOwnGrid
+from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid
 from hybridnav.harness.names import baseline_name, class_of, source_hash
 from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
@@ -91,10 +91,10 @@ class MethodSpec:
             return "any-angle"
         planner = (self.preset or {}).get("planner", {})
         settings = (
-            ("refine", "ompl"),
+            ("method", "ompl"),
             ("smooth", LINE_OF_SIGHT),
             ("smooth", "arcs"),
-            ("coarse", "mesh"),
+            ("method", "shortest"),
         )
         is_any_angle = any(planner.get(key) == value for key, value in settings)
         return "any-angle" if is_any_angle else "octile"
@@ -134,7 +134,7 @@ def preset_spec(
     preset = load_preset(source)
     _check_metric(preset, by_costs=by_costs)
     pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
-    smoothed = preset.planner.smooth == LINE_OF_SIGHT
+    smoothed = preset.planner.finish == LINE_OF_SIGHT
     return MethodSpec(
         f"{preset.name}+{LINE_OF_SIGHT}" if smoothed else preset.name,
         preset.model_dump(exclude={"description": True, "planner": {"costs"}}),
@@ -143,8 +143,8 @@ def preset_spec(
 
 
 def _check_metric(preset: Preset, *, by_costs: bool) -> None:
-    ompl, costs = preset.planner.ompl, preset.planner.costs
-    needs_costs = preset.planner.smooth == "arcs" or (costs and costs.clearance)
+    ompl, costs = preset.planner.sampling, preset.planner.clearance
+    needs_costs = preset.planner.finish == "arcs" or costs is not None
     if needs_costs and not by_costs:
         raise InvalidValueError(
             f"preset {preset.name} plans by costs, and this run measures lengths: state costs for "
@@ -288,26 +288,36 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
             grid, spec.graph, clear_edges_only=spec.clear_edges_only
         )
     else:
-        path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
-        made_of = class_of(path)
-        options = options | spec.settings
-        if not _takes(made_of, "costs"):
-            costs = None
-        if costs is not None:
-            options = options | {"costs": costs}
-        if spec.is_named and _takes(made_of, "name"):
-            options = {"name": spec.name} | options
-        own = os.getpid()
-        try:
-            method = made_of(grid if topology is None else topology, **options)
-        finally:
-            _end_fork_of(own)
+        method, costs = _of_class(spec, grid if topology is None else topology, costs)
     by_costs = costs is not None
     if spec.grid:
         method, topology = OnOwnGrid(method, grid), None
     seconds = built - began, time.perf_counter() - built
     is_named = spec.is_named or not spec.source
     return Prepared(method, topology, *seconds, by_costs, is_named)
+
+
+def _of_class(
+    spec: MethodSpec, given: OccupancyGrid | TopologicalMap, costs: CostLayer | None
+) -> tuple[Method, CostLayer | None]:
+    """Return the method of a baseline or a class of others, and the costs that it plans by."""
+    path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
+    made_of = class_of(path)
+    options = options | spec.settings
+    if not _takes(made_of, "costs"):
+        costs = None
+    if costs is not None:
+        options = options | {"costs": costs}
+    if spec.is_named and _takes(made_of, "name"):
+        options = {"name": spec.name} | options
+    own = os.getpid()
+    try:
+        made: Any = made_of(given, **options)
+    finally:
+        _end_fork_of(own)
+    is_search = not hasattr(made, "solve") and hasattr(made, "find")
+    grid = given.grid if isinstance(given, TopologicalMap) else given
+    return FoundMethod(made, grid) if is_search else made, costs
 
 
 def _end_fork_of(own: int) -> None:

@@ -3,6 +3,7 @@ from .alternatives import (
     Alternatives as Alternatives,
     plan_alternatives as plan_alternatives,
 )
+from .batch import PlanBatch as PlanBatch
 from .blocked import Blocked as Blocked
 from .closures_file import load_blocked as load_blocked
 from .export import (
@@ -13,22 +14,24 @@ from .export import (
 from .path import Path as Path
 from .planner import HybridPlanner as HybridPlanner
 from .preset import (
-    ClearanceSettings as ClearanceSettings,
-    CostSettings as CostSettings,
-    PlannerSettings as PlannerSettings,
     Preset as Preset,
-    PyramidSettings as PyramidSettings,
     load_preset as load_preset,
+    planner_settings as planner_settings,
     preset_names as preset_names,
 )
 from .result import (
     COST_METRICS as COST_METRICS,
     Metric as Metric,
-    PlanBatch as PlanBatch,
     PlanResult as PlanResult,
     PlanStats as PlanStats,
     PlanStatus as PlanStatus,
     Refinement as Refinement,
+)
+from .settings import (
+    ClearanceSettings as ClearanceSettings,
+    CostSettings as CostSettings,
+    PlannerSettings as PlannerSettings,
+    PyramidSettings as PyramidSettings,
 )
 from .tour import Tour as Tour, plan_tour as plan_tour
 

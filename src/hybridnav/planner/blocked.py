@@ -14,6 +14,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps.islands import in_runs
 from hybridnav.planner.areas import checked_area, runs_of, shown
 from hybridnav.planner.boundaries import cells_on_boundaries
+from hybridnav.planner.endpoints import no_places
 from hybridnav.pyramid import LevelArc
 from hybridnav.topology.rooms import Door
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
 
@@ -142,16 +144,18 @@ class Blocked:
             When the map has no such door, room, arc, place or cell, a door is one of another map,
             an arc is a self-loop, or an area closes no cell of the map.
         """
-        grid = topology.grid
+        return self.cells_on(topology.grid, topology)
+
+    def cells_on(self, grid: OccupancyGrid, topology: TopologicalMap | None) -> LongArray:
+        """Find the cells as `cells_of` does, on a grid whose places may not be built: None."""
         cells = _inside(np.asarray(self.cells), grid.shape)
-        single = np.concatenate(
-            [
-                cells[:, 0] * grid.shape[1] + cells[:, 1],
-                *self._in_places(topology),
-                *self._in_rooms(topology),
-                *self._on_boundaries(topology),
-            ]
-        )
+        found = [cells[:, 0] * grid.shape[1] + cells[:, 1]]
+        if self.arcs or self.places or self.doors or self.rooms:
+            if topology is None:
+                no_places()
+            found += self._in_places(topology) + self._in_rooms(topology)
+            found += self._on_boundaries(topology)
+        single = np.concatenate(found)
         runs = [np.stack([single, single + 1], axis=1)]
         for given, radius_m in ((self.polygons, grid.robot_radius_m), (self.keepout, 0.0)):
             areas = cast("Sequence[BaseGeometry]", given)

@@ -10,9 +10,9 @@ import shapely
 from shapely.ops import substring
 
 from hybridnav.maps.costs import cost_along
-from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.tour import tour_of
 from hybridnav.route import RouteFinder, door_graph
+from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

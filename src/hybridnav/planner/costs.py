@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
@@ -19,8 +18,8 @@ from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.costs.checks import joined_cells
 from hybridnav.maps.lines import polyline_length
 from hybridnav.planner import Path
-from hybridnav.planner.closed import ClosedCells
 from hybridnav.refine import CostLine
+from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
@@ -51,10 +50,10 @@ class PlannerCosts:
 
     def __init__(self, grid: OccupancyGrid, preset: Preset, given: CostLayer | None) -> None:
         self._grid, self._preset = grid, preset
-        named = preset.planner.costs
+        named = preset.planner.clearance
         self._named: CostLayer | None = None
-        if named is not None and named.clearance is not None:
-            self._named = CostLayer.clearance(grid, **named.clearance.model_dump())
+        if named is not None:
+            self._named = CostLayer.clearance(grid, **named.model_dump())
         self.given = given
         """The layer given to the planner, which stays with its cells when the map changes."""
         self.layer = self._named
@@ -164,7 +163,7 @@ class CostFinish:
         self.layer = layer
         self._grid = grid
         self._allow_unexplored = settings.allow_unexplored
-        self._turning_radius_m = settings.turning_radius_m
+        self._turning_radius_m: float = getattr(settings, "turning_radius_m", math.nan)
 
     def with_closed(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the layer closes for all queries."""
@@ -172,13 +171,6 @@ class CostFinish:
         if not len(flat):
             return closed
         return ClosedCells(flat if closed is None else np.union1d(closed.flat, flat))
-
-    def cell_path(self, cells: LongArray) -> tuple[Path, float]:
-        """Return a path of cells and its cost in metres."""
-        per_cell = self._grid.resolution_m
-        points = self._grid.frame.points_of(cells)
-        path = Path(cells, points, path_length_in_cells(cells) * per_cell)
-        return path, self.layer.cost_of_cells(cells) * per_cell
 
     def line(
         self, cells: LongArray, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None

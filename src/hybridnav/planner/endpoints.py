@@ -12,10 +12,13 @@ from hybridnav.maps import CellClass
 from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
+    from typing import NoReturn
+
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.search.found import ClosedCells
 
 Cell = tuple[int, int]
 Points = tuple["FloatArray", "FloatArray"]
@@ -32,6 +35,14 @@ _REFUSED = (
         CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
     },
 )
+
+
+def no_places() -> NoReturn:
+    """Refuse what needs places, on a grid that changed after they were built."""
+    raise InvalidValueError(
+        "the map changed after its places were built, and places, rooms and doors belong to them: "
+        "call update with topology, the topological map of the grid now"
+    )
 
 
 def check_at(at: str) -> None:
@@ -63,6 +74,16 @@ def cells_of_endpoints(
         if not may_enter:
             return refused[CellClass(of_class)]
     return cells
+
+
+def refusal(
+    closed: ClosedCells, cells: tuple[Cell, Cell], shape: tuple[int, int]
+) -> PlanStatus | None:
+    """Return the status of a query whose start or goal is closed, None if neither is."""
+    shut = closed.holds(np.array(cells) @ [shape[1], 1])
+    if not shut.any():
+        return None
+    return PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
 
 
 def _numbers(given: ArrayLike) -> FloatArray:

@@ -1,9 +1,10 @@
-"""Changes of the map under a planner: which cells changed, and what stands for stale places."""
+"""Changes under a planner: of its costs, or of its map, whose changed cells methods follow."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,62 +12,22 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import class_reach, class_rules
 from hybridnav.maps.checks import checked_type
-from hybridnav.planner import PlanResult, PlanStatus
-from hybridnav.planner.cell_planner import Carried, Following
-from hybridnav.planner.select import cell_planner
-from hybridnav.route.route_finder import RouteFinder, RouteOfCells
+from hybridnav.planner.methods import make_method
+from hybridnav.planner.methods.grid import Site
+from hybridnav.search.found import Change
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from typing import NoReturn
+    from collections.abc import Callable
 
-    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav._base.typing import LongArray
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Metric, Path, Preset
-    from hybridnav.planner.cell_planner import CellPlan, CellPlanner
     from hybridnav.planner.costs import PlannerCosts
-    from hybridnav.planner.ompl_plans import OmplPlan
-    from hybridnav.pyramid import DualGraphPyramid
+    from hybridnav.planner.planning import Planning
 
 
-_ON_CELLS = "none", "mesh", "jumps"
-"""Values of `coarse` that need no places."""
-
-
-class StalePlaces:
-    """Stands for the topological map of a grid that changed after its places were built.
-
-    It has the grid. Whatever else is asked of it is refused, so that no place of the map before is
-    taken for one of the map now.
-    """
-
-    def __init__(self, grid: OccupancyGrid, built: DualGraphPyramid) -> None:
-        self.grid = grid
-        self.built = built
-        """The pyramid of the map before, for the record of how it was built."""
-
-    def __getattr__(self, name: str) -> NoReturn:
-        if name.startswith("_"):  # what copies and pickles look for
-            raise AttributeError(name)
-        raise InvalidValueError(
-            f"the map changed after its places were built, and {name} belongs to them: call "
-            "update with topology, the topological map of the grid now"
-        )
-
-
-def is_stale(topology: TopologicalMap) -> bool:
-    """Return whether this stands for a topological map whose grid changed."""
-    return isinstance(topology, StalePlaces)
-
-
-def built_of(topology: TopologicalMap) -> DualGraphPyramid:
-    """Return the pyramid of a topological map, or of the one that it was before its grid
-    changed."""
-    return topology.built if isinstance(topology, StalePlaces) else topology.pyramid
-
-
-class PlannerChange(NamedTuple):
+class Update(NamedTuple):
     """What an update gives to a planner: at least one of the first three."""
 
     costs: CostLayer | None
@@ -78,16 +39,11 @@ class PlannerChange(NamedTuple):
     box: Box
     """First row, last row + 1, first column, last column + 1 of the cells that may have changed."""
 
-    @property
-    def is_of_map(self) -> bool:
-        """Whether the map changes, and not the costs alone."""
-        return self.grid is not None or self.topology is not None
 
-
-def change_of(
+def update_of(
     costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
-) -> PlannerChange:
-    """Return the change that an update was given.
+) -> Update:
+    """Return the update that was given.
 
     Raises
     ------
@@ -102,40 +58,48 @@ def change_of(
         raise InvalidValueError(
             "update was given no costs, grid or topology, expected one of them: pass what changed"
         )
-    return PlannerChange(costs, grid, topology, box)
+    return Update(costs, grid, topology, box)
 
 
-def followed(
-    topology: TopologicalMap,
-    preset: Preset,
-    cells: CellPlanner,
-    costs: PlannerCosts,
-    change: PlannerChange,
-) -> tuple[TopologicalMap, CellPlanner, PlannerCosts]:
-    """Return the places, the planner of cell paths, and the costs after a change of the map.
-
-    Parameters
-    ----------
-    topology, preset, cells, costs
-        Those of a planner; unchanged.
-    change
-        The map now, and new costs on it if there are any.
+def begun(now: Planning, update: Update) -> Callable[[], Planning]:
+    """Check all of an update, and return what ends it while no query runs: how to plan then.
 
     Raises
     ------
     InvalidValueError
         When the planner cannot follow, or the grid or the costs are those of another map.
     """
-    settings, places, grid = preset.planner, change.topology, change.grid
-    if settings.refine == "ompl":
+    if update.grid is not None or update.topology is not None:
+        return partial(_caught_up, _followed(now, update))
+    assert update.costs is not None  # noqa: S101 - one of the three is given
+    return partial(_recosted, now, *now.costs.changed(update.costs, update.box))
+
+
+def _caught_up(planning: Planning) -> Planning:
+    planning.method.catch_up()
+    return planning
+
+
+def _recosted(now: Planning, costs: PlannerCosts, box: Box) -> Planning:
+    """Return how to plan by other costs, by the method itself where it can take them."""
+    method, layer = now.method, costs.layer
+    if layer is None or not method.take_costs(layer, box):
+        method = make_method(Site(now.grid, now.topology, layer), now.preset.planner)
+    return replace(now, method=method, costs=costs)
+
+
+def _followed(now: Planning, update: Update) -> Planning:
+    """Return how to plan on a changed map; what is now stays as it is."""
+    settings, places, grid = now.preset.planner, update.topology, update.grid
+    if now.ompl is not None:
         raise InvalidValueError(
-            f"preset {preset.name} cannot follow a change, because OMPL's process has the map: "
+            f"preset {now.preset.name} cannot follow a change, because OMPL's process has the map: "
             "make a new planner of the map now"
         )
-    if places is None and settings.coarse not in _ON_CELLS:
+    if places is None and settings.needs_places:
         raise InvalidValueError(
-            f"preset {preset.name} plans on the places of its map, and only a grid is given: call "
-            "update with topology too, or take preset shortest, octile or grid-astar"
+            f"preset {now.preset.name} plans on the places of its map, and only a grid is given: "
+            "call update with topology too, or take preset shortest, octile or grid-astar"
         )
     if places is not None:
         if grid is not None and not np.array_equal(grid.classes, places.grid.classes):
@@ -145,17 +109,14 @@ def followed(
             )
         grid = places.grid
     assert grid is not None  # noqa: S101 - one of both is given
-    changed = changed_cells(topology.grid, grid, change.box)
-    if places is None:
-        places = cast("TopologicalMap", StalePlaces(grid, built_of(topology)))
-    costs = costs.on(grid)
-    if change.costs is not None:
-        costs, _ = costs.changed(change.costs, change.box)
-    if isinstance(cells, Following):
-        return places, cells.followed(grid, changed), costs
-    if isinstance(cells, Carried):
-        return places, cast("CellPlanner", cells.carried(places, costs.layer)), costs
-    return places, cell_planner(places, settings, None, costs.layer), costs
+    cells, costs = changed_cells(now.grid, grid, update.box), now.costs.on(grid)
+    if update.costs is not None:
+        costs, _ = costs.changed(update.costs, update.box)
+    method = now.method.changed(Change(grid, places, costs.layer, cells))
+    if method is None:
+        method = make_method(Site(grid, places, costs.layer), settings)
+    built = now.built if places is None else places
+    return replace(now, grid=grid, built=built, method=method, costs=costs, closures={})
 
 
 def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongArray:
@@ -201,113 +162,3 @@ def _check_inside(cells: LongArray, box: Box, reach: int) -> None:
             f"{int(outside.sum())} cells changed outside what changed states, the first at row "
             f"{row}, column {col}: pass changed=None to compare all cells"
         )
-
-
-# Results of queries: with their routes, and with the settings that they were planned by.
-
-Poses = tuple["FloatArray", "FloatArray"]
-
-
-class Outcomes:
-    """Makes the results of one planner.
-
-    Parameters
-    ----------
-    topology
-        The map; with stale places results have no routes.
-    preset
-        The preset of the planner.
-    costs
-        The costs that it plans by; None for lengths.
-    """
-
-    def __init__(
-        self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
-    ) -> None:
-        self._topology = topology
-        self._preset = preset
-        self._costs = costs
-        self._built = built_of(topology)
-        self._route_finder = None if is_stale(topology) else RouteFinder(topology)
-
-    def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
-        """Return a result that records the endpoints, the preset and the settings of the
-        pyramid."""
-        # Each result has its own settings, so that a change of one does not affect the next.
-        settings = {
-            key: dict(value) if isinstance(value, dict) else value
-            for key, value in self._settings.items()
-        }
-        start, goal = tuple(poses[0].tolist()), tuple(poses[1].tolist())
-        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
-
-    def no_path(self, plan: CellPlan, poses: Poses, metric: Metric) -> PlanResult:
-        """Return the result of a plan without a path."""
-        bound = plan.bound_cells * self._topology.grid.resolution_m
-        return self.answer(
-            PlanStatus.NO_PATH, poses, metric=metric, lower_bound=bound, stats=plan.stats
-        )
-
-    def solved(  # noqa: PLR0913 - the last has a default
-        self,
-        plan: CellPlan,
-        poses: Poses,
-        path: Path,
-        metric: Metric,
-        bound_m: float,
-        *,
-        weighted_cost: float | None = None,
-    ) -> PlanResult:
-        """Return the result of a plan with a path."""
-        return self.answer(
-            PlanStatus.SOLVED,
-            poses,
-            metric=metric,
-            path=path.turned_at_ends(*poses),
-            route_source=plan.route or self.route_of(path),
-            lower_bound=bound_m,
-            weighted_cost=weighted_cost,
-            stats=plan.stats,
-        )
-
-    def by_ompl(self, found: OmplPlan, plan: CellPlan, poses: Poses, bound_m: float) -> PlanResult:
-        """Return the result of a coarse plan refined by OMPL, with the bound of the coarse one."""
-        bound = max(found.lower_bound, bound_m)
-        if found.path is not None and found.status is PlanStatus.SOLVED:
-            bound = min(bound, found.weighted_cost or found.path.length_m)
-        path = found.path
-        if path is not None and path.headings_rad is None and found.status is PlanStatus.SOLVED:
-            path = path.turned_at_ends(*poses)
-        return self.answer(
-            found.status,
-            poses,
-            metric=found.metric,
-            path=path,
-            route_source=self.route_of(found.path),
-            lower_bound=bound,
-            weighted_cost=found.weighted_cost,
-            refinement=found.refinement,
-            stats=plan.stats,
-        )
-
-    def route_of(self, path: Path | None) -> RouteOfCells | None:
-        """Return what the route of a path is found from, None for no path or stale places."""
-        if path is None or self._route_finder is None:
-            return None
-        return RouteOfCells(self._topology, self._route_finder, path.cells)
-
-    @cached_property
-    def _settings(self) -> dict[str, Any]:
-        pyramid = self._built
-        costs = {} if self._costs is None else {"costs": self._costs.source}
-        return {
-            "preset": self._preset.name,
-            "planner": self._preset.planner.model_dump(),
-            "pyramid": {
-                "merge_distance_m": pyramid.merge_distance_m,
-                "linkage": pyramid.linkage,
-                "seed": pyramid.seed,
-                "robot_radius_m": self._topology.grid.robot_radius_m,
-            },
-            **costs,
-        }

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.closed import ClosedCells
+    from hybridnav.search.found import ClosedCells
     from hybridnav.topology import TopologicalMap
 
 At = Literal["anywhere", "point"]
@@ -97,7 +97,7 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
     fixed: list[Any] = [_point_of(topology, waypoint, at) for waypoint in waypoints]
     space = _Space(topology, enterable, None if costs is None else costs.units)
     points = _chosen(space, waypoints, fixed, _radius_m(settings))
-    if settings.ompl is not None and settings.ompl.has_heading:
+    if settings.sampling is not None and settings.sampling.has_heading:
         return _facing_along_paths(space, waypoints, points)
     return points
 
@@ -249,7 +249,7 @@ def _radius_m(settings: PlannerSettings) -> float:
 
     It is 0 for a disc, by which the map was inflated.
     """
-    ompl = settings.ompl
+    ompl = settings.sampling
     if ompl is None or ompl.footprint is None:
         return 0.0
     # Loads shapely.

@@ -11,15 +11,16 @@ from hybridnav._base.turns import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset
-from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
-from hybridnav.planner.endpoints import read_points
-from hybridnav.planner.follow import PlannerChange, change_of, followed
-from hybridnav.planner.queries import Queries
-from hybridnav.planner.select import cell_planner
+from hybridnav.planner.endpoints import no_places, read_points
+from hybridnav.planner.follow import begun, update_of
+from hybridnav.planner.methods import make_method
+from hybridnav.planner.methods.grid import Site
+from hybridnav.planner.planning import Planning
+from hybridnav.planner.settings import OmplPlannerSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from contextlib import AbstractContextManager
 
     from numpy.typing import ArrayLike
@@ -27,18 +28,16 @@ if TYPE_CHECKING:
 
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.areas import Box
+    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanBatch, PlanResult
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_planner import CellPlanner, Prepared
-    from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.drafts import PlanDraft
-    from hybridnav.planner.finish import Smooth
+    from hybridnav.planner.follow import Update
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
-    from hybridnav.planner.ompl_plans import OmplPlanner
+    from hybridnav.planner.planning import Smooth
+    from hybridnav.planner.result import PlanDraft
+    from hybridnav.search.found import ClosedCells, Method, Prepared
     from hybridnav.topology import TopologicalMap
 
 
@@ -62,7 +61,7 @@ class HybridPlanner:
     costs
         A factor for each cell, by which a metre in it costs more, joined with the costs that the
         preset names. The path is the cheapest one, and its result has the metric `weighted`. Only
-        for presets with `refine: grid-astar`, or with `coarse: overlay`.
+        for methods `cheapest`, `grid-astar` and `paper`.
 
     Raises
     ------
@@ -90,47 +89,70 @@ class HybridPlanner:
         prepared: Prepared | None = None,
         costs: CostLayer | None = None,
     ) -> None:
-        self.topology = topology
         self.preset = load_preset(preset)
-        check_radius(topology.grid, self.preset)
-        settings = self.preset.planner
-        self._costs = PlannerCosts(topology.grid, self.preset, costs)
-        self._cells = cell_planner(topology, settings, prepared, self.costs)
-        self._turns = Turns()
-        self._begun: Callable[[], None] | None = None
-        """The update that has begun and not ended; an interrupt leaves it here."""
-        self._preparing = Turns()
-        self._ompl: OmplPlanner | None = None
-        if settings.refine == "ompl":
+        grid, settings = topology.grid, self.preset.planner
+        check_radius(grid, self.preset)
+        by = PlannerCosts(grid, self.preset, costs)
+        site = Site(grid, topology, by.layer, prepared)
+        method, ompl = make_method(site, settings), None
+        if isinstance(settings, OmplPlannerSettings):
             # Loads modules for these presets only, or reports which one to install.
-            from hybridnav.planner.ompl_plans import ompl_planner  # noqa: PLC0415
+            from hybridnav.planner.methods.ompl import ompl_planner  # noqa: PLC0415
 
-            self._ompl = ompl_planner(topology, self._cells, settings)
-        self._queries = self._made_queries()
+            ompl = ompl_planner(site, method, settings)
+        self._now = Planning(self.preset, grid, topology, method, by, ompl)
+        self._turns, self._preparing = Turns(), Turns()
+        self._begun: Callable[[], Planning] | None = None
+        """The update that has begun and not ended; an interrupt leaves it here."""
 
-    def _made_queries(self) -> Queries:
-        return Queries(self.topology, self.preset, self._cells, self.costs, self._ompl)
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map now."""
+        return self._now.grid
+
+    @property
+    def topology(self) -> TopologicalMap:
+        """The places of the map now.
+
+        Raises
+        ------
+        InvalidValueError
+            When the map changed, by an `update` with a grid alone, after its places were built.
+        """
+        topology = self._now.topology
+        return no_places() if topology is None else topology
+
+    @property
+    def pyramid_rooms(self) -> RoomLabels | None:
+        """The rooms of the map; None without rooms, or while its places are not built."""
+        topology = self._now.topology
+        return None if topology is None else topology.pyramid.rooms
 
     @property
     def costs(self) -> CostLayer | None:
         """The costs that it plans by, None for lengths."""
-        return self._costs.layer
+        return self._now.costs.layer
+
+    @property
+    def method(self) -> Method:
+        """The search that its preset names, on the map now."""
+        return self._now.method
 
     @property
     def prepared(self) -> Prepared | None:
         """The structure built for queries: a mesh or a jump-point graph; None before that, and
         with presets that build none or, as the overlay does, one that changes with the costs."""
-        return self._cells.prepared
+        return self._now.method.prepared
 
     @property
     def guide(self) -> Guide | None:
         """The source of descriptions for a person; None on a map without rooms."""
-        return self._queries.guide
+        return self._now.guide
 
     @property
     def needs_headings(self) -> bool:
         """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
-        return self._queries.needs_headings
+        return self._now.needs_headings
 
     def plan(
         self,
@@ -177,7 +199,8 @@ class HybridPlanner:
             not on the map, or `smooth` is `"arcs"` and the planner plans by lengths.
         """
         with self._query():
-            return self._queries.plan(start, goal, smooth, blocked, at)
+            now = self._now
+            return now.plan(now.read(start, goal, smooth, blocked, at))
 
     def _query(self) -> AbstractContextManager[bool]:
         """Return the lock to hold while the map and the costs must stay as they are."""
@@ -203,7 +226,8 @@ class HybridPlanner:
             As in `plan`.
         """
         with self._query():
-            return self._queries.draft(start, goal, blocked, at)
+            now = self._now
+            return now.draft(now.read(start, goal, None, blocked, at))
 
     def plan_many(
         self,
@@ -240,7 +264,7 @@ class HybridPlanner:
                 "give each start its goal"
             )
         with self._query():
-            return self._queries.plan_many((first, last), smooth, blocked)
+            return self._now.plan_many((first, last), smooth, blocked)
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
@@ -255,7 +279,7 @@ class HybridPlanner:
             Called after each step with the number of steps done and of all steps, as for a progress
             bar.
         """
-        self._preparing.alone(lambda: self._cells.prepare(progress))
+        self._preparing.alone(lambda: self._now.method.prepare(progress))
 
     def update(
         self,
@@ -270,7 +294,7 @@ class HybridPlanner:
         Queries of other threads that run already finish by what was before; the update waits for
         them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
 
-        With `coarse: overlay` the changed fields get their costs at once; searches leave stale
+        With method `cheapest` the changed fields get their costs at once; searches leave stale
         tables above these out until `prepare` renews them. `shortest`, `octile` and `grid-astar`
         follow a changed grid alone. Their results have no route, and names, places and doors are
         refused, until an update brings the places of the map now. All other presets need these at
@@ -311,54 +335,46 @@ class HybridPlanner:
         >>> print(round(planner.plan((0.5, 0.5), (1.5, 0.5)).cost, 3))
         1.8
         """
-        before = self.topology.grid
+        before = self.grid
         box = box_of_area(changed, before.frame, before.shape)
-        change = change_of(costs, grid, topology, box)
-        self._preparing.alone(partial(self._update, change))
+        update = update_of(costs, grid, topology, box)
+        self._preparing.alone(partial(self._update, update))
 
-    def _update(self, change: PlannerChange) -> None:
-        """Check all of a change, then make it."""
+    def _update(self, update: Update) -> None:
+        """Check all of an update, then make it."""
         self._turns.alone(self._complete)
-        if change.is_of_map:
-            made = followed(self.topology, self.preset, self._cells, self._costs, change)
-            self._begun = partial(self._take_map, *made)
-        elif change.costs is not None:
-            changed = self._costs.changed(change.costs, change.box)
-            self._begun = partial(self._take_costs, *changed)
+        self._begun = begun(self._now, update)
         self._turns.alone(self._complete)
-
-    def _take_map(self, topology: TopologicalMap, cells: CellPlanner, costs: PlannerCosts) -> None:
-        self.topology, self._cells, self._costs = topology, cells, costs
-        if isinstance(cells, Carried):
-            cells.catch_up()
-        self._queries = self._made_queries()
 
     def _complete(self) -> None:
         """Make an update that has begun, also one that was interrupted."""
         if self._begun is not None:
-            self._begun()
+            self._now = self._begun()
             self._begun = None
-
-    def _take_costs(self, costs: PlannerCosts, box: Box) -> None:
-        self._costs = costs
-        if isinstance(self._cells, Updatable) and costs.layer is not None:
-            self._cells.update(costs.layer, box)
-        else:
-            self._cells = cell_planner(self.topology, self.preset.planner, None, costs.layer)
-        self._queries.take(self._cells, self.costs)
 
     def close(self) -> None:
         """End the OMPL process of a preset; the next query waits for another one."""
-        if self._ompl is not None:
-            self._ompl.close()
+        if self._now.ompl is not None:
+            self._now.ompl.close()
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure."""
-        return self._queries.closed(blocked)
+        return self._now.closed(blocked)
+
+    def points_of(
+        self,
+        waypoints: Sequence[ArrayLike | str],
+        *,
+        at: At = "anywhere",
+        closed: ClosedCells | None = None,
+    ) -> list[ArrayLike]:
+        """Return a point for each waypoint, a name too, so that the path through all of them is
+        cheapest."""
+        return self._now.points_of(waypoints, at, closed)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
-        return self._queries.closed_for_all(closed)
+        return self._now.closed_for_all(closed)
 
 
 # Check of the robot's radius, which map and preset both state.

@@ -6,30 +6,22 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
 from hybridnav.errors import PlanError
 from hybridnav.planner.guide import sentences
 from hybridnav.route.route import Route
+from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
+from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
+    from collections.abc import Callable
+
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
 
-Metric = Literal[
-    "octile",
-    "weighted",
-    "any-angle",
-    "any-angle-weighted",
-    "clearance-weighted",
-    "dubins",
-    "reeds-shepp",
-]
-"""What a path is judged by: the kind of its length, or of its cost."""
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
 
@@ -89,66 +81,6 @@ class Refinement:
     """Seconds and cost of each better path."""
     iterations: int
     """Iterations of planners and simplification."""
-
-
-@dataclass(frozen=True)
-class PlanStats:
-    """Effort of a query."""
-
-    expanded: int = 0
-    """Number of cells that the refiner expanded."""
-    expanded_places: int = 0
-    """Number of places that the coarse search expanded."""
-    expanded_border_cells: int = 0
-    """Number of border cells that the search on the overlay expanded."""
-    expanded_intervals: int = 0
-    """Number of intervals that the search on the mesh expanded."""
-    corridor_cells: int = 0
-    """Number of cells in the corridor; 0 for the whole map."""
-    seconds: dict[str, float] = field(default_factory=dict)
-    """Wall-clock seconds per stage."""
-
-
-@copies_alike
-@dataclass(frozen=True, eq=False)
-class PlanBatch:
-    """Outcomes of many queries, arrays of n.
-
-    Examples
-    --------
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> planner = hn.HybridPlanner(topology)
-    >>> batch = planner.plan_many([(0.5, 0.5), (0.5, 0.5)], [(2.0, 2.5), (1.5, 0.5)])
-    >>> batch.cost.round(3)
-    array([2.546, 1.   ])
-    """
-
-    status: AnyArray
-    """str (n,), the values of `PlanStatus`."""
-    cost: FloatArray
-    """float64 (n,), metres; infinite where there is no path."""
-    lower_bound: FloatArray
-    """float64 (n,), metres."""
-    path_start: LongArray
-    """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
-    points: FloatArray
-    """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
-    headings_rad: FloatArray | None = None
-    """float64 (m,), the heading at each point; None in spaces without headings."""
-
-    @property
-    def gap(self) -> FloatArray:
-        """float64 (n,), proved distances from the optimum; NaN where there is no path."""
-        gap = np.full(len(self.cost), np.nan)
-        solved = np.isfinite(self.cost)
-        np.divide(self.cost, self.lower_bound, out=gap, where=solved & (self.lower_bound > 0))
-        gap[solved & (self.lower_bound <= 0)] = 1.0
-        return gap - 1
-
-    def path(self, query: int) -> FloatArray:
-        """Return the points of one path, float64 (k, 2); none where there is no path."""
-        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
-        return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +216,28 @@ class PlanResult:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "settings": _finite(self.settings),
         }
+
+
+@dataclass(frozen=True, eq=False)
+class PlanDraft:
+    """A plan between two waypoints, for those who compare many and want the result of few."""
+
+    status: PlanStatus
+    cost: float
+    """As in `PlanResult`."""
+    lower_bound: float
+    stats: PlanStats
+    result: Callable[[], PlanResult]
+    """Makes the result."""
+
+    @classmethod
+    def of(cls, result: PlanResult) -> Self:
+        """Return the draft of a result that is made already."""
+        return cls(result.status, result.cost, result.lower_bound, result.stats, lambda: result)
+
+    def __reduce__(self) -> tuple[Callable[[PlanResult], PlanDraft], tuple[PlanResult]]:
+        """Make the result, with which copies travel without the planner and its map."""
+        return PlanDraft.of, (self.result(),)
 
 
 def _finite(value: Any) -> Any:

@@ -11,7 +11,6 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.guide import sentences
 from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
-from hybridnav.planner.named import At, check_names, points_of_waypoints
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,11 +19,12 @@ if TYPE_CHECKING:
 
     from hybridnav.planner import Metric, PlanResult
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.finish import Smooth
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.guide.legs import Leg
+    from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.planner.planning import Smooth
+    from hybridnav.search.found import ClosedCells
 
 _COUNTS = (
     "expanded",
@@ -241,16 +241,8 @@ def plan_tour(
     """
     if len(waypoints) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a tour needs at least two waypoints, got {len(waypoints)}")
-    check_names(planner.topology, waypoints)
     closed = planner.closed(blocked)
-    points = points_of_waypoints(
-        planner.topology,
-        planner.preset.planner,
-        waypoints,
-        at=at,
-        closed=planner.closed_for_all(closed),
-        costs=planner.costs,
-    )
+    points = planner.points_of(waypoints, at=at, closed=closed)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))

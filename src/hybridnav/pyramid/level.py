@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
-from hybridnav._base.fields import field_distances
+from hybridnav._base.kernels.fields import field_distances
 from hybridnav._base.moves import STRAIGHT, length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap

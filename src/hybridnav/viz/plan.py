@@ -249,7 +249,7 @@ def _entries(
     if result.route is not None:
         line = Line2D([], [], color=style.INK, lw=_ROUTE_WIDTH * width, marker="o")
         line.set(markerfacecolor=style.FREE, markersize=3.6 * width, markeredgewidth=width)
-        chosen = result.settings.get("planner", {}).get("coarse") == "max-distance"
+        chosen = result.settings.get("planner", {}).get("method") == "paper"
         words = ("coarse route", "corridor") if chosen else ("route", "its places")
         entries += [(line, words[0]), (swatch(style.PLACES), words[1])]
     entries.append((arc_handle(sizes), "place, arc"))

@@ -218,7 +218,7 @@ def test_an_overlay_is_made_from_regions_that_followed():
         places.update(with_classes(office, classes), changed=box).version
     ).version
     topology = hn.TopologicalMap(regions.pyramid)
-    over = hn.load_preset("octile", overrides=["planner.coarse=overlay"])
+    over = hn.load_preset("octile", overrides=["planner.method=cheapest"])
     planner = hn.HybridPlanner(topology, preset=over)
     planner.prepare()
     exact = hn.HybridPlanner(topology, preset="octile")

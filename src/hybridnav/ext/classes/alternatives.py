@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from hybridnav.ext.classes.classes import Word
     from hybridnav.planner import PlanResult
     from hybridnav.planner.by_doors import DoorTours, RouteLimits
-    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
+    from hybridnav.search.found import ClosedCells
 
 Cell = tuple[int, int]
 _LEAST_S = 1e-3
@@ -92,7 +92,7 @@ class ClassTours:
         closed: ClosedCells | None,
         effort: ClassEffort,
     ) -> None:
-        if planner.preset.planner.refine == "ompl":
+        if planner.preset.planner.method == "ompl":
             raise InvalidValueError(
                 "homotopy classes are of paths of the grid: ask a preset without OMPL for them, "
                 f'or by="doors", not {planner.preset.name}'

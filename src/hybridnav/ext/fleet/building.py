@@ -17,7 +17,7 @@ from hybridnav.ext.fleet.saved import building_parts
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import did_you_mean, place_of_name
 from hybridnav.planner import PlanStatus
-from hybridnav.planner.endpoints import cells_of_endpoints, read_point
+from hybridnav.planner.endpoints import cells_of_endpoints, read_point, refusal
 from hybridnav.planner.named import check_names
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.planner import HybridPlanner
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.named import At
     from hybridnav.planner.saved.container import Part
+    from hybridnav.search.found import ClosedCells
 
 
 class Building:
@@ -395,7 +395,7 @@ def refusal_of(
         status = cells if isinstance(cells, PlanStatus) else None
         shut = planner.closed_for_all(closed.get(end.floor))
         if status is None and shut is not None and not isinstance(cells, PlanStatus):
-            status = shut.refusal(cells, grid.shape)
+            status = refusal(shut, cells, grid.shape)
         if status is not None:
             return PlanStatus[status.name.replace("START", kind)]
     return None

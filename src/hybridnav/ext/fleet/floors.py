@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.follow import is_stale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,8 +65,7 @@ class Floor:
     @property
     def rooms(self) -> RoomLabels | None:
         """The rooms of its map; None without rooms, or while its places are stale."""
-        topology = self.planner.topology
-        return None if is_stale(topology) else topology.pyramid.rooms
+        return self.planner.pyramid_rooms
 
 
 class Known(NamedTuple):
@@ -102,7 +100,7 @@ class FloorTable:
         self._positions: list[tuple[float, float]] = positions_m.tolist()
         planner = floor.planner
         self._of = planner.topology, planner.costs
-        is_any_angle = planner.preset.planner.coarse == "mesh"
+        is_any_angle = planner.method.metric == "any-angle"
         self._slack_m = 0.0 if is_any_angle else math.sqrt(2) * planner.topology.grid.resolution_m
         """Metres by which a path between two points may be shorter than the line between them:
         paths of cells lead from centre to centre."""

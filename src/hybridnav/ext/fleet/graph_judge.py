@@ -16,6 +16,7 @@ from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, excess_of
 from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.planner.settings import ShortestSettings
 from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
@@ -195,8 +196,8 @@ def judge_building_graph(
 def _check_planners(building: Building) -> None:
     preset = building.floors[0].planner.preset
     settings = preset.planner
-    limits = settings.allow_unexplored, settings.epsilon, settings.budget_s
-    if settings.coarse != "mesh" or any(limits):
+    is_plain = isinstance(settings, ShortestSettings) and not settings.allow_unexplored
+    if not is_plain or settings.epsilon or settings.budget_s:
         raise InvalidValueError(
             f"the building is planned by preset {preset.name}, and routes are compared with "
             "shortest paths in free space: load it with preset shortest"

@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav.ext.fleet.floors import ROUNDED
 from hybridnav.ext.fleet.network import GOAL, START, ChosenParts
 from hybridnav.planner import PlanStatus
-from hybridnav.planner.drafts import PlanDraft
+from hybridnav.planner.result import PlanDraft
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.floors import FloorTable
     from hybridnav.ext.fleet.network import LinkNetwork, Part
     from hybridnav.planner import HybridPlanner
-    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.named import At
+    from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""

@@ -321,5 +321,5 @@ def _session(planner: HybridPlanner, file: RoomsFile | None, advice: str) -> Ses
 
 def _is_plain(preset: str) -> bool:
     """Return whether a preset plans over floors: without headings."""
-    ompl = load_preset(preset).planner.ompl
+    ompl = load_preset(preset).planner.sampling
     return ompl is None or not ompl.has_heading

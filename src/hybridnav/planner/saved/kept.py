@@ -270,8 +270,8 @@ def parts_of(
     for planner in planners:
         settings, prepared = planner.preset.planner, planner.prepared
         key = made_for(settings)
-        if prepared is not None and (settings.coarse, key) not in keys:
-            keys.append((settings.coarse, key))
+        if prepared is not None and (settings.underlying.method, key) not in keys:
+            keys.append((settings.underlying.method, key))
             found += search_parts(prepared, key)
     return found
 

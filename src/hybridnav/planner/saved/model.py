@@ -183,7 +183,7 @@ class Model:
         prepared = None
         if topology.grid is self.grid:
             key = made_for(preset.planner)
-            prepared = search_of(self._filed, preset.planner.coarse, key, self._sizes)
+            prepared = search_of(self._filed, preset.planner.underlying.method, key, self._sizes)
         return HybridPlanner(topology, preset=preset, prepared=prepared, costs=costs)
 
     def grown(self, settings: PyramidSettings, rooms: RoomLabels | None) -> TopologicalMap:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.cell_planner import Prepared
     from hybridnav.planner.saved.container import FiledPart, Part
+    from hybridnav.search.found import Prepared
     from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.search.octile import JumpSearch
 
@@ -71,7 +71,7 @@ def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
 
 
 def search_of(
-    filed: Sequence[FiledPart], coarse: str, key: dict[str, Any], known: dict[str, int]
+    filed: Sequence[FiledPart], method: str, key: dict[str, Any], known: dict[str, int]
 ) -> Prepared | None:
     """Read the preparations for a planner of some settings; return None if the model has none.
 
@@ -79,8 +79,8 @@ def search_of(
     ----------
     filed
         All parts of the model.
-    coarse
-        The setting `planner.coarse`.
+    method
+        The setting `planner.method`.
     key
         Of `made_for`.
     known
@@ -92,9 +92,9 @@ def search_of(
         When a part is not as it was written.
     """
     fitting = {part.kind: part for part in filed if part.values.get("made_for") == key["made_for"]}
-    if coarse == "mesh" and MESH.kind in fitting:
+    if method == "shortest" and MESH.kind in fitting:
         return _mesh_of(fitting, known)
-    if coarse == "jumps" and JUMP_GRAPH.kind in fitting:
+    if method == "octile" and JUMP_GRAPH.kind in fitting:
         return _jumps_of(fitting, known)
     return None
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import find
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import find
 from hybridnav.pyramid.darts import base_sigma, next_at_cell
 
 

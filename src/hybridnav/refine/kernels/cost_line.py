@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.exact import compare_products
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import compare_products
 from hybridnav.maps.costs.integral import segment_cost
 from hybridnav.refine.kernels.segments import is_legal
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import grow
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import grow
 
 
 @njit(cache=True, nogil=True)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._base.arrays import grow, pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 if TYPE_CHECKING:

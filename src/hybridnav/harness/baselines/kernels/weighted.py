@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import grow, pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.exact import compare_products
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import compare_products
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 """Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,

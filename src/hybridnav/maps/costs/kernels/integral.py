@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.exact import turn_of
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.exact import turn_of
 
 
 @njit(cache=True, nogil=True)

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.exact import turn_of
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import turn_of
 
 _MARGIN = 1e-6
 """Rounding of the point where a segment meets a row of cells, in cells."""

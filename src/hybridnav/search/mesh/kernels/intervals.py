@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from hybridnav._base.exact import turn_of
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.exact import turn_of
 
 # Columns of a node's whole numbers.
 SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.exact import turn_of
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.mesh.kernels.intervals import (
     ENDS,
     PARENT,

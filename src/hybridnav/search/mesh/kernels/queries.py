@@ -8,8 +8,8 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from hybridnav._base.arrays import pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks

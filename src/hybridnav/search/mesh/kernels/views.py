@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from hybridnav._base.exact import turn_of
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.exact import turn_of
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import grow, pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.moves import FAR, octile_cost
 from hybridnav.search.contraction import NO_ARC, pack
 from hybridnav.search.octile.kernels.tables import corner_at, is_corner, number_of

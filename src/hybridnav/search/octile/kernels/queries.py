@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.moves import FAR, octile_cost
 from hybridnav.search.contraction import corners_between
 from hybridnav.search.octile.kernels.legs import FROM_GOAL, FROM_START, row_col_kind, shortest

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import grow, pop, push
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.moves import COL_STEP, ROW_STEP
 from hybridnav.search.overlay.kernels.costs import least_cost, move_cost, octile_units, slot_of
 from hybridnav.search.overlay.kernels.lanes import FAR, NO_PATH

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import pop, push
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import pop, push
 from hybridnav.search.overlay.kernels.costs import clique_place, least_cost, slot_of
 from hybridnav.search.overlay.kernels.exits import reach_over_exits
 from hybridnav.search.overlay.kernels.fields import with_room

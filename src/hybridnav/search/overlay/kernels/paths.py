@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._base.arrays import grow, pop, push
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav.search.overlay.kernels.costs import clique_place, least_cost
 from hybridnav.search.overlay.kernels.fields import rank, with_room
 from hybridnav.search.overlay.kernels.lanes import FAR, NO_PATH

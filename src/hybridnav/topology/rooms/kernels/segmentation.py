@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from hybridnav._base.arrays import find
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import find
 from hybridnav._base.trig import cos, sin
 
 

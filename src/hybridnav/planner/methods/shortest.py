@@ -1,4 +1,4 @@
-"""Planner of the preset `shortest`: exact any-angle paths on the convex mesh."""
+"""Method `shortest`: exact any-angle paths on the convex mesh."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 import threading
 import time
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.planner import PlanStats
-from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
+from hybridnav.planner.methods.grid import Site, enterable_of
 from hybridnav.refine import LineOfSight
+from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.mesh import (
     DetourSearch,
     MeshPath,
@@ -28,14 +28,12 @@ from hybridnav.search.mesh import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._base.progress import Progress
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planner import Metric, PlannerSettings
-    from hybridnav.planner.cell_planner import CellQueries, CellQuery
-    from hybridnav.planner.closed import ClosedCells
-    from hybridnav.pyramid import Level
-    from hybridnav.refine import GridRefiner
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.planner.settings import ShortestSettings
+    from hybridnav.search.found import Change, ClosedCells, Metric, Query, QueryMany
 
 Position = tuple[float, float]
 
@@ -46,38 +44,17 @@ _KEPT = 8
 """Number of searches round closed cells that are kept for queries with equal closures."""
 
 
-class FoundPath(NamedTuple):
-    """A path on the mesh, before the cells that it passes are known."""
-
-    query: CellQuery
-    """What was asked for."""
-    path: MeshPath
-    """What the search has found."""
-    points: FloatArray | None
-    """float64 (n, 2), `(x, y)` in metres; None where no path was found."""
-    stats: PlanStats
-    """Its effort."""
-
-    @property
-    def length_m(self) -> float:
-        """Length of the path in metres, infinite for none."""
-        return math.inf if self.points is None else polyline_length(self.points)
-
-
 @copies_alike
-class OverMesh:
+class OverMesh(Method):
     """Shortest any-angle paths; the mesh is built when the first query needs it.
 
     Parameters
     ----------
-    grid
-        The map, without corner cutting.
-    refiner
-        Search of cell paths, for queries whose time is up before the search of the mesh has a path.
+    site
+        The map, without corner cutting, and the search of its mesh, if it is built already.
     settings
-        Whether unexplored cells may be entered, and the accepted distance from the optimum.
-    search
-        Search of the mesh of the same cells, if it is built already.
+        Whether unexplored cells may be entered, the accepted distance from the optimum, and the
+        time of a query.
 
     Raises
     ------
@@ -87,13 +64,8 @@ class OverMesh:
 
     metric: Metric = "any-angle"
 
-    def __init__(
-        self,
-        grid: OccupancyGrid,
-        refiner: GridRefiner,
-        settings: PlannerSettings,
-        search: MeshSearch | None = None,
-    ) -> None:
+    def __init__(self, site: Site, settings: ShortestSettings) -> None:
+        grid, search = site.grid, site.prepared
         if grid.corner_cutting:
             raise InvalidValueError(
                 "shortest any-angle paths do not pass between two blocked cells that meet at a "
@@ -101,12 +73,12 @@ class OverMesh:
                 "preset grid-astar"
             )
         self._grid, self._frame = grid, grid.frame
-        self._refiner = refiner
+        self._refiner = site.refiner(settings)
         self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
-        self._search = search
+        self._search = search if isinstance(search, MeshSearch) else None
         self._is_renewed = False
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
@@ -117,10 +89,10 @@ class OverMesh:
         """The search of the mesh, None until it is built, and after a change of the map."""
         return None if self._is_renewed else self._search
 
-    def followed(self, grid: OccupancyGrid, cells: LongArray) -> OverMesh:
-        """Return the planner of the changed map; polygons beside changed cells are cut anew, and
-        the graph of corners is stale until it is prepared again. See `Following`."""
-        made = OverMesh(grid, self._refiner.on(grid), self._settings)
+    def changed(self, change: Change) -> OverMesh:
+        """Return the method of the changed map; polygons beside changed cells are cut anew, and
+        the graph of corners is stale until it is prepared again. See `Method`."""
+        made, cells = OverMesh(Site(change.grid, change.topology), self._settings), change.cells
         search = self._search
         if search is not None:
             was = enterable_of(self._grid, cells, allow_unexplored=self._allow_unexplored)
@@ -133,7 +105,7 @@ class OverMesh:
         return made
 
     def prepare(self, progress: Progress = no_progress) -> MeshSearch:
-        """Build the mesh and the graph of its corners, once; see `CellPlanner`."""
+        """Build the mesh and the graph of its corners, once; see `Method`."""
         search = self._on_mesh()
         if not search.is_prepared:
             progress(1, 3)
@@ -148,17 +120,13 @@ class OverMesh:
                     self._search = MeshSearch(build_mesh(self._free))
         return self._search
 
-    def plan(self, query: CellQuery) -> CellPlan:
-        """Find a shortest path between two points; see `CellPlanner`.
+    def find(self, query: Query) -> Found:
+        """Find a shortest path between two points; see `Method`. Its cells are found when somebody
+        reads them.
 
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
         answer is a cell path shortened by line of sight, with the proved bound.
         """
-        return self.completed(self.found(query))
-
-    def found(self, query: CellQuery) -> FoundPath:
-        """Find the points of a shortest path between two points, not yet the cells that it
-        passes."""
         began = time.perf_counter()
         seconds = {}
         if self._search is None and self._budget_s is None:
@@ -168,36 +136,21 @@ class OverMesh:
         row, col = self._frame.position_of(float(start[0]), float(start[1]))
         positions = (row, col), self._frame.position_of(float(goal[0]), float(goal[1]))
         now = time.perf_counter()
-        found, expanded = self._on_graph(query, positions)
+        path, expanded = self._on_graph(query, positions)
         points = None
-        if found.positions is not None:
-            points = self._frame.points_of_grid(found.positions)
+        if path.positions is not None:
+            points = self._frame.points_of_grid(path.positions)
             points[0], points[-1] = query.points
         seconds["shortest"] = time.perf_counter() - now
-        return FoundPath(
-            query, found, points, PlanStats(expanded_intervals=expanded, seconds=seconds)
-        )
+        stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
+        if points is not None:
+            cells = partial(self._passed, query, path, seconds)
+            return _along(points, path.length_cells, path.lower_bound_cells, cells, stats)
+        if math.isinf(path.lower_bound_cells):
+            return Found(None, stats=stats)
+        return self._in_sight(query, path.lower_bound_cells, stats)
 
-    def completed(self, path: FoundPath) -> CellPlan:
-        """Return the plan of a path that was found, with the cells that it passes."""
-        query, found, points, stats = path
-        now = time.perf_counter()
-        passed = self._passed(query, found)
-        stats.seconds["shortest"] += time.perf_counter() - now
-        plan = CellPlan(
-            passed,
-            points=points,
-            length_cells=found.length_cells,
-            bound_cells=found.lower_bound_cells,
-            stats=stats,
-        )
-        if points is not None or math.isinf(found.lower_bound_cells):
-            return plan  # a path, or the proof of none
-        return self._in_sight(query, plan)
-
-    def _on_graph(
-        self, query: CellQuery, positions: tuple[Position, Position]
-    ) -> tuple[MeshPath, int]:
+    def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
         """Return the path of the search of the mesh, and the nodes expanded."""
         search = self._search
         if search is None:
@@ -222,8 +175,8 @@ class OverMesh:
             found = replace(found, lower_bound_cells=bound)
         return found, expanded
 
-    def _in_sight(self, query: CellQuery, plan: CellPlan) -> CellPlan:
-        """Return the shortest path of cells, shortened by line of sight, with a plan's bound."""
+    def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
+        """Return the shortest path of cells, shortened by line of sight, with a proved bound."""
         began = time.perf_counter()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
@@ -231,14 +184,13 @@ class OverMesh:
         if found.cells is not None:
             sight = self._open_sight if flat is None else self._sight(flat)
             points = sight.shorten(found.cells, *query.points)
-        seconds = {**plan.stats.seconds, "line-of-sight": time.perf_counter() - began}
-        expanded = plan.stats.expanded_intervals + found.expanded
+        seconds = {**spent.seconds, "line-of-sight": time.perf_counter() - began}
+        expanded = spent.expanded_intervals + found.expanded
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
-        if points is None:
-            return CellPlan(None, stats=stats)
+        if points is None or found.cells is None:
+            return Found(None, stats=stats)
         length = polyline_length(points) / self._frame.resolution_m
-        bound = min(plan.bound_cells, length)
-        return CellPlan(found.cells, points, length_cells=length, bound_cells=bound, stats=stats)
+        return _along(points, length, min(bound_cells, length), found.cells, stats)
 
     @cached_property
     def _open_sight(self) -> LineOfSight:
@@ -248,8 +200,8 @@ class OverMesh:
         """Return the shortener of cell paths, with some flat cells closed."""
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
-    def plan_many(self, queries: CellQueries) -> CellPlans | None:
-        """Find a shortest path for each query, on all cores; see `CellPlanner`.
+    def find_many(self, queries: QueryMany) -> FoundMany | None:
+        """Find a shortest path for each query, on all cores; see `Method`.
 
         Queries whose paths meet closed cells stay undone, and with a time limit all of them.
         """
@@ -270,7 +222,7 @@ class OverMesh:
         share = np.ones(len(cost_m))
         moves = solved & (found.length_cells > 0)
         np.divide(found.lower_bound_cells, found.length_cells, out=share, where=moves)
-        return CellPlans(
+        return FoundMany(
             is_done=is_done,
             cost_m=cost_m,
             lower_bound_m=cost_m * share,
@@ -278,21 +230,20 @@ class OverMesh:
             points=along,
         )
 
-    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
-        """Return the bound of the plan, which is any-angle; see `CellPlanner`."""
-        return plan.bound_cells * self._frame.resolution_m
+    def _passed(self, query: Query, path: MeshPath, seconds: dict[str, float]) -> LongArray:
+        """Return the cells that a path passes, from start to goal, and add the time to its
+        stage."""
+        now = time.perf_counter()
+        passed = self._cells_along(query, path)
+        seconds["shortest"] += time.perf_counter() - now
+        return passed
 
-    def fields(self, level: Level) -> IntArray:
-        """Return the fields of the places, as the mesh has none; see `CellPlanner`."""
-        return level.field_of
-
-    def _passed(self, query: CellQuery, found: MeshPath) -> LongArray | None:
-        """Return the cells that a path passes, from start to goal; None without a path."""
-        if found.positions is None:
-            return None
-        passed = cells_of_line(self._free, found.positions)
+    def _cells_along(self, query: Query, path: MeshPath) -> LongArray:
+        """Return the cells that a path passes, from start to goal."""
+        assert path.positions is not None  # noqa: S101 - only paths are asked for their cells
+        passed = cells_of_line(self._free, path.positions)
         if query.closed is not None and query.closed.holds(passed @ self._across).any():
-            passed = self._passed_beside(query.closed, found.positions)
+            passed = self._passed_beside(query.closed, path.positions)
         # For an end on a side, the cell behind the side may be listed.
         cells = query.cells
         parts = [passed]
@@ -321,3 +272,19 @@ class OverMesh:
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)
         return found
+
+
+def _along(
+    points: FloatArray,
+    length_cells: float,
+    bound_cells: float,
+    cells: LongArray | Callable[[], LongArray],
+    stats: PlanStats,
+) -> Found:
+    """Return the answer of a path through points.
+
+    The bound is a share of the length in metres, so that a proved optimum has no gap by rounding.
+    """
+    length_m = polyline_length(points)
+    bound_m = min(length_m * (bound_cells / length_cells), length_m) if length_cells else 0.0
+    return Found(cells, length_m, bound_m, points, stats=stats)

@@ -7,7 +7,7 @@ from fractions import Fraction
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from hybridnav._base.exact import compare_products, turn_of
+from hybridnav._base.kernels.exact import compare_products, turn_of
 
 coordinates = st.integers(-(2**51), 2**51).map(lambda n: n / 2**24)
 """Multiples of 2^-24 below 2^27, whose differences fit a float64."""

@@ -1,98 +1,23 @@
-"""The planner of cell paths that the settings of a preset select."""
+"""Refiners of the user's own, and other classes that a preset names as `module:Class`."""
 
 from __future__ import annotations
 
 import inspect
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.moves import STEPS, legal_moves
-from hybridnav.errors import InvalidValueError, PresetError
-from hybridnav.refine import GridRefiner
+from hybridnav.errors import PresetError
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.refine import Refiner
     from hybridnav.route import Corridor
-    from hybridnav.topology import TopologicalMap
-
-
-_T = TypeVar("_T")
-
-
-def cell_planner(
-    topology: TopologicalMap,
-    settings: PlannerSettings,
-    prepared: Prepared | None,
-    costs: CostLayer | None = None,
-) -> CellPlanner:
-    """Make the planner of cell paths for some settings.
-
-    The modules of the other methods are not loaded.
-
-    Parameters
-    ----------
-    topology
-        The map.
-    settings
-        Section `planner` of a preset.
-    prepared
-        Structures that another planner of the same map and settings has built; None for none.
-    costs
-        Costs of the cells, with settings that can plan by them; None for lengths.
-
-    Raises
-    ------
-    InvalidValueError
-        When these settings do not use structures of the given kind.
-    PresetError
-        When the settings name a refiner of the user's own that cannot be used.
-    """
-    grid, coarse = topology.grid, settings.coarse
-    refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored, costs=costs)
-    if coarse == "overlay":
-        from hybridnav.planner.overlay_plans import OverOverlay  # noqa: PLC0415
-
-        _taken(type(None), prepared, coarse)
-        return OverOverlay(topology, refiner, settings)
-    if coarse == "mesh":
-        from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
-        from hybridnav.search.mesh import MeshSearch  # noqa: PLC0415
-
-        return OverMesh(grid, refiner, settings, _taken(MeshSearch, prepared, coarse))
-    if coarse == "jumps":
-        from hybridnav.planner.jump_plans import OverJumps  # noqa: PLC0415
-        from hybridnav.search.octile import JumpSearch  # noqa: PLC0415
-
-        return OverJumps(grid, refiner, settings, _taken(JumpSearch, prepared, coarse))
-    from hybridnav.planner.cell_plans import MaxDistance, WholeMap  # noqa: PLC0415
-
-    _taken(type(None), prepared, coarse)
-    own = None
-    if is_own(settings.refine):
-        own = own_refiner(settings.refine, grid, allow_unexplored=settings.allow_unexplored)
-    if coarse == "none":
-        return WholeMap(refiner, own)
-    return MaxDistance(topology, refiner, settings, own)
-
-
-def _taken(kind: type[_T], prepared: Prepared | None, coarse: str) -> _T | None:
-    if prepared is None or isinstance(prepared, kind):
-        return prepared
-    raise InvalidValueError(
-        f"coarse: {coarse} plans on nothing like a {type(prepared).__name__}: prepared must come "
-        "from a planner of the same preset"
-    )
-
-
-# Refiners of the user's own, which a preset names as `module:Class`.
 
 Cell = tuple[int, int]
 
@@ -100,52 +25,51 @@ _MAX_SHOWN = 120
 """Characters of a foreign error that a message quotes."""
 
 
-def is_own(refine: str) -> bool:
-    """Return whether a setting `refine` names a class."""
-    return ":" in refine
-
-
-def own_refiner(name: str, grid: OccupancyGrid, *, allow_unexplored: bool) -> Refiner:
-    """Import a class, make a refiner of it, and return one that checks its paths.
+def own_refiner(grid: OccupancyGrid, settings: PlannerSettings) -> Refiner | None:
+    """Import the class that settings name, and return a refiner of it whose paths are checked.
 
     Parameters
     ----------
-    name
-        `module:Class`. The class is called with the grid and the keyword `allow_unexplored`.
     grid
         The map.
-    allow_unexplored
-        Whether unexplored cells may be entered.
+    settings
+        Their `refine` is `module:Class`, else there is none. The class is called with the grid and
+        the keyword `allow_unexplored`.
 
     Raises
     ------
     PresetError
         When the module cannot be imported, has no such class, or the class makes no refiner.
     """
-    own = _class_of(name)
+    name, allow_unexplored = settings.own_refiner, settings.allow_unexplored
+    if name is None:
+        return None
+    own = class_of(name)
     try:
         made = own(grid, allow_unexplored=allow_unexplored)
     except Exception as error:
         call = f"{own.__name__}(grid, allow_unexplored={allow_unexplored})"
-        raise _refused(name, f"{call} fails, {_one_line(error)}") from error
+        raise refused(name, f"{call} fails, {one_line(error)}") from error
     try:
         inspect.signature(made.refine).bind((0, 0), (0, 0), None)
     except (AttributeError, TypeError, ValueError) as error:
         expected = "expected a method refine(start, goal, corridor)"
-        raise _refused(name, f"it is no refiner, {_one_line(error)}: {expected}") from error
+        raise refused(name, f"it is no refiner, {one_line(error)}: {expected}") from error
     return CheckedRefiner(name, made, grid, allow_unexplored=allow_unexplored)
 
 
-def _class_of(name: str) -> Any:
+def class_of(name: str, key: str = "planner.refine") -> Any:
     """Import the class that a setting names."""
     module, _, attribute = name.partition(":")
     try:
         found = getattr(import_module(module), attribute, None)
     except (Exception, SystemExit) as error:
-        raise _refused(name, f"module {module} cannot be imported, {_one_line(error)}") from error
+        raise refused(
+            name, f"module {module} cannot be imported, {one_line(error)}", key
+        ) from error
     if not inspect.isclass(found):
         what = "has nothing of that name" if found is None else f"has a {type(found).__name__}"
-        raise _refused(name, f"module {module} {what}, expected a class {attribute}")
+        raise refused(name, f"module {module} {what}, expected a class {attribute}", key)
     return found
 
 
@@ -213,18 +137,19 @@ class CheckedRefiner:
         return moves
 
     def _wrong(self, what: str) -> PresetError:
-        return _refused(
+        return refused(
             self._name,
             f"refine returned {what}, expected (cells, expanded): whole numbers of shape (n, 2) by "
             "legal moves from start to goal, or None, and a count",
         )
 
 
-def _refused(name: str, why: str) -> PresetError:
-    return PresetError(f"planner.refine: {name}: {why}")
+def refused(name: str, why: str, key: str = "planner.refine") -> PresetError:
+    """Return the error that refuses a class."""
+    return PresetError(f"{key}: {name}: {why}")
 
 
-def _one_line(error: BaseException) -> str:
+def one_line(error: BaseException) -> str:
     """Return a foreign error in one line."""
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]} ..."

@@ -1,8 +1,7 @@
-"""Planner of presets with costs: cheapest cell paths on the multilevel overlay of the map."""
+"""Method `cheapest`: cheapest cell paths on the multilevel overlay of the map."""
 
 from __future__ import annotations
 
-import math
 import time
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -12,22 +11,18 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav._base.turns import Turns
-from hybridnav.planner import PlanStats
-from hybridnav.planner.cell_planner import CellPlan
-from hybridnav.planner.cell_plans import WholeMap, round_closed
-from hybridnav.refine import GridRefiner
+from hybridnav.planner.methods.grid import Site, WholeMap, on_cells, round_closed
+from hybridnav.search.found import Method, PlanStats
 from hybridnav.search.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, LongArray
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Metric, PlannerSettings
-    from hybridnav.planner.cell_planner import CellQueries, CellQuery
-    from hybridnav.pyramid import Level
+    from hybridnav.planner.settings import CheapestSettings
+    from hybridnav.search.found import Change, Found, Metric, Query
     from hybridnav.search.overlay import Overlay
-    from hybridnav.topology import TopologicalMap
 
 
 _WORTH = 20
@@ -36,7 +31,7 @@ cell, A* 0.2 us for each cell that it expands."""
 
 
 @copies_alike
-class OverOverlay:
+class OverOverlay(Method):
     """Cheapest paths of cells; the overlay is built once queries have spent as much time without.
 
     Until then, and if corners may be cut, A* searches the whole map. Without costs the paths are
@@ -44,22 +39,18 @@ class OverOverlay:
 
     Parameters
     ----------
-    topology
-        The map; its pyramid has the fields of the overlay.
-    refiner
-        Search of paths round closed cells, and before the overlay is built, with the costs.
+    site
+        The map with its places, whose pyramid has the fields of the overlay, and its costs.
     settings
         Whether unexplored cells may be entered, and the accepted distance from the optimum.
     """
 
-    def __init__(
-        self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
-    ) -> None:
-        self._topology = topology
-        self._settings = settings
+    def __init__(self, site: Site, settings: CheapestSettings) -> None:
+        assert site.topology is not None  # noqa: S101 - no method of places is made without
+        self._topology, self._settings = site.topology, settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon = settings.epsilon or 0.0
-        self._take(refiner)
+        self._take(site)
         self._built: tuple[Overlay, OverlaySearch] | None = None
         self._is_too_long = False
         """Whether the costs of paths inside a field do not fit, as with factors of hundreds."""
@@ -74,22 +65,13 @@ class OverOverlay:
         free = self._topology.grid.enterable(allow_unexplored=self._allow_unexplored)
         return _WORTH * int(free.sum())
 
-    def _take(self, refiner: GridRefiner) -> None:
-        self._refiner = refiner
-        self._whole_map = WholeMap(refiner)
-
-    @property
-    def metric(self) -> Metric:
-        """`weighted`, or `octile` without costs; see `CellPlanner`."""
-        return self._whole_map.metric
-
-    @property
-    def prepared(self) -> None:
-        """None, because an overlay changes with the costs of its planner; see `CellPlanner`."""
-        return
+    def _take(self, site: Site) -> None:
+        self._whole_map = WholeMap(site, self._settings)
+        self._refiner, _ = self._whole_map.refiners
+        self.metric: Metric = self._whole_map.metric
 
     def prepare(self, progress: Progress = no_progress) -> None:
-        """Build the overlay, or renew what updates have made stale; see `CellPlanner`."""
+        """Build the overlay, or renew what updates have made stale; see `Method`."""
         self._building.alone(partial(self._build_or_renew, progress))
         progress(1, 1)
 
@@ -127,13 +109,13 @@ class OverOverlay:
             return
         self._built = overlay, OverlaySearch(overlay)
 
-    def update(self, costs: CostLayer, box: Box) -> None:
-        """Plan by other costs from now on; see `Updatable`."""
+    def take_costs(self, costs: CostLayer, box: Box) -> bool:
+        """Plan by other costs from now on; see `Method`."""
         self._building.alone(partial(self._take_costs, costs, box))
+        return True
 
     def _take_costs(self, costs: CostLayer, box: Box) -> None:
-        allowed = self._allow_unexplored
-        self._take(GridRefiner(self._topology.grid, allow_unexplored=allowed, costs=costs))
+        self._take(Site(self._topology.grid, self._topology, costs))
         if self._built is None:
             self._is_too_long = False
             return
@@ -143,11 +125,9 @@ class OverOverlay:
         except PathsTooLongError:
             self._built, self._is_too_long = None, True
 
-    def carried(self, topology: TopologicalMap, costs: CostLayer | None) -> OverOverlay:
-        """Return the planner of a changed map, which takes the overlay over; see `Carried`."""
-        allowed = self._allow_unexplored
-        refiner = GridRefiner(topology.grid, allow_unexplored=allowed, costs=costs)
-        other = OverOverlay(topology, refiner, self._settings)
+    def changed(self, change: Change) -> OverOverlay:
+        """Return the method of a changed map, which takes the overlay over; see `Method`."""
+        other = OverOverlay(Site(*change[:3]), self._settings)
         other._built, other._expanded = self._built, self._expanded
         if self._built is not None:
             before, now = self._state(), other._state()
@@ -164,7 +144,7 @@ class OverOverlay:
         return factors, enterable, np.zeros(grid.shape, np.bool_) if closed is None else closed
 
     def catch_up(self) -> None:
-        """Take the changed cells into the overlay; see `Carried`."""
+        """Take the changed cells into the overlay; see `Method`."""
         self._building.alone(self._catch_up)
 
     def _catch_up(self) -> None:
@@ -178,8 +158,8 @@ class OverOverlay:
             self._built, self._is_too_long = None, True
         self._overdue = None
 
-    def plan(self, query: CellQuery) -> CellPlan:
-        """Find a cheapest path, or one within epsilon of it; see `CellPlanner`."""
+    def find(self, query: Query) -> Found:
+        """Find a cheapest path, or one within epsilon of it; see `Method`."""
         began = time.perf_counter()
         seconds = {}
         if self._built is None and self._expanded >= self._worth:
@@ -187,32 +167,20 @@ class OverOverlay:
             seconds["overlay"] = time.perf_counter() - began
         built = self._built
         if built is None:
-            plan = self._whole_map.plan(query)
-            self._expanded += plan.stats.expanded
-            return plan
+            found = self._whole_map.find(query)
+            self._expanded += found.stats.expanded
+            return found
         now = time.perf_counter()
-        found = built[1].path(*query.cells, epsilon=self._epsilon)
+        path = built[1].path(*query.cells, epsilon=self._epsilon)
         seconds["search"] = time.perf_counter() - now
-        plan = CellPlan(
-            found.cells,
-            bound_cells=found.lower_bound_cells,
-            stats=PlanStats(
-                expanded=found.expanded,
-                expanded_border_cells=found.expanded_border_cells,
-                seconds=seconds,
-            ),
+        stats = PlanStats(
+            expanded=path.expanded,
+            expanded_border_cells=path.expanded_border_cells,
+            seconds=seconds,
         )
-        return round_closed(plan, query, self._refiner)
-
-    def plan_many(self, queries: CellQueries) -> None:
-        """None, because each query has a search of its own; see `CellPlanner`."""
-
-    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
-        """Return the straight distance; see `CellPlanner`."""
-        return math.dist(*points)
-
-    def fields(self, level: Level) -> None:
-        """None, because paths may use the whole map; see `CellPlanner`."""
+        bound = path.lower_bound_cells
+        found = on_cells(self._refiner, path.cells, bound_cells=bound, stats=stats)
+        return round_closed(found, query, self._refiner)
 
 
 def _box_of(flat: LongArray, shape: tuple[int, ...]) -> Box:

@@ -1,4 +1,4 @@
-"""Planner of the presets with OMPL: from a coarse path to one in the robot's state space."""
+"""Method `ompl`: from a coarse path to one in the robot's state space."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ from hybridnav._base.poses import Motion
 from hybridnav._base.trig import directions
 from hybridnav.maps.lines import cells_of_line
 from hybridnav.planner import Path, PlanStatus, Refinement
-from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
-from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
+from hybridnav.refine.ompl import Clearance, Setup, Worker
+from hybridnav.refine.ompl import Query as OmplQuery
+from hybridnav.search.found import Query
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.planner import Metric, PlannerSettings
-    from hybridnav.planner.cell_planner import CellPlanner
+    from hybridnav.planner import Metric
+    from hybridnav.planner.methods.grid import Site
+    from hybridnav.planner.settings import OmplPlannerSettings
     from hybridnav.refine.ompl import Reply, Search
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.search.found import Method
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,24 +49,22 @@ class OmplPlan:
     search: Search | None = None
 
 
-def ompl_planner(
-    topology: TopologicalMap, cells: CellPlanner, settings: PlannerSettings
-) -> OmplPlanner:
-    """Make a planner with OMPL in the fields of a planner of cell paths.
-
-    If that planner has no fields, OMPL searches the whole map.
+def ompl_planner(site: Site, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
+    """Make a planner with OMPL along the paths of a method.
 
     Raises
     ------
     OmplError
         When OMPL is not installed, refuses the settings, or its process does not start.
     """
-    field_of = cells.fields(topology.level)
-    free = np.argwhere(topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
+    grid, field_of = site.grid, None
+    if settings.along != "grid-astar" and site.topology is not None:
+        field_of = site.topology.level.field_of
+    free = np.argwhere(grid.enterable(allow_unexplored=settings.allow_unexplored))[:1]
     if len(free):  # kernels loaded at the first query would use up its budget
-        row, col = free[0].tolist()
-        cells.plan(CellQuery.between(topology.grid.frame, (row, col), (row, col)))
-    return OmplPlanner(topology.grid, settings, field_of)
+        cell, (point,) = (int(free[0, 0]), int(free[0, 1])), grid.frame.points_of(free)
+        _ = method.find(Query((cell, cell), (point, point))).cells
+    return OmplPlanner(grid, settings, field_of)
 
 
 @copies_alike
@@ -94,10 +94,9 @@ class OmplPlanner:
     def __init__(
         self,
         grid: OccupancyGrid,
-        settings: PlannerSettings,
+        settings: OmplPlannerSettings,
         field_of: NDArray[np.int16 | np.int32] | None,
     ) -> None:
-        assert settings.ompl is not None  # noqa: S101 - the preset is checked
         self._grid = grid
         self._settings = settings
         self.ompl = settings.ompl
@@ -136,7 +135,7 @@ class OmplPlanner:
             return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
         with self._one_at_a_time:
             self._worker.ensure()
-            query = Query(
+            query = OmplQuery(
                 start=endpoints[0],
                 goal=endpoints[1],
                 cells=cells,

@@ -1,0 +1,160 @@
+"""Many plans at once: those that look-ups answer in one kernel, the others one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.copies import frozen
+from hybridnav.maps import CellClass
+from hybridnav.planner.result import PlanStatus
+from hybridnav.search.found import ClosedCells, QueryMany
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import PlanResult
+    from hybridnav.search.found import FoundMany, Method
+
+
+@dataclass(frozen=True, eq=False)
+class PlanBatch:
+    """Outcomes of many queries, arrays of n.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology)
+    >>> batch = planner.plan_many([(0.5, 0.5), (0.5, 0.5)], [(2.0, 2.5), (1.5, 0.5)])
+    >>> batch.cost.round(3)
+    array([2.546, 1.   ])
+    """
+
+    status: AnyArray
+    """str (n,), the values of `PlanStatus`."""
+    cost: FloatArray
+    """float64 (n,), metres; infinite where there is no path."""
+    lower_bound: FloatArray
+    """float64 (n,), metres."""
+    path_start: LongArray
+    """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), the heading at each point; None in spaces without headings."""
+
+    @property
+    def gap(self) -> FloatArray:
+        """float64 (n,), proved distances from the optimum; NaN where there is no path."""
+        gap = np.full(len(self.cost), np.nan)
+        solved = np.isfinite(self.cost)
+        np.divide(self.cost, self.lower_bound, out=gap, where=solved & (self.lower_bound > 0))
+        gap[solved & (self.lower_bound <= 0)] = 1.0
+        return gap - 1
+
+    def path(self, query: int) -> FloatArray:
+        """Return the points of one path, float64 (k, 2); none where there is no path."""
+        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
+        return points
+
+
+def plan_many(
+    grid: OccupancyGrid,
+    at_once: Method | None,
+    endpoints: tuple[FloatArray, FloatArray],
+    closed: ClosedCells | None,
+    alone: Callable[[FloatArray, FloatArray], PlanResult],
+) -> PlanBatch:
+    """Return the answers to pairs of points, in arrays.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    at_once
+        Planner for many queries at once; None leaves all to `alone`.
+    endpoints
+        Starts and goals, float64 (n, 2) each, or poses (n, 3).
+    closed
+        Closed cells; None for none.
+    alone
+        Plans one of the remaining queries, between two of the `endpoints`.
+    """
+    starts, goals = endpoints
+    n = len(starts)
+    status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
+    cost, bound = np.full(n, np.inf), np.full(n, np.inf)
+    paths: list[FloatArray] = [np.empty((0, 2))] * n
+    headings = [np.empty(0)] * n
+    left = np.ones(n, dtype=np.bool_)
+    first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
+    asked = np.flatnonzero(_are_free(grid, first) & _are_free(grid, last))
+    found = None
+    if len(asked) and at_once is not None:
+        cells = first[asked], last[asked]
+        found = at_once.find_many(QueryMany(cells, (starts[asked], goals[asked]), closed))
+    if at_once is not None and found is not None:
+        kept = found.is_done
+        if closed is not None:
+            on_cells = found if at_once.metric == "octile" else None
+            kept = kept & ~_met(closed, cells, grid, on_cells)
+        done = asked[kept]
+        left[done] = False
+        cost[done] = found.cost_m[kept]
+        bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
+        status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
+        for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
+            points = found.points[found.path_start[k] : found.path_start[k + 1]]
+            paths[i] = points if cost[i] > 0 else points[:1]
+    for i in np.flatnonzero(left).tolist():
+        result = alone(starts[i], goals[i])
+        status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
+        if result.path is not None:
+            paths[i] = result.path.points
+            if result.path.headings_rad is not None:
+                headings[i] = result.path.headings_rad
+    has_yaw = starts.shape[1] > 2  # noqa: PLR2004
+    turns = frozen(np.concatenate([np.empty(0), *headings])) if has_yaw else None
+    return PlanBatch(
+        status=frozen(status),
+        cost=frozen(cost),
+        lower_bound=frozen(bound),
+        path_start=frozen(
+            np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64)
+        ),
+        points=frozen(np.concatenate([np.empty((0, 2)), *paths])),
+        headings_rad=turns,
+    )
+
+
+def _met(
+    closed: ClosedCells,
+    endpoints: tuple[LongArray, LongArray],
+    grid: OccupancyGrid,
+    found: FoundMany | None,
+) -> BoolArray:
+    """Return which queries meet closed cells with an endpoint, or with their paths, bool (n,).
+
+    Only paths of cells are given; None for others.
+    """
+    across = np.array([grid.shape[1], 1])
+    met: BoolArray = closed.holds(endpoints[0] @ across) | closed.holds(endpoints[1] @ across)
+    if found is None:
+        return met
+    for k in np.flatnonzero(found.is_done & ~met).tolist():
+        points = found.points[found.path_start[k] : found.path_start[k + 1]]
+        met[k] = len(points) and closed.meets(grid.frame.cells_of(points), grid)
+    return met
+
+
+def _are_free(grid: OccupancyGrid, cells: LongArray) -> BoolArray:
+    """Return whether cells (n, 2) lie on the map and are free."""
+    classes = grid.classes
+    inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
+    free = np.zeros(len(cells), dtype=np.bool_)
+    free[inside] = classes[tuple(cells[inside].T)] == CellClass.FREE
+    return free

@@ -1,0 +1,50 @@
+"""The methods of presets: each answers a query on one map, by a structure of its own."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlannerSettings
+    from hybridnav.planner.methods.grid import Site
+    from hybridnav.search.found import Method, Prepared
+    from hybridnav.topology import TopologicalMap
+
+_METHODS = {
+    "shortest": "shortest:OverMesh",
+    "octile": "octile:OverJumps",
+    "cheapest": "cheapest:OverOverlay",
+    "paper": "paper:MaxDistance",
+    "grid-astar": "grid:WholeMap",
+}
+"""Module and class of each method; only that of a preset is loaded."""
+
+
+def make_method(site: Site, settings: PlannerSettings) -> Method:
+    """Make the method that some settings name.
+
+    Raises
+    ------
+    InvalidValueError
+        When these settings do not use structures of the given kind, or the map does not suit.
+    PresetError
+        When the settings name a refiner of the user's own that cannot be used.
+    """
+    settings = settings.underlying
+    if settings.method not in _METHODS:
+        from hybridnav.planner.methods.own_method import own_method  # noqa: PLC0415 - for these alone
+
+        return own_method(site, settings)
+    module, _, name = _METHODS[settings.method].partition(":")
+    made: Method = getattr(import_module(f"{__name__}.{module}"), name)(site, settings)
+    if site.prepared is not None and made.prepared is not site.prepared:
+        raise InvalidValueError(
+            f"method {settings.method} plans on nothing like a {type(site.prepared).__name__}: "
+            "prepared must come from a planner of the same preset"
+        )
+    return made

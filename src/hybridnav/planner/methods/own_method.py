@@ -1,0 +1,97 @@
+"""Methods of the user's own, which a preset names as `module:Class`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.progress import no_progress
+from hybridnav.errors import PresetError, brief
+from hybridnav.planner.methods.grid import round_closed
+from hybridnav.planner.methods.own_refiner import class_of, one_line, refused
+from hybridnav.search.found import Found, Method
+
+if TYPE_CHECKING:
+    from hybridnav._base.progress import Progress
+    from hybridnav.planner import PlannerSettings
+    from hybridnav.planner.methods.grid import Site
+    from hybridnav.refine import GridRefiner
+    from hybridnav.search.found import Prepared, Query
+
+
+def own_method(site: Site, settings: PlannerSettings) -> Method:
+    """Import the class that settings name as their method, and make a method of it.
+
+    The class is called with the grid, the keywords `costs` and `allow_unexplored`, and those of
+    `settings`. It needs `metric` and `find`; the defaults of `Method` stand for what it leaves out.
+
+    Raises
+    ------
+    PresetError
+        When the module cannot be imported, has no such class, or the class makes no method.
+    """
+    own = class_of(settings.method, "planner.method")
+    keywords = {"costs": site.costs, "allow_unexplored": settings.allow_unexplored}
+    try:
+        made = own(site.grid, **keywords, **settings.settings)
+        metric, find = made.metric, made.find
+    except Exception as error:
+        why = f"it makes no method of the map, {one_line(error)}: expected metric and find(query)"
+        raise refused(settings.method, why, "planner.method") from error
+    if metric not in _METRICS or not callable(find):
+        why = f"its metric is {brief(metric)}, expected one of {', '.join(_METRICS)}"
+        raise refused(settings.method, why, "planner.method")
+    return OwnMethod(settings.method, made, site.refiner(settings))
+
+
+_METRICS = ("octile", "weighted", "any-angle")
+"""Metrics in which methods find paths."""
+
+
+class OwnMethod(Method):
+    """A method of the user's own, whose answers are checked before a result shows them."""
+
+    def __init__(self, name: str, own: Any, refiner: GridRefiner) -> None:
+        self._name, self._own, self._refiner = name, own, refiner
+        self.metric = own.metric
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """None: a model keeps no structures of others; see `Method`."""
+        return None
+
+    def prepare(self, progress: Progress = no_progress) -> object:
+        """Prepare the user's method, if it has that ability; see `Method`."""
+        own = getattr(self._own, "prepare", None)
+        if callable(own):
+            own()
+        return super().prepare(progress)
+
+    def find(self, query: Query) -> Found:
+        """Find a path; see `Method`.
+
+        Raises
+        ------
+        PresetError
+            When the answer is no `Found`, or its path does not lead from start to goal.
+        """
+        found = self._own.find(query)
+        if not isinstance(found, Found):
+            raise self._wrong(f"a {type(found).__name__}")
+        if not found.has_path:
+            return found
+        ends = [tuple(cell) for cell in np.asarray(found.cells)[[0, -1]].tolist()]
+        if ends != [tuple(cell) for cell in query.cells]:
+            raise self._wrong(f"a path from {ends[0]} to {ends[1]}")
+        if self.metric != "any-angle":
+            return round_closed(found, query, self._refiner)
+        if query.closed is not None and query.closed.meets(found.cells, self._refiner.grid):
+            raise self._wrong("a path through closed cells")
+        return found
+
+    def _wrong(self, what: str) -> PresetError:
+        return PresetError(
+            f"planner.method: {self._name}: find returned {what}, expected a Found with a path "
+            "from the first cell of the query to the last, or without one"
+        )

@@ -1,0 +1,375 @@
+"""Plans of one map by one method: a query in, a path found, refined, and a result out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps.lines import polyline_length
+from hybridnav.planner import Path, PlanResult, PlanStatus
+from hybridnav.planner.batch import plan_many
+from hybridnav.planner.costs import CostFinish
+from hybridnav.planner.endpoints import cells_of_endpoints, check_at, no_places, read_end, refusal
+from hybridnav.planner.result import PlanDraft
+from hybridnav.refine import LineOfSight
+from hybridnav.route.route_finder import RouteFinder, RouteOfCells
+from hybridnav.search.found import ClosedCells, Query
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner import PlanBatch, Preset
+    from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.costs import PlannerCosts
+    from hybridnav.planner.guide.itinerary import Guide
+    from hybridnav.planner.methods.ompl import OmplPlanner
+    from hybridnav.planner.named import At
+    from hybridnav.search.found import Found, Method
+    from hybridnav.topology import TopologicalMap
+
+Smooth = Literal["none", "line-of-sight", "arcs"]
+
+_KEPT = 16
+"""Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
+
+
+class Request(NamedTuple):
+    """What a caller wants to know, read."""
+
+    poses: tuple[FloatArray, FloatArray]
+    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
+    smooth: Smooth
+    closed: ClosedCells | None
+    goal: ArrayLike | str
+    """The goal as it was given."""
+    began: float
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class Planning:
+    """How a planner plans, by the map and the costs of now.
+
+    It knows no locks: the caller sees to it that costs do not change during a query.
+    """
+
+    preset: Preset
+    grid: OccupancyGrid
+    """The map."""
+    built: TopologicalMap
+    """The places that were built last, of this grid or of one before."""
+    method: Method
+    """Finds paths."""
+    costs: PlannerCosts
+    """The costs that the method plans by."""
+    ompl: OmplPlanner | None = None
+    """Refines the paths in the robot's space; None for those of the method."""
+    closures: dict[object, ClosedCells] = field(default_factory=dict)
+    """The cells of the last closures, by their keys."""
+
+    @property
+    def topology(self) -> TopologicalMap | None:
+        """The places of the map; None if it changed since they were built."""
+        return self.built if self.built.grid is self.grid else None
+
+    # Reading: names to points, closures to cells.
+
+    def read(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        smooth: Smooth | None,
+        blocked: Closable | ClosedCells | None,
+        at: At,
+    ) -> Request:
+        """Read a query; see `HybridPlanner.plan`."""
+        began, waypoint = time.perf_counter(), goal
+        check_at(at)
+        closed = self.closed(blocked)
+        if isinstance(start, str) or isinstance(goal, str):
+            start, goal = self.points_of([start, goal], at, closed)
+        read = partial(read_end, needs_heading=self.needs_headings)
+        poses = read("start", start), read("goal", goal)
+        return Request(poses, self._checked(smooth), closed, waypoint, began)
+
+    @property
+    def needs_headings(self) -> bool:
+        """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
+        return self.ompl is not None and self.ompl.ompl.has_heading
+
+    def points_of(
+        self, waypoints: Sequence[ArrayLike | str], at: At, closed: ClosedCells | None
+    ) -> list[ArrayLike]:
+        """Return a point for each waypoint, so that the path through all of them is cheapest."""
+        check_at(at)
+        if not any(isinstance(waypoint, str) for waypoint in waypoints):
+            return list(waypoints)
+        if self.topology is None:
+            no_places()
+        # Loads modules that plans between points do not need.
+        from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415
+
+        check_names(self.topology, waypoints)
+        return points_of_waypoints(
+            self.topology,
+            self.preset.planner,
+            waypoints,
+            at=at,
+            closed=self.closed_for_all(closed),
+            costs=self.costs.layer,
+        )
+
+    def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
+        """Return the cells of a closure, None for no closure; the last ones are kept."""
+        if blocked is None or isinstance(blocked, ClosedCells):
+            return blocked
+        # Loads shapely, which most queries do not need.
+        from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
+
+        closure, known = as_blocked(blocked), self.closures
+        # Without a lock: two threads may compute the same cells.
+        found = known.pop(closure.key, None)
+        if found is None:
+            found = ClosedCells(closure.cells_on(self.grid, self.topology))
+        known[closure.key] = found  # the last one now
+        for old in list(known)[:-_KEPT]:
+            known.pop(old, None)
+        return found
+
+    def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
+        """Return the closed cells of a query with those that the costs close for all queries."""
+        return closed if self._by_costs is None else self._by_costs.with_closed(closed)
+
+    def _checked(self, smooth: Smooth | None) -> Smooth:
+        """Return the finish asked for, or that of the preset for None."""
+        chosen = self.preset.planner.finish if smooth is None else smooth
+        if chosen not in get_args(Smooth):
+            known = ", ".join(map(repr, get_args(Smooth)))
+            raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
+        if chosen == "arcs" and self._by_costs is None:
+            raise InvalidValueError(
+                "smooth 'arcs' rounds bends of paths by costs, and this planner plans by lengths: "
+                "give it costs, or take 'line-of-sight'"
+            )
+        return chosen
+
+    def query(self, request: Request) -> Query | PlanStatus:
+        """Return the query for the method, or the status that refuses start or goal."""
+        poses, _, closed, *_ = request
+        points, allowed = (poses[0][:2], poses[1][:2]), self.preset.planner.allow_unexplored
+        cells = cells_of_endpoints(self.grid, points, allow_unexplored=allowed)
+        if isinstance(cells, PlanStatus):
+            return cells
+        shut = self.closed_for_all(closed)
+        if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
+            return refused
+        return Query(cells, points, closed)
+
+    # Planning: a path found by the method, then refined.
+
+    def plan(self, request: Request) -> PlanResult:
+        """Plan a path."""
+        query = self.query(request)
+        if isinstance(query, PlanStatus):
+            return self._answer(query, request)
+        return self.result(request, query, self.method.find(query))
+
+    def draft(self, request: Request) -> PlanDraft:
+        """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
+        query = self.query(request)
+        if isinstance(query, PlanStatus):
+            return PlanDraft.of(self._answer(query, request))
+        found = self.method.find(query)
+        made = partial(self.result, request, query, found)
+        if not found.has_path or self.ompl is not None or request.smooth != "none":
+            return PlanDraft.of(made())
+        bound = min(found.lower_bound_m, found.cost_m)
+        return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
+
+    def result(self, request: Request, query: Query, found: Found) -> PlanResult:
+        """Refine a path that was found, and return its result."""
+        metric = self.method.metric
+        if not found.has_path:
+            bound, stats = found.lower_bound_m, found.stats
+            status = PlanStatus.NO_PATH
+            return self._answer(status, request, metric=metric, lower_bound=bound, stats=stats)
+        if self.ompl is not None:
+            result = self._by_ompl(self.ompl, request, query, found)
+        elif self._by_costs is not None:
+            result = self._cheapest(self._by_costs, request, query, found)
+        elif metric == "octile" and request.smooth == "line-of-sight":
+            result = self._in_sight(request, query, found)
+        else:
+            points, length_m = found.points, found.cost_m
+            if points is None:
+                points = self.grid.frame.points_of(found.cells)
+            if metric != "octile" and not length_m > 0:
+                points = points[:1]
+            path = Path(found.cells, points, length_m)
+            result = self._solved(request, found, path, found.lower_bound_m, metric=metric)
+        if result.path is None or not result.solved or self.guide is None:
+            return result
+        source = self.guide.of(result.path, request.goal, request.poses[0].tolist())
+        return replace(result, instruction_source=source)
+
+    def _in_sight(self, request: Request, query: Query, found: Found) -> PlanResult:
+        """Return the result of a path of cells that is shortened by line of sight."""
+        began, sight, closed = time.perf_counter(), self._sight, request.closed
+        if closed is not None:  # one for this query
+            allowed = self.preset.planner.allow_unexplored
+            sight = LineOfSight(self.grid, allow_unexplored=allowed, closed=closed.flat)
+        points = sight.shorten(found.cells, *query.points)
+        found.stats.seconds["smooth"] = time.perf_counter() - began
+        length_m = polyline_length(points)
+        path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
+        return self._solved(request, found, path, query.straight_m, metric="any-angle")
+
+    @cached_property
+    def _sight(self) -> LineOfSight:
+        return LineOfSight(self.grid, allow_unexplored=self.preset.planner.allow_unexplored)
+
+    @cached_property
+    def _by_costs(self) -> CostFinish | None:
+        """The last step of plans by costs; None for plans by lengths."""
+        layer = self.costs.layer
+        return None if layer is None else CostFinish(self.grid, layer, self.preset.planner)
+
+    def _cheapest(
+        self, costs: CostFinish, request: Request, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a cheapest path of cells."""
+        solved = partial(self._solved, request, found)
+        if request.smooth == "none":
+            points = self.grid.frame.points_of(found.cells)
+            length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
+            path, cost_m = Path(found.cells, points, length_m), found.cost_m
+            return solved(path, found.lower_bound_m, metric="weighted", weighted_cost=cost_m)
+        began = time.perf_counter()
+        finish = costs.arcs if request.smooth == "arcs" else costs.line
+        path, cost_m = finish(found.cells, request.poses, request.closed)
+        found.stats.seconds["smooth"] = time.perf_counter() - began
+        bound, of_cells = query.straight_m, found.lower_bound_m
+        metric: Any = "any-angle-weighted"
+        return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
+
+    def _by_ompl(
+        self, ompl: OmplPlanner, request: Request, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a path refined by OMPL, with the bound of the method too."""
+        now, closed = time.perf_counter(), request.closed
+        first, last = (
+            pose if len(pose) > 2 else np.append(pose, 0.0)  # noqa: PLR2004
+            for pose in request.poses
+        )
+        flat = None if closed is None else closed.flat
+        refined = ompl.plan(found.cells, (first, last), flat, spent_s=now - request.began)
+        found.stats.seconds["ompl"] = time.perf_counter() - now
+        is_any_angle = self.method.metric == "any-angle"
+        own = found.lower_bound_m if is_any_angle else query.straight_m
+        bound, path = max(refined.lower_bound, own), refined.path
+        if path is not None and refined.status is PlanStatus.SOLVED:
+            bound = min(bound, refined.weighted_cost or path.length_m)
+            path = path if path.headings_rad is not None else path.turned_at_ends(*request.poses)
+        return self._answer(
+            refined.status,
+            request,
+            metric=refined.metric,
+            path=path,
+            route_source=self._route_of(path),
+            lower_bound=bound,
+            weighted_cost=refined.weighted_cost,
+            refinement=refined.refinement,
+            stats=found.stats,
+        )
+
+    # Results: with their routes, and the settings that they were planned by.
+
+    def _solved(
+        self, request: Request, found: Found, path: Path, bound_m: float, **outcome: Any
+    ) -> PlanResult:
+        """Return the result of a path, whose bound is at most its cost."""
+        cost_m = outcome.get("weighted_cost", path.length_m)
+        return self._answer(
+            PlanStatus.SOLVED,
+            request,
+            path=path.turned_at_ends(*request.poses),
+            route_source=found.route or self._route_of(path),
+            lower_bound=min(bound_m, cost_m),
+            stats=found.stats,
+            **outcome,
+        )
+
+    def _answer(self, status: PlanStatus, request: Request, **outcome: Any) -> PlanResult:
+        """Return a result that records endpoints, preset and settings of the pyramid."""
+        # Each result has its own settings, so that a change of one does not affect the next.
+        settings = {
+            key: dict(value) if isinstance(value, dict) else value
+            for key, value in self._settings.items()
+        }
+        start, goal = (tuple(pose.tolist()) for pose in request.poses)
+        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
+
+    def _route_of(self, path: Path | None) -> RouteOfCells | None:
+        """Return what the route of a path is found from, None for no path or no places."""
+        if path is None or self._route_finder is None:
+            return None
+        return RouteOfCells(self.built, self._route_finder, path.cells)
+
+    @cached_property
+    def _route_finder(self) -> RouteFinder | None:
+        return None if self.topology is None else RouteFinder(self.topology)
+
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        pyramid, layer = self.built.pyramid, self.costs.layer
+        costs = {} if layer is None else {"costs": layer.source}
+        return {
+            "preset": self.preset.name,
+            "planner": self.preset.planner.model_dump(),
+            "pyramid": {
+                "merge_distance_m": pyramid.merge_distance_m,
+                "linkage": pyramid.linkage,
+                "seed": pyramid.seed,
+                "robot_radius_m": self.grid.robot_radius_m,
+            },
+            **costs,
+        }
+
+    @cached_property
+    def guide(self) -> Guide | None:
+        """The source of descriptions for a person; None on a map without rooms."""
+        if self.topology is None or self.topology.pyramid.rooms is None:
+            return None
+        # Loads modules that plans without rooms do not need.
+        from hybridnav.planner.guide.itinerary import Guide  # noqa: PLC0415
+
+        return Guide(self.topology.rooms)
+
+    # Many queries at once: those that look-ups answer in one kernel, the others one by one.
+
+    def plan_many(
+        self,
+        pairs: tuple[FloatArray, FloatArray],
+        smooth: Smooth | None,
+        blocked: Closable | ClosedCells | None,
+    ) -> PlanBatch:
+        """Plan paths between many pairs of points; see `HybridPlanner.plan_many`."""
+        finish, closed, method = self._checked(smooth), self.closed(blocked), self.method
+        is_kept = finish == "none" or method.metric == "any-angle"
+        at_once = method if self.ompl is None and is_kept else None
+
+        def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
+            return self.plan(self.read(start, goal, finish, closed, "anywhere"))
+
+        return plan_many(self.grid, at_once, pairs, closed, alone)

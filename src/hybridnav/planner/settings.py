@@ -1,0 +1,392 @@
+"""The sections of a preset: of the pyramid, and of the planner by each method."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
+from hybridnav.refine.ompl.settings import OmplSettings
+
+_OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
+
+def _no_boolean(value: Any) -> Any:
+    """Refuse a YAML `yes` or `on` where a number belongs; Python would call it 1."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("number_type", "input should be a number")
+    return value
+
+
+def _class_name(refine: str) -> str:
+    """Refuse what is neither the grid search nor written like the name of a class."""
+    if refine == "grid-astar" or _OWN.fullmatch(refine):
+        return refine
+    raise PydanticCustomError(
+        "refiner", "input should be 'grid-astar' or a class of your own, module:Class"
+    )
+
+
+_Float = Annotated[float, BeforeValidator(_no_boolean)]
+_Int = Annotated[int, BeforeValidator(_no_boolean)]
+
+
+class Section(BaseModel):
+    """Keys that are checked, and do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=True)
+
+
+class PyramidSettings(Section):
+    """Section `pyramid`: how the map is inflated and contracted.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import PyramidSettings
+    >>> PyramidSettings(merge_distance_m=2.0).linkage
+    'radius'
+    """
+
+    merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
+    """U_d in metres, infinity (.inf) allowed."""
+    linkage: Literal["survivor", "radius", "diameter"] = "radius"
+    """What stays below U_d."""
+    seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
+    """Breaks ties."""
+    robot_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = DEFAULT_ROBOT_RADIUS_M
+    """Radius by which occupied cells are inflated, in metres."""
+
+
+class ClearanceSettings(Section):
+    """Section `planner.costs.clearance`: factors by Nav2's inflation, see `CostLayer.clearance`.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import ClearanceSettings
+    >>> ClearanceSettings(multiplier=3.0).scaling
+    3.0
+    """
+
+    inflation_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 0.70
+    """Distance from obstacles up to which cells cost more, in metres."""
+    scaling: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 3.0
+    """How quickly costs fall off, 1 / m: `cost_scaling_factor`."""
+    inscribed_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] | None = None
+    """Distance from which they fall off, in metres; null for the radius of the robot."""
+    multiplier: Annotated[_Float, Field(ge=0, le=991)] = 2.0
+    """Factor above 1 of a cell at the inscribed radius."""
+
+
+class CostSettings(Section):
+    """Section `planner.costs`: what makes a metre in a cell cost more than a metre.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import CostSettings
+    >>> print(CostSettings().clearance)
+    None
+    """
+
+    clearance: ClearanceSettings | None = None
+    """Distance from obstacles; null for no such costs."""
+
+
+Finish = Literal["none", "line-of-sight", "arcs"]
+
+
+class PlannerSettings(Section):
+    """Section `planner`: the method, and what each method has; the keys of one are its class."""
+
+    allow_unexplored: bool = False
+    """Whether unexplored cells may be entered."""
+
+    needs_places: ClassVar[bool] = False
+    """Whether the method plans on the places of the map, and not on its cells alone."""
+
+    @property
+    def finish(self) -> Finish:
+        """What is done with the path that the method finds."""
+        return "none"
+
+    @property
+    def own_refiner(self) -> str | None:
+        """The class `module:Class` that refines in place of the grid search; None for none."""
+        return None
+
+    @property
+    def clearance(self) -> ClearanceSettings | None:
+        """Costs that are computed from the map; None for none."""
+        return None
+
+    @property
+    def sampling(self) -> OmplSettings | None:
+        """How OMPL searches; None without it."""
+        return None
+
+    @property
+    def underlying(self) -> PlannerSettings:
+        """The section of the method that finds paths of cells or points: its own, or that along
+        whose paths OMPL goes."""
+        return self
+
+    def refusal_of_costs(self) -> str | None:
+        """Return why these settings cannot plan by costs, None if they can."""
+        return f"method {self.method} knows lengths only; {_WITH_COSTS}"
+
+    if TYPE_CHECKING:  # which keys there are depends on the method
+
+        def __getattr__(self, name: str) -> Any: ...
+
+
+_WITH_COSTS = (
+    "costs go with method cheapest, as in preset robot, with grid-astar and with paper, without a "
+    "refiner of your own"
+)
+
+
+class ShortestSettings(PlannerSettings):
+    """Method `shortest`: the shortest any-angle path, on convex polygons of free space."""
+
+    method: Literal["shortest"] = "shortest"
+    epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
+    """The search ends once no path can be better by more than this part; null or 0 for the
+    optimum."""
+    budget_s: Annotated[_Float, Field(ge=0)] | None = None
+    """Seconds after which a query returns the best path so far, with its proved bound; null for no
+    limit. Until the planner is prepared, such queries shorten a path of cells by line of sight."""
+
+
+class OctileSettings(PlannerSettings):
+    """Method `octile`: the shortest path of cells, on the corner cells at which such paths turn."""
+
+    method: Literal["octile"] = "octile"
+    smooth: Literal["none", "line-of-sight"] = "none"
+    """Whether the path is shortened to an any-angle one."""
+
+    @property
+    def finish(self) -> Finish:
+        """What is done with the path of cells."""
+        return self.smooth
+
+
+class _ByCosts(PlannerSettings):
+    smooth: Finish = "none"
+    """Whether the path is shortened to an any-angle one; `arcs`, which goes with costs, also rounds
+    its bends."""
+    turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
+    """With `smooth: arcs`, the least radius of an arc in metres; where none fits, the robot turns
+    on the spot."""
+    costs: CostSettings | None = None
+    """Factors by which metres cost more; the path is the cheapest one. null makes costs lengths."""
+
+    @property
+    def finish(self) -> Finish:
+        """What is done with the path of cells."""
+        return self.smooth
+
+    @property
+    def clearance(self) -> ClearanceSettings | None:
+        """Costs that are computed from the map; None for none."""
+        return None if self.costs is None else self.costs.clearance
+
+    def refusal_of_costs(self) -> str | None:
+        """Return why these settings cannot plan by costs, None if they can."""
+        own = self.own_refiner
+        return None if own is None else f"refine: {own} knows lengths only; {_WITH_COSTS}"
+
+    @model_validator(mode="after")
+    def _go_together(self) -> Self:
+        wants_costs = self.clearance is not None or self.smooth == "arcs"
+        if wants_costs and (why := self.refusal_of_costs()):
+            raise PydanticCustomError("costs_refused", "{why}", {"why": why})
+        return self
+
+
+class CheapestSettings(_ByCosts):
+    """Method `cheapest`: the cheapest path of cells, on exact costs between the border cells of
+    fields on several levels of the pyramid."""
+
+    method: Literal["cheapest"] = "cheapest"
+    epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
+    """The search ends once no path can be better by more than this part; null or 0 for the
+    optimum."""
+
+    needs_places: ClassVar[bool] = True
+
+
+class _Refined(_ByCosts):
+    refine: Annotated[str, AfterValidator(_class_name)] = "grid-astar"
+    """Search for the path: `grid-astar`, cell by cell, or a refiner of your own, `module:Class`,
+    which is imported when a planner is made."""
+
+    @property
+    def own_refiner(self) -> str | None:
+        """The class `module:Class` that refines in place of the grid search; None for none."""
+        return self.refine if ":" in self.refine else None
+
+
+class GridSettings(_Refined):
+    """Method `grid-astar`: the cells of the whole map."""
+
+    method: Literal["grid-astar"] = "grid-astar"
+
+
+class PaperSettings(_Refined):
+    """Method `paper`: the places, by the max-distance attribute of their arcs, choose the route;
+    a search of cells refines inside it."""
+
+    method: Literal["paper"] = "paper"
+    corridor: Literal["route", "neighbours"] = "route"
+    """Fields in which the refiner searches: those of the route, or also their neighbours."""
+
+    needs_places: ClassVar[bool] = True
+
+
+class OmplPlannerSettings(PlannerSettings):
+    """Method `ompl`: a sampling-based planner of OMPL, along the path of another method."""
+
+    method: Literal["ompl"] = "ompl"
+    along: Literal["shortest", "paper", "grid-astar"] = "shortest"
+    """Method whose path chooses the fields in which OMPL begins; with `grid-astar` it begins on the
+    whole map."""
+    corridor: Literal["route", "neighbours"] = "route"
+    """Fields in which OMPL begins: those of the path, or also their neighbours."""
+    ompl: OmplSettings = OmplSettings()
+    """Which planner of OMPL, in which space, for how long."""
+
+    @property
+    def sampling(self) -> OmplSettings:
+        """How OMPL searches."""
+        return self.ompl
+
+    @property
+    def underlying(self) -> PlannerSettings:
+        """The section of the method along whose paths OMPL goes."""
+        allowed = self.allow_unexplored
+        if self.along == "paper":
+            return PaperSettings(allow_unexplored=allowed, corridor=self.corridor)
+        kind = ShortestSettings if self.along == "shortest" else GridSettings
+        return kind(allow_unexplored=allowed)
+
+
+def _own_method(method: str) -> str:
+    """Refuse what is not written like the name of a class."""
+    if not _OWN.fullmatch(method):
+        raise PydanticCustomError("own", "input should be a class of your own, module:Class")
+    return method
+
+
+class OwnSettings(PlannerSettings):
+    """A method of your own, `module:Class`, which is imported when a planner is made."""
+
+    method: Annotated[str, AfterValidator(_own_method)]
+    settings: dict[str, Any] = {}
+    """Keyword arguments of the class."""
+
+
+SECTIONS: dict[str, type[PlannerSettings]] = {
+    "shortest": ShortestSettings,
+    "octile": OctileSettings,
+    "cheapest": CheapestSettings,
+    "grid-astar": GridSettings,
+    "paper": PaperSettings,
+    "ompl": OmplPlannerSettings,
+    "own": OwnSettings,
+}
+"""The class of each method's section, by its tag."""
+METHODS = tuple(name for name in SECTIONS if name != "own")
+"""Names of the methods of the package."""
+_OLD_METHODS = {
+    "max-distance": "paper",
+    "mesh": "shortest",
+    "jumps": "octile",
+    "overlay": "cheapest",
+    "none": "grid-astar",
+}
+"""Values of `coarse` in files of earlier versions, and the methods that they are now."""
+_OLD_DEFAULTS = {
+    "corridor": "route",
+    "ompl": None,
+    "epsilon": None,
+    "budget_s": None,
+    "smooth": "none",
+    "turning_radius_m": 0.3,
+    "costs": None,
+}
+"""What keys of such files may say where the method has no such key."""
+
+
+def method_of(given: Any) -> str:
+    """Return the tag of a section."""
+    if isinstance(given, dict):
+        method = given.get("method", "paper")
+    else:
+        method = getattr(given, "method", "")
+    if not isinstance(method, str):
+        return ""
+    return "own" if ":" in method else method
+
+
+def _translated(given: Any) -> Any:
+    """Return the section of an earlier version, with keys `coarse` and `refine`, as one of today;
+    others as they are."""
+    if not isinstance(given, dict):
+        return given
+    section, now = dict(given), given.get("method", "paper")
+    refine = "ompl" if now == "ompl" else given.get("refine")
+    if "coarse" not in given and (now == "ompl" or refine not in ("none", "ompl")):
+        return given
+    unstated = next((old for old, new in _OLD_METHODS.items() if new == now), "max-distance")
+    coarse = section.pop("coarse", unstated)
+    if coarse == "portals":  # which are gone: what plans the same or better paths
+        by_costs = given.get("costs") or given.get("smooth") == "arcs"
+        coarse = "mesh" if refine == "ompl" else "overlay" if by_costs else "jumps"
+        if coarse == "jumps":  # which need no epsilon: their paths are the shortest
+            section.pop("epsilon", None)
+    if not isinstance(coarse, str) or coarse not in _OLD_METHODS:
+        known = ", ".join(METHODS)
+        raise PydanticCustomError(
+            "gone", "coarse is gone: write method, one of {of}", {"of": known}
+        )
+    method = _OLD_METHODS[coarse]
+    if refine == "ompl":
+        section["along"] = method if method in {"shortest", "paper"} else "grid-astar"
+        method = "ompl"
+    section["method"], keys = method, SECTIONS[method].model_fields
+    if "refine" in section and ("refine" not in keys or refine == "none"):
+        del section["refine"]
+    if section.get("ompl", section) is None:
+        del section["ompl"]
+    idle = [key for key, one in _OLD_DEFAULTS.items() if section.get(key, _OLD_DEFAULTS) == one]
+    section = {key: one for key, one in section.items() if key in keys or key not in idle}
+    text = f"planner.coarse and planner.refine are gone: write planner.method: {method}"
+    if given.get("coarse") == "portals":
+        text = f"portals are gone, method: {method} plans instead: write that"
+    warnings.warn(text, FutureWarning, stacklevel=2)
+    return section
+
+
+AnyMethod = Annotated[
+    Annotated[ShortestSettings, Tag("shortest")]
+    | Annotated[OctileSettings, Tag("octile")]
+    | Annotated[CheapestSettings, Tag("cheapest")]
+    | Annotated[GridSettings, Tag("grid-astar")]
+    | Annotated[PaperSettings, Tag("paper")]
+    | Annotated[OmplPlannerSettings, Tag("ompl")]
+    | Annotated[OwnSettings, Tag("own")],
+    Discriminator(method_of),
+    BeforeValidator(_translated),
+]

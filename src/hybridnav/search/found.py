@@ -1,0 +1,224 @@
+"""One query in, one value out: what every search method is asked, and what it answers.
+
+All lengths, costs and bounds are in metres, so that nobody has to know how a method counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from hybridnav._base.progress import no_progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.areas import Box
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.route import Route
+    from hybridnav.search.mesh import MeshSearch
+    from hybridnav.search.octile import JumpSearch
+    from hybridnav.topology import TopologicalMap
+
+    Prepared = MeshSearch | JumpSearch
+    """Structures of a map that methods build, and models keep."""
+
+Cell = tuple[int, int]
+Metric = Literal[
+    "octile",
+    "weighted",
+    "any-angle",
+    "any-angle-weighted",
+    "clearance-weighted",
+    "dubins",
+    "reeds-shepp",
+]
+"""What a path is judged by: the kind of its length, or of its cost."""
+
+
+@dataclass(frozen=True)
+class PlanStats:
+    """Effort of a query."""
+
+    expanded: int = 0
+    """Number of cells that the refiner expanded."""
+    expanded_places: int = 0
+    """Number of places that the coarse search expanded."""
+    expanded_border_cells: int = 0
+    """Number of border cells that the search on the overlay expanded."""
+    expanded_intervals: int = 0
+    """Number of intervals that the search on the mesh expanded."""
+    corridor_cells: int = 0
+    """Number of cells in the corridor; 0 for the whole map."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall-clock seconds per stage."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedCells:
+    """The closed cells of one map, computed once for several queries."""
+
+    flat: LongArray
+    """int64 (n,), flat cells, sorted, each once."""
+
+    def holds(self, flat: LongArray) -> BoolArray:
+        """Return which of some flat cells are closed."""
+        if not len(self.flat):
+            return np.zeros(len(flat), dtype=np.bool_)
+        at = np.minimum(np.searchsorted(self.flat, flat), len(self.flat) - 1)
+        found: BoolArray = self.flat[at] == flat
+        return found
+
+    def meets(self, cells: LongArray, grid: OccupancyGrid) -> bool:
+        """Return whether a path stands on a closed cell, or illegally passes one on a diagonal.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), legal moves.
+        grid
+            The map; if its corners may be cut, diagonals need no side cells.
+        """
+        cols = grid.shape[1]
+        flat = cells[:, 0] * cols + cells[:, 1]
+        if not grid.corner_cutting:
+            side_cells = cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]
+            flat = np.concatenate([flat, *side_cells])
+        return bool(self.holds(flat).any())
+
+
+class Query(NamedTuple):
+    """One query: two cells that may be entered, points in them, and what is closed for it."""
+
+    cells: tuple[Cell, Cell]
+    points: tuple[FloatArray, FloatArray]
+    """float64 (2,) each, start and goal, `(x, y)` in metres, map frame."""
+    closed: ClosedCells | None = None
+    """Closed cells, not including start and goal; None for none."""
+
+    @property
+    def straight_m(self) -> float:
+        """Distance of the points, a bound on the length of every path."""
+        return math.dist(*self.points)
+
+
+class QueryMany(NamedTuple):
+    """Many queries with the same closures, arrays of n."""
+
+    cells: tuple[LongArray, LongArray]
+    """int64 (n, 2) each, the cells of the starts, and of the goals; they may be entered."""
+    points: tuple[FloatArray, FloatArray]
+    """float64 (n, 2) each, starts and goals, `(x, y)` in metres, map frame."""
+    closed: ClosedCells | None = None
+    """Closed cells; a start or a goal may be one. None for none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The answer to one query: a path with its cost and bound, or the proof that there is none."""
+
+    passed: LongArray | Callable[[], LongArray] | None
+    """The cells of the path, or how to find them; None without a path."""
+    cost_m: float = math.inf
+    """Length or cost in the metric of the method; infinite without a path."""
+    lower_bound_m: float = math.inf
+    """Proved bound on the cost of all paths; infinite where it is proved that there is none."""
+    points: FloatArray | None = None
+    """float64 (m, 2), centres of the cells if known already, or where an any-angle path turns."""
+    route: Route | None = None
+    """The route that was chosen before the path; None to derive it from the path."""
+    stats: PlanStats = field(default_factory=PlanStats)
+
+    @property
+    def has_path(self) -> bool:
+        """Whether there is a path."""
+        return self.passed is not None
+
+    @cached_property
+    def cells(self) -> LongArray:
+        """int64 (n, 2), legal moves from start to goal; only of an answer with a path."""
+        assert self.passed is not None  # noqa: S101 - the caller has looked
+        return self.passed() if callable(self.passed) else self.passed
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMany:
+    """Answers to many queries, arrays of n."""
+
+    is_done: BoolArray
+    """bool (n,), whether the answer is that of `find`; False if `find` must still be called."""
+    cost_m: FloatArray
+    """float64 (n,), infinite if there is no path."""
+    lower_bound_m: FloatArray
+    path_start: LongArray
+    """int64 (n + 1,), offsets of the points of each path."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame."""
+
+
+class Change(NamedTuple):
+    """A map after its cells changed."""
+
+    grid: OccupancyGrid
+    topology: TopologicalMap | None
+    """Its places; None if they are not built."""
+    costs: CostLayer | None
+    """Its costs; None for lengths."""
+    cells: LongArray
+    """int64 (m, 2), (row, col) of the cells whose class is another one than before."""
+
+
+class Method(Protocol):
+    """A search for paths on one map. A class that derives from it need only write `find`."""
+
+    metric: Metric
+    """The metric of all its paths, `octile`, `weighted` or `any-angle`."""
+
+    def find(self, query: Query) -> Found:
+        """Find a path of the quality that the preset requires, which meets no closed cell."""
+        ...
+
+    def find_many(self, queries: QueryMany) -> FoundMany | None:  # noqa: ARG002 - a default
+        """Find paths for many queries at once; None where `find` must be called for each.
+
+        A path between cells may meet a closed cell: the caller looks.
+        """
+        return None
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """The structure for queries that is worth keeping; None until it is built, and without."""
+        return None
+
+    def prepare(self, progress: Progress = no_progress) -> object:
+        """Build the structures for queries, once, and report each step; else the first query does
+        it."""
+        progress(1, 1)
+        return None
+
+    def changed(self, change: Change) -> Method | None:  # noqa: ARG002 - a default
+        """Return the method of a changed map, this one stays as it is; None to make it anew."""
+        return None
+
+    def catch_up(self) -> None:
+        """Bring structures that `changed` took over up to date; no query runs meanwhile."""
+        return
+
+    def take_costs(self, costs: CostLayer, box: Box) -> bool:  # noqa: ARG002 - a default
+        """Plan by other costs from now on; no query runs meanwhile. False to be made anew.
+
+        Parameters
+        ----------
+        costs
+            The new costs of all cells.
+        box
+            First row, last row + 1, first column, last column + 1 of the cells that differ.
+        """
+        return False

@@ -1,0 +1,87 @@
+"""Search methods, of which presets can be made too, as methods of the harness."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from hybridnav.harness.output import write_outputs
+from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.search.found import Found
+from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
+from tests.planner.test_own_method import ByCells
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hybridnav.search.found import Query
+
+
+class Boastful(ByCells):
+    """Proves that its detours are shortest."""
+
+    def find(self, query: Query) -> Found:
+        """Go to and fro first."""
+        found: Found = super().find(query)
+        if not found.has_path:
+            return found
+        cells = found.cells
+        there = np.concatenate([cells[:2], cells]) if len(cells) > 1 else cells
+        return Found(there, 1.0, 1.0)
+
+
+class AtAnyAngle(ByCells):
+    """Claims to plan at any angle, along the cells."""
+
+    metric = "any-angle"
+
+    def find(self, query: Query) -> Found:
+        """Return the points of the cells."""
+        found: Found = super().find(query)
+        if not found.has_path:
+            return found
+        points = self.frame.points_of(found.cells)
+        points = points if found.cost_m > 0 else points[:1]
+        return Found(found.cells, found.cost_m, query.straight_m, points)
+
+
+class Unsure(ByCells):
+    """Finds nothing, and proves nothing."""
+
+    def find(self, query: Query) -> Found:
+        """Return no path and no proof."""
+        return Found(None, lower_bound_m=query.straight_m)
+
+
+@pytest.mark.parametrize(
+    ("method", "is_faulty", "share"),
+    [(ByCells, False, 1), (Boastful, True, 1), (AtAnyAngle, False, 1), (Unsure, False, 0)],
+)
+def test_a_search_method_is_asked_and_judged_like_any_other(
+    method: type[ByCells],
+    is_faulty: bool,  # noqa: FBT001
+    share: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+    monkeypatch.setitem(sys.modules, "mine", sys.modules[__name__])
+    settings = RunSettings(
+        maps=(str(write_map(tmp_path, ROOMS)),),
+        presets=(),
+        baselines=(name_of(method),),
+        pairs=6,
+        robot_radius_m=0.0,
+    )
+    evaluate(settings, tmp_path / "run")
+    study = write_outputs(tmp_path / "run")
+    (outcome,) = study.of_method(method.__name__)
+    assert outcome.checks == (7 if share else 0)
+    assert bool(outcome.faults) == is_faulty
+    assert np.isfinite(outcome.lengths_m).any() == (share > 0)
+    if method is Unsure:
+        statuses = {record["status"] for record in outcome.records}
+        assert statuses == {"no path, and no proof of none"}
