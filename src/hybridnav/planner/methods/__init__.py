@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlannerSettings
     from hybridnav.planner.methods.grid import Site
-    from hybridnav.search.found import Method, Prepared
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.search.found import Method
 
 _METHODS = {
     "shortest": "shortest:OverMesh",
