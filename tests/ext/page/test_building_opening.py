@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 import hybridnav as hn
-from hybridnav.ext.page import BuildingOpening, BuildingSession, serve
-from hybridnav.ext.page.command import building_opening
+from hybridnav.ext.page import Opening, Site, serve
 from tests.ext.page.browser import WINDOW, browsing
-from tests.ext.page.server import building_session_of, folder_in, served, write_building
+from tests.ext.page.server import building_page, building_site_of, folder_in, served, write_building
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,17 +30,17 @@ class _Held:
         self.go_on = threading.Event()
         self.file = file
         grid = hn.load(file.parent / "four.yaml", robot_radius_m=0.2).grid
-        self.opening = BuildingOpening("building", ["ground", "2: upper"], grid, self._make)
+        self.opening = Opening(grid, self._make, name="building", floors=["ground", "2: upper"])
 
-    def _make(self, tell: Callable[[str], None]) -> BuildingSession:
+    def _make(self, tell: Callable[[str], None]) -> Site:
         tell("reading 2 floors")
         assert self.go_on.wait(60)
-        return building_session_of(self.file)
+        return building_site_of(self.file)
 
 
 def test_cells_of_the_lowest_floor_are_there_first(folder: Path) -> None:
     held = _Held(write_building(folder))
-    whole = building_session_of(held.file)
+    whole = building_site_of(held.file)
     with served(held.opening, folder) as client:
         held.opening.begin()
         found = client.get("map.json").value
@@ -49,7 +48,7 @@ def test_cells_of_the_lowest_floor_are_there_first(folder: Path) -> None:
         assert client.get("floor/0/map.json").value["ready"] is False
         tile = client.get("floor/0/tile/map/0/0/0.png")
         assert tile.body == whole.sessions[0].layer("map").png(0, 0, 0, "light")
-        assert client.get("floor/0/state.json").value["stage"] == "reading 2 floors"
+        assert client.get("state.json").value["stage"] == "reading 2 floors"
         assert client.get("floor/1/map.json").code == 503
         assert client.get("floor/7/map.json").code == 503
         for name in ("plan", "optimum", "alternatives", "export/model", "floor/0/save"):
@@ -59,7 +58,7 @@ def test_cells_of_the_lowest_floor_are_there_first(folder: Path) -> None:
         held.opening.wait()
         assert client.get("map.json").value == whole.describe()
         assert client.get("floor/1/map.json").value == whole.sessions[1].describe()
-        assert client.get("floor/0/state.json").value["stage"] == ""
+        assert client.get("state.json").value["stage"] == ""
         assert client.get("floor/7/map.json").code == 422
         plan = client.post("plan", QUERY).value
         assert plan["solved"]
@@ -69,8 +68,7 @@ def test_cells_of_the_lowest_floor_are_there_first(folder: Path) -> None:
 def test_what_is_wrong_with_a_building_ends_the_server(folder: Path) -> None:
     file = write_building(folder)
     file.write_text(file.read_text("utf-8").replace("room: e}", "room: nowhere}"), "utf-8")
-    given = {"map_file": file, "preset": None, "overrides": None}
-    opening = building_opening(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+    opening = building_page(file).opening()
     with pytest.raises(hn.MapError, match="nowhere"):
         serve(opening, folder)
 
@@ -78,17 +76,15 @@ def test_what_is_wrong_with_a_building_ends_the_server(folder: Path) -> None:
 def test_a_wrong_lowest_floor_is_refused_before_the_page_opens(folder: Path) -> None:
     file = write_building(folder)
     (folder / "four.yaml").unlink()
-    given = {"map_file": file, "preset": None, "overrides": None}
     with pytest.raises(hn.MapError, match=r"floor ground.*four\.yaml"):
-        building_opening(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+        building_page(file).opening()
 
 
 def test_a_model_has_all_its_floors_at_once(folder: Path, tmp_path: Path) -> None:
     model = tmp_path / "building.hnm"
     hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
-    given = {"map_file": model, "preset": None, "overrides": None}
-    shown = building_opening(given | {"robot_radius_m": None, "max_cells": 10**6})
-    assert isinstance(shown, BuildingSession)
+    shown = building_page(model, robot_radius_m=None).opening()
+    assert isinstance(shown, Site)
 
 
 @pytest.mark.full

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.ext.page.server import TOKEN, building_session_of, folder_in, served, write_building
+from tests.ext.page.server import TOKEN, building_site_of, folder_in, served, write_building
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +22,7 @@ QUERY: dict[str, Any] = {"start": START, "goal": GOAL, "preset": "shortest"}
 def building(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
     """One server for all hostile requests: none may change any file."""
     folder = folder_in(tmp_path_factory.mktemp("hostile"))
-    session = building_session_of(write_building(folder))
+    session = building_site_of(write_building(folder))
 
     def files() -> dict[str, bytes]:
         return {str(f): f.read_bytes() for f in folder.parent.rglob("*") if f.is_file()}

@@ -10,17 +10,17 @@ import pytest
 import hybridnav as hn
 from hybridnav.ext.page import Opening, serve
 from tests.ext.page.browser import WINDOW, browsing
-from tests.ext.page.server import folder_in, served, session_of
+from tests.ext.page.server import folder_in, query_of, served, session_of, site_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav.ext.page import Session
+    from hybridnav.ext.page import Site
 
 
 class _Held:
-    """A session that is made when the test lets it."""
+    """A site that is made when the test lets it."""
 
     def __init__(self, file: Path) -> None:
         self.go_on = threading.Event()
@@ -28,10 +28,10 @@ class _Held:
         grid = hn.load(file, robot_radius_m=0.2).grid
         self.opening = Opening(grid, self._make)
 
-    def _make(self, tell: Callable[[str], None]) -> Session:
+    def _make(self, tell: Callable[[str], None]) -> Site:
         tell("finding rooms")
         assert self.go_on.wait(60)
-        return session_of(self.file)
+        return site_of(self.file)
 
 
 def test_cells_are_there_before_rooms(folder: Path) -> None:
@@ -39,34 +39,35 @@ def test_cells_are_there_before_rooms(folder: Path) -> None:
     whole = session_of(folder / "four.yaml")
     with served(held.opening, folder) as client:
         held.opening.begin()
-        found = client.get("map.json").value
+        assert client.get("map.json").value["floors"] == [""]
+        found = client.get("floor/0/map.json").value
         assert (found["ready"], found["rooms"]["rooms"], found["levels"]) == (False, [], [])
         assert {found["rows"], found["cols"]} == set(whole.grid.shape)
-        tile = client.get("tile/map/0/0/0.png?theme=dark")
+        tile = client.get("floor/0/tile/map/0/0/0.png?theme=dark")
         assert tile.body == whole.layer("map").png(0, 0, 0, "dark")
         assert client.get("state.json").value["stage"] == "finding rooms"
-        query = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+        query = query_of([10.5, 40.5], [70.5, 10.5])
         change = {"op": "rename", "room": "a", "name": "x"}
         for name, value in (
             ("plan", query),
-            ("export/rooms", None),
-            ("edit", {"version": 0, "change": change}),
-            ("save", {"version": 0}),
+            ("floor/0/export/rooms", None),
+            ("floor/0/edit", {"version": 0, "change": change}),
+            ("floor/0/save", {"version": 0}),
         ):
             refused = client.post(name, value)
             assert (refused.code, refused.value["error"]) == (503, "not yet: finding rooms")
         for name in ("rooms.json", "outlines.json", "graph/0.json", "tile/rooms/0/0/0.png"):
-            assert client.get(name).code == 503
-        assert client.get("tile/map/9/0/0.png").code == 422
+            assert client.get(f"floor/0/{name}").code == 503
+        assert client.get("floor/0/tile/map/9/0/0.png").code == 422
         held.go_on.set()
         held.opening.wait()
         assert client.get("state.json").value["stage"] == ""
-        assert client.get("map.json").value == whole.describe()
+        assert client.get("floor/0/map.json").value == whole.describe()
         assert client.post("plan", query).value["solved"]
 
 
 def test_what_cannot_be_prepared_ends_the_server(folder: Path) -> None:
-    def make(_: Callable[[str], None]) -> Session:
+    def make(_: Callable[[str], None]) -> Site:
         raise hn.InvalidValueError("no rooms today")
 
     opening = Opening(hn.load(folder / "four.yaml", robot_radius_m=0.2).grid, make)

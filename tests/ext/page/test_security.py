@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.ext.page.server import TOKEN, folder_in, served, session_of
+from tests.ext.page.server import TOKEN, folder_in, query_of, served, site_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from tests.ext.page.server import Client
 
-QUERY = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def client(folder: Path) -> Iterator[Client]:
     """One server for all hostile requests: none may change anything."""
-    with served(session_of(folder / "four.yaml"), folder) as client:
+    with served(site_of(folder / "four.yaml"), folder) as client:
         yield client
 
 
@@ -41,7 +41,7 @@ def _nothing_changes(folder: Path, client: Client) -> Any:
 
     before = files()
     yield
-    assert client.get("rooms.json").code == 200  # it still answers
+    assert client.get("floor/0/rooms.json").code == 200  # it still answers
     assert files() == before
 
 
@@ -96,6 +96,8 @@ def test_without_the_token_nothing_is_answered(client: Client, path: str) -> Non
 def test_paths_upward_and_numbers_out_of_range_are_refused(client: Client, name: str) -> None:
     from urllib.parse import quote
 
+    if name.startswith(("tile/", "graph/", "costs/")):
+        name = f"floor/0/{name}"
     answer = client.get(quote(name, safe="/%.:\\") if not name.isascii() else name)
     assert 400 <= answer.code < 500
     assert b"secret" not in answer.body or b"error" in answer.body
@@ -119,9 +121,9 @@ def test_foreign_origins_and_hosts_are_refused(
     client: Client, headers: dict[str, str], method: str
 ) -> None:
     if method == "GET":
-        assert client.get("map.json", **headers).code == 403
+        assert client.get("floor/0/map.json", **headers).code == 403
     else:
-        assert client.post("save", {"version": 0}, **headers).code == 403
+        assert client.post("floor/0/save", {"version": 0}, **headers).code == 403
 
 
 def test_its_own_origin_is_welcome(client: Client) -> None:
@@ -132,34 +134,39 @@ def test_its_own_origin_is_welcome(client: Client) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"start": [1e300, 0]},
-        {"start": [math.inf, 0]},
-        {"start": [math.nan, 0]},
-        {"start": [10**400, 0]},
-        {"start": ["1", "2"]},
-        {"start": [True, False]},
-        {"start": [1, 2, 3]},
+        {"start": {"floor": 0, "point": [1e300, 0]}},
+        {"start": {"floor": 0, "point": [math.inf, 0]}},
+        {"start": {"floor": 0, "point": [math.nan, 0]}},
+        {"start": {"floor": 0, "point": [10**400, 0]}},
+        {"start": {"floor": 0, "point": ["1", "2"]}},
+        {"start": {"floor": 0, "point": [True, False]}},
+        {"start": {"floor": 0, "point": [1, 2, 3]}},
         {"start": None},
         {"start": {"x": 1}},
+        {"start": [1, 1]},
+        {"start": {"floor": 1, "point": [1, 1]}},
         {"preset": "../planners/shortest"},
         {"preset": "/etc/passwd"},
         {"preset": "no-such-preset"},
         {"preset": 1},
-        {"closed": {"doors": [10**30]}},
-        {"closed": {"doors": ["1"]}},
-        {"closed": {"doors": [999999]}},
-        {"closed": {"rooms": ["no such room"]}},
-        {"closed": {"rooms": [["a"]]}},
-        {"closed": {"polygons": [[[0, 0], [1, 1]]]}},
-        {"closed": {"polygons": [[[0, 0], [9, 9], [9, 0], [0, 9]]]}},
-        {"closed": {"polygons": [[[0, 0]] * 1001]}},
-        {"closed": {"files": ["/etc/passwd"]}},
+        {"closed": {"floors": [{"floor": 0, "doors": [10**30]}]}},
+        {"closed": {"floors": [{"floor": 0, "doors": ["1"]}]}},
+        {"closed": {"floors": [{"floor": 0, "doors": [999999]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["no such room"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": [["a"]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0], [1, 1]]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0], [9, 9], [9, 0], [0, 9]]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0]] * 1001]}]}},
+        {"closed": {"floors": [{"floor": 0, "files": ["/etc/passwd"]}]}},
+        {"closed": {"doors": [1]}},
+        {"closed": {"links": ["no such link"]}},
         {"more": 1},
     ],
 )
 def test_wrong_types_and_huge_numbers_are_refused(client: Client, change: dict[str, Any]) -> None:
     for name in ("plan", "optimum", "alternatives", "export/path-csv"):
-        answer = client.post(name, QUERY | change)
+        floor = {"floor": 0} if name.startswith("export") else {}
+        answer = client.post(name, QUERY | floor | change)
         if name == "optimum" and change.get("preset") == "no-such-preset":
             continue  # it has a preset of its own
         assert answer.code == 422
@@ -168,7 +175,7 @@ def test_wrong_types_and_huge_numbers_are_refused(client: Client, change: dict[s
 
 
 @pytest.mark.parametrize("value", [None, [], 1, "plan", {}, {"version": 0}, {"version": -1}])
-@pytest.mark.parametrize("name", ["plan", "alternatives", "edit", "at"])
+@pytest.mark.parametrize("name", ["plan", "alternatives", "floor/0/edit", "floor/0/at"])
 def test_what_is_no_request_is_refused(client: Client, name: str, value: Any) -> None:
     assert client.post(name, value).code == 422
 
@@ -194,7 +201,7 @@ def test_what_is_no_request_is_refused(client: Client, name: str, value: Any) ->
     ],
 )
 def test_changes_that_are_none_are_refused(client: Client, change: dict[str, Any]) -> None:
-    answer = client.post("edit", {"version": 0, "change": change})
+    answer = client.post("floor/0/edit", {"version": 0, "change": change})
     assert answer.code == 422
     assert client.session.rooms.names == ("a", "b", "c", "d")
 
@@ -219,7 +226,7 @@ def test_bodies_that_are_no_json_are_refused(
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])
 def test_other_methods_are_refused(client: Client, method: str) -> None:
-    assert client.send(method, f"/{TOKEN}/save").code in {403, 405}
+    assert client.send(method, f"/{TOKEN}/floor/0/save").code in {403, 405}
 
 
 def test_answers_may_not_be_framed_sniffed_or_reached_from_elsewhere(client: Client) -> None:

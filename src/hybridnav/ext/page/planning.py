@@ -13,7 +13,13 @@ from hybridnav.ext.page.graph import in_grid, in_metres
 from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
 
 if TYPE_CHECKING:
-    from hybridnav.ext.page.requests import AlternativesQuery, Closed, PathQuery, PlanQuery
+    from hybridnav.ext.page.requests import (
+        AlternativesQuery,
+        FloorClosed,
+        PartQuery,
+        PathQuery,
+        PlanQuery,
+    )
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
     from hybridnav.planner.saved import Model
@@ -87,21 +93,32 @@ class Planning:
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
         planner, points = self.planner(query.preset), self._points(query)
-        closed = self.blocked(query.closed)
+        closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
         tour = plan_tour(planner, points, blocked=closed)
         return self._facts(tour.results[0]) | self._itinerary(tour)
 
-    def outcome(self, query: PathQuery) -> PlanResult:
-        """Return the plan itself, to be written."""
-        closed = self.blocked(query.closed)
-        return self.planner(query.preset).plan(*self._points(query), blocked=closed)
-
     def optimum(self, query: PathQuery) -> dict[str, Any]:
         """Return the shortest path of cells on the whole grid."""
-        on_grid = query.model_copy(update={"preset": GRID})
-        return self._facts(self.outcome(on_grid))
+        return self._facts(self._outcome(query.model_copy(update={"preset": GRID})))
+
+    def on_floor(self, query: PartQuery) -> PlanResult:
+        """Return the plan itself, to be written."""
+        return self._outcome(query)
+
+    def kept(self) -> HybridPlanner:
+        """Return what a model of the map holds."""
+        return self.planner(self.presets[0])
+
+    @property
+    def links(self) -> list[dict[str, Any]]:
+        """The links that join a map with others: none."""
+        return []
+
+    def _outcome(self, query: PathQuery) -> PlanResult:
+        points, closed = self._points(query), self._closed(query)
+        return self.planner(query.preset).plan(*points, blocked=closed)
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes that differ for people."""
@@ -112,7 +129,7 @@ class Planning:
             goal,
             query.count,
             by=query.by,
-            blocked=self.blocked(query.closed),
+            blocked=self._closed(query),
         )
         routes = [
             self._facts(each.result)
@@ -123,13 +140,18 @@ class Planning:
         return {"routes": routes, "complete": found.complete, "note": found.note}
 
     def _points(self, query: PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        start, goal = (in_metres(point, self.grid) for point in (query.start, query.goal))
+        start, goal = (in_metres(end.point, self.grid) for end in (query.start, query.goal))
         if not self.planner(query.preset).needs_headings:
             return start, goal
         yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
         return (*start, yaw), (*goal, yaw)
 
-    def blocked(self, closed: Closed) -> Blocked | None:
+    def _closed(self, query: PathQuery) -> Blocked | None:
+        if query.closed.links:
+            raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
+        return next(map(self.blocked, query.closed.floors), None)
+
+    def blocked(self, closed: FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
 
         Raises
@@ -157,12 +179,12 @@ class Planning:
             "lower_bound": result.lower_bound,
             "gap": result.gap,
         }
-        line = [] if result.path is None else in_grid(result.path.points, self.grid)
+        lines = [] if result.path is None else [in_grid(result.path.points, self.grid)]
         return {
             "status": str(result.status),
             "solved": result.solved,
             "metric": result.metric,
-            "line": line,
+            "parts": [{"floor": 0, "line": line} for line in lines],
             "seconds": round(sum(result.stats.seconds.values()), 6),
         } | {name: finite(value) for name, value in figures.items()}
 
