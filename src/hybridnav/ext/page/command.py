@@ -15,12 +15,7 @@ from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import BesideRoomsOption, MapOrBuildingArgument
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
-from hybridnav.ext.fleet.command import (
-    BuildingSource,
-    check_options,
-    is_building_file,
-    refused_options,
-)
+from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
@@ -63,9 +58,8 @@ BrowserOption = Annotated[
 ]
 
 
-@with_map()
+@with_map(over_floors=lambda: _view_over_floors)
 def view(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     save: SaveOption = None,
     routes: RouteOption = None,
@@ -80,16 +74,42 @@ def view(
 
     MAP may be a building: the page then has its floors.
     """
+    _check_save(save, routes)
+    for text in routes or ():
+        _ends(text, ("",))
+    page = MapPage.read(map_file, rooms_file, parsed_costs(costs), reading)
+    _show(page, save, routes, port, browser=browser)
+
+
+def _view_over_floors(
+    *,
+    map_file: Path,
+    save: Path | None,
+    routes: list[str] | None,
+    port: int,
+    browser: bool,
+    reading: MapOptions,
+) -> None:
+    """Open a building as a page; see `view`."""
+    _check_save(save, routes)
+    _show(BuildingPage(map_file, reading), save, routes, port, browser=browser)
+
+
+def _check_save(save: Path | None, routes: list[str] | None) -> None:
     check_output(save, "--save", (".html",))
     if routes and save is None:
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
-    if is_building_file(map_file):
-        check_options(refused_options(ctx, VIEW_OPTIONS))
-        source: MapPage | BuildingPage = BuildingPage(BuildingSource.of(ctx.params))
-    else:
-        for text in routes or ():
-            _ends(text, ("",))
-        source = MapPage.read(map_file, rooms_file, parsed_costs(costs), reading)
+
+
+def _show(
+    source: MapPage | BuildingPage,
+    save: Path | None,
+    routes: list[str] | None,
+    port: int,
+    *,
+    browser: bool,
+) -> None:
+    """Write a page into a file, or serve it."""
     if save is not None:
         _save(source.make(lambda _: None), save, routes or ())
     else:
@@ -164,27 +184,17 @@ class MapPage:
         )
 
 
-# `hybridnav view` for a building of several floors.
-
-VIEW_OPTIONS = frozenset(
-    {
-        *("map_file", "save", "routes", "port", "browser"),
-        *("preset", "overrides", "robot_radius_m", "max_cells"),
-    }
-)
-"""Parameters of `hybridnav view` that mean something for a building."""
-
-
 @dataclass(frozen=True)
 class BuildingPage:
     """The page of a building."""
 
-    source: BuildingSource
+    file: Path
+    reading: MapOptions
 
     @property
     def folder(self) -> Path:
         """The only folder in which anything is written."""
-        return self.source.file.parent
+        return self.file.parent
 
     def opening(self) -> Opening | Site:
         """Return what the page shows at once: the cells of the lowest floor, or a model, which has
@@ -193,27 +203,27 @@ class BuildingPage:
         from hybridnav.ext.fleet.files.read import load_floor  # noqa: PLC0415
         from hybridnav.ext.page import Opening  # noqa: PLC0415
 
-        entries, source = self._entries(), self.source
+        entries = self._entries()
         if entries is None:
             return self.make(lambda _: None)
         lowest = load_floor(
             entries.floors[0],
             self.folder,
-            robot_radius_m=source.robot_radius_m,
-            preset=source.settings,
-            max_cells=source.max_cells,
+            robot_radius_m=self.reading.robot_radius_m,
+            preset=preset_of_floors(self.reading),
+            max_cells=self.reading.max_cells,
         )
         names = [floor.name for floor in entries.floors]
-        return Opening(lowest.grid, self.make, name=source.file.stem, floors=names)
+        return Opening(lowest.grid, self.make, name=self.file.stem, floors=names)
 
     def make(self, tell: Callable[[str], None]) -> Site:
         """Load the building, and return what the page shows then."""
         from hybridnav.ext.page import Site  # noqa: PLC0415 - loads numba and matplotlib
 
-        entries, name = self._entries(), self.source.file.stem
+        entries, name = self._entries(), self.file.stem
         n_floors = 0 if entries is None else len(entries.floors)
         tell(f"reading {n_floors} floors" if n_floors != 1 else "reading the floor")
-        building = self.source.load({})
+        building = load_floors(self.file, self.reading, {})
         if entries is None:
             return Site.of_building(building, name)
         files = _rooms_files(entries.floors, self.folder)
@@ -224,7 +234,7 @@ class BuildingPage:
         from hybridnav.ext.fleet.files.entries import read_building_entries  # noqa: PLC0415
         from hybridnav.planner.saved import is_model  # noqa: PLC0415
 
-        return None if is_model(self.source.file) else read_building_entries(self.source.file)
+        return None if is_model(self.file) else read_building_entries(self.file)
 
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
