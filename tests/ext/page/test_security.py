@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.ext.page.server import TOKEN, folder_in, query_of, served, site_of
+from tests.ext.page.server import (
+    TOKEN,
+    building_site_of,
+    folder_in,
+    query_of,
+    served,
+    site_of,
+    write_building,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,14 +29,17 @@ QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a map, with another file above it that nothing may touch."""
-    return folder_in(tmp_path_factory.mktemp("hostile"))
+    """The folder of a building and its maps, with another file above it that nothing may touch."""
+    folder = folder_in(tmp_path_factory.mktemp("hostile"))
+    write_building(folder)
+    return folder
 
 
-@pytest.fixture(scope="module")
-def client(folder: Path) -> Iterator[Client]:
-    """One server for all hostile requests: none may change anything."""
-    with served(site_of(folder / "four.yaml"), folder) as client:
+@pytest.fixture(scope="module", params=["four.yaml", "building.yaml"])
+def client(folder: Path, request: pytest.FixtureRequest) -> Iterator[Client]:
+    """One server for all hostile requests to a map or a building: none may change anything."""
+    made = site_of if request.param == "four.yaml" else building_site_of
+    with served(made(folder / request.param), folder) as client:
         yield client
 
 
@@ -56,6 +67,8 @@ def _nothing_changes(folder: Path, client: Client) -> Any:
         f"/{TOKEN.upper()}/map.json",
         f"//{TOKEN}/map.json",
         f"/{TOKEN}x/map.json",
+        "/floor/0/map.json",
+        f"/{TOKEN[:-1]}/floor/0/map.json",
     ],
 )
 def test_without_the_token_nothing_is_answered(client: Client, path: str) -> None:
@@ -104,6 +117,31 @@ def test_paths_upward_and_numbers_out_of_range_are_refused(client: Client, name:
 
 
 @pytest.mark.parametrize(
+    "name",
+    [
+        *("floor/2/map.json", "floor/-1/map.json", "floor/99999999999999999999/map.json"),
+        *("floor/1e0/map.json", "floor/%D9%A1/map.json", "floor//map.json", "floor/map.json"),
+        *("floor/../../secret.txt", "floor/..%2f..%2fsecret.txt/map.json", "floor/0%00/map.json"),
+        *("floor/2/tile/map/0/0/0.png", "floor/0/tile/map/0/9/0.png", "floor/+1/rooms.json"),
+        *("floor/0/../1/../../../secret.txt", "floor/0/graph/-1.json", "tile/map/0/0/0.png"),
+        "rooms.json",
+    ],
+)
+def test_floors_that_are_none_are_refused(client: Client, name: str) -> None:
+    answer = client.get(name)
+    assert 400 <= answer.code < 500
+    assert b"secret" not in answer.body or b"error" in answer.body
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [("nav2", None), ("rooms", None), ("../x", None), ("path-csv", None), ("path-csv", QUERY)],
+)
+def test_files_that_a_site_has_not_are_refused(client: Client, kind: str, value: Any) -> None:
+    assert 400 <= client.post(f"export/{kind}", value).code < 500
+
+
+@pytest.mark.parametrize(
     "headers",
     [
         {"origin": "https://evil.example"},
@@ -121,8 +159,10 @@ def test_foreign_origins_and_hosts_are_refused(
     client: Client, headers: dict[str, str], method: str
 ) -> None:
     if method == "GET":
-        assert client.get("floor/0/map.json", **headers).code == 403
+        for name in ("map.json", "floor/0/map.json"):
+            assert client.get(name, **headers).code == 403
     else:
+        assert client.post("plan", QUERY, **headers).code == 403
         assert client.post("floor/0/save", {"version": 0}, **headers).code == 403
 
 
@@ -144,7 +184,15 @@ def test_its_own_origin_is_welcome(client: Client) -> None:
         {"start": None},
         {"start": {"x": 1}},
         {"start": [1, 1]},
-        {"start": {"floor": 1, "point": [1, 1]}},
+        {"start": {"floor": 2, "point": [1, 1]}},
+        {"start": {"floor": 10**30, "point": [1, 1]}},
+        {"start": {"floor": -1, "point": [1, 1]}},
+        {"start": {"floor": "0", "point": [1, 1]}},
+        {"start": {"floor": True, "point": [1, 1]}},
+        {"start": {"floor": 0.0, "point": [1, 1]}},
+        {"start": {"floor": 0}},
+        {"goal": None},
+        {"stairs": 1},
         {"preset": "../planners/shortest"},
         {"preset": "/etc/passwd"},
         {"preset": "no-such-preset"},
@@ -160,6 +208,11 @@ def test_its_own_origin_is_welcome(client: Client) -> None:
         {"closed": {"floors": [{"floor": 0, "files": ["/etc/passwd"]}]}},
         {"closed": {"doors": [1]}},
         {"closed": {"links": ["no such link"]}},
+        {"closed": {"links": "lift"}},
+        {"closed": {"links": [1]}},
+        {"closed": {"floors": [{"floor": 7, "rooms": ["a"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["e"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["a"]}] * 2}},
         {"more": 1},
     ],
 )
@@ -171,7 +224,7 @@ def test_wrong_types_and_huge_numbers_are_refused(client: Client, change: dict[s
             continue  # it has a preset of its own
         assert answer.code == 422
         assert answer.value["error"]
-        assert "\n" not in answer.value["error"]
+        assert answer.value["error"].isprintable()
 
 
 @pytest.mark.parametrize("value", [None, [], 1, "plan", {}, {"version": 0}, {"version": -1}])
