@@ -22,12 +22,12 @@ from hybridnav.ext.page.page import (
     exported_floor,
     live_page,
 )
+from hybridnav.ext.page.planning import GRID
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
     Edit,
     PartQuery,
-    PathQuery,
     PlanQuery,
     Save,
     Undo,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.page.opening import Opening
     from hybridnav.ext.page.session import Session
-    from hybridnav.ext.page.site import Routes, Site
+    from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
 
 _MOST_BYTES = 2_000_000
@@ -156,28 +156,39 @@ class _Answers:
                 request.path_params["preset"]
             ),
         }
-        plans: dict[str, tuple[type[PathQuery], Callable[[Routes, Any], Any]]] = {
-            "plan": (PlanQuery, lambda routes, query: routes.plan(query)),
-            "optimum": (PathQuery, lambda routes, query: routes.optimum(query)),
-            "alternatives": (AlternativesQuery, lambda routes, query: routes.alternatives(query)),
+        posts: dict[str, tuple[type[BaseModel], Callable[[Request, Any], Any]]] = {
+            f"{at}/plan": (PlanQuery, lambda _, query: self._planned(query)),
+            f"{at}/optimum": (
+                PlanQuery,
+                lambda _, query: self._planned(
+                    query.model_copy(update={"preset": GRID, "brief": True})
+                ),
+            ),
+            f"{at}/alternatives": (
+                AlternativesQuery,
+                lambda _, query: self._shown.site.routes(query).alternatives(query),
+            ),
+            f"{floor}/at": (
+                At,
+                lambda request, asked: {"room": self._session(request).room_at(asked.point)},
+            ),
+            f"{floor}/edit": (Edit, lambda request, asked: self._session(request).edit(asked)),
+            f"{floor}/undo": (
+                Undo,
+                lambda request, asked: self._session(request).undo(asked.version),
+            ),
+            f"{floor}/save": (Save, lambda request, asked: self._session(request).save(asked)),
         }
-        acts: dict[str, tuple[type[BaseModel], Callable[[Session, Any], Any]]] = {
-            "at": (At, lambda session, asked: {"room": session.room_at(asked.point)}),
-            "edit": (Edit, lambda session, asked: session.edit(asked)),
-            "undo": (Undo, lambda session, asked: session.undo(asked.version)),
-            "save": (Save, lambda session, asked: session.save(asked)),
-        }
-        posts = {
-            f"{at}/export/{{kind}}": _post_file(self._export),
-            f"{floor}/export/{{kind}}": _post_file(self._export_floor),
-            **{f"{at}/{name}": _post(self._plan(*each)) for name, each in plans.items()},
-            **{f"{floor}/{name}": _post(self._act(*each)) for name, each in acts.items()},
-        }
+        files = {at: self._export, floor: self._export_floor}
         tile = f"{floor}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
         return [
             Route(tile, _get(self._tile, "image/png")),
             *(Route(path, _get_json(answer)) for path, answer in gets.items()),
-            *(Route(path, answer, methods=["POST"]) for path, answer in posts.items()),
+            *(Route(path, _post(*each), methods=["POST"]) for path, each in posts.items()),
+            *(
+                Route(f"{above}/export/{{kind}}", _post_file(answer), methods=["POST"])
+                for above, answer in files.items()
+            ),
         ]
 
     def _floor(self, request: Request) -> Any:
@@ -188,19 +199,8 @@ class _Answers:
         """Return the session of the floor in an address, once it is there."""
         return self._shown.site.floor(request.path_params["floor"])
 
-    def _plan(
-        self, kind: type[PathQuery], act: Callable[[Routes, Any], Any]
-    ) -> Callable[[Request, Any], Any]:
-        def answer(_: Request, value: Any) -> Any:
-            site, query = self._shown.site, checked(kind, value)
-            return act(site.routes(query), query)
-
-        return answer
-
-    def _act(
-        self, kind: type[BaseModel], act: Callable[[Session, Any], Any]
-    ) -> Callable[[Request, Any], Any]:
-        return lambda request, value: act(self._session(request), checked(kind, value))
+    def _planned(self, query: PlanQuery) -> dict[str, Any]:
+        return self._shown.site.routes(query).plan(query)
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
         site, query = self._shown.site, checked(PartQuery, value) if value else None
@@ -261,12 +261,12 @@ def _get_json(read: Callable[[Any], Any]) -> Any:
     return answer
 
 
-def _post(act: Callable[[Request, Any], Any]) -> Any:
+def _post(kind: type[BaseModel], act: Callable[[Request, Any], Any]) -> Any:
     async def answer(request: Request) -> Response:
         value = await _body(request)
         if isinstance(value, Response):
             return value
-        return _json(await _done(lambda: act(request, value)))
+        return _json(await _done(lambda: act(request, checked(kind, value))))
 
     return answer
 

@@ -13,6 +13,7 @@ from hybridnav.ext.page.graph import in_grid, in_metres
 from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
 
 if TYPE_CHECKING:
+    from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.page.requests import (
         AlternativesQuery,
         FloorClosed,
@@ -99,13 +100,10 @@ class Planning:
         tour = plan_tour(planner, points, blocked=closed)
         return self._facts(tour.results[0]) | self._itinerary(tour)
 
-    def optimum(self, query: PathQuery) -> dict[str, Any]:
-        """Return the shortest path of cells on the whole grid."""
-        return self._facts(self._outcome(query.model_copy(update={"preset": GRID})))
-
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
-        return self._outcome(query)
+        points, closed = self._points(query), self._closed(query)
+        return self.planner(query.preset).plan(*points, blocked=closed)
 
     def kept(self) -> HybridPlanner:
         """Return what a model of the map holds."""
@@ -115,10 +113,6 @@ class Planning:
     def links(self) -> list[dict[str, Any]]:
         """The links that join a map with others: none."""
         return []
-
-    def _outcome(self, query: PathQuery) -> PlanResult:
-        points, closed = self._points(query), self._closed(query)
-        return self.planner(query.preset).plan(*points, blocked=closed)
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes that differ for people."""
@@ -172,21 +166,12 @@ class Planning:
         return Blocked(doors=closed.doors, rooms=closed.rooms, polygons=areas)
 
     def _facts(self, result: PlanResult) -> dict[str, Any]:
-        """Return the figures and the line of a plan; None stands for what is not finite."""
-        figures: dict[str, float | None] = {
-            "length_m": result.path.length_m if result.path is not None else None,
-            "cost": result.cost,
-            "lower_bound": result.lower_bound,
-            "gap": result.gap,
-        }
-        lines = [] if result.path is None else [in_grid(result.path.points, self.grid)]
-        return {
-            "status": str(result.status),
-            "solved": result.solved,
-            "metric": result.metric,
-            "parts": [{"floor": 0, "line": line} for line in lines],
-            "seconds": round(sum(result.stats.seconds.values()), 6),
-        } | {name: finite(value) for name, value in figures.items()}
+        """Return the figures and the line of a plan."""
+        path = result.path
+        lines = [] if path is None else [in_grid(path.points, self.grid)]
+        parts = [{"floor": 0, "line": line} for line in lines]
+        length_m = None if path is None else path.length_m
+        return facts_of(result, parts) | {"length_m": finite(length_m)}
 
     def _itinerary(self, tour: Tour) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
@@ -202,6 +187,18 @@ class Planning:
             "words": tour.words(),
             "places": list(route.places) if route is not None else [],
         }
+
+
+def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of a plan, and its lines floor by floor; None stands for what is not
+    finite."""
+    return {
+        "status": str(plan.status),
+        "solved": plan.solved,
+        "metric": plan.metric,
+        "parts": parts,
+        "seconds": round(sum(plan.stats.seconds.values()), 6),
+    } | {name: finite(getattr(plan, name)) for name in ("cost", "lower_bound", "gap")}
 
 
 def finite(value: float | None) -> float | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
 from hybridnav.ext.page.graph import in_grid, in_metres
-from hybridnav.ext.page.planning import GRID, finite
+from hybridnav.ext.page.planning import facts_of, finite
 from hybridnav.ext.page.session import Session
 from hybridnav.planner import Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
@@ -60,9 +60,6 @@ class Routes(Protocol):
 
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with words."""
-
-    def optimum(self, query: PathQuery) -> dict[str, Any]:
-        """Return the cheapest route by cells of the whole grids."""
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes that differ for people."""
@@ -303,10 +300,6 @@ class _OverFloors:
         plan = self._outcome(query)
         return self._facts(plan) | ({} if query.brief else {"words": plan.words()})
 
-    def optimum(self, query: PathQuery) -> dict[str, Any]:
-        """Return the cheapest route by cells of the whole grids, and links."""
-        return self._facts(self._outcome(query.model_copy(update={"preset": GRID})))
-
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by different links."""
         start, goal = self._ends(query)
@@ -360,7 +353,7 @@ class _OverFloors:
         return {"blocked": blocked, "closed_links": links, "stairs": stairs}
 
     def _facts(self, plan: BuildingPlan) -> dict[str, Any]:
-        """Return the figures and lines of a plan; None stands for what is not finite."""
+        """Return the figures and lines of a plan, and its rides."""
         number_of = self._number_of
         parts = []
         for name, result in zip(plan.floors, plan.results, strict=True):
@@ -379,15 +372,12 @@ class _OverFloors:
             }
             for ride in plan.rides
         ]
-        figures = ("length_m", "charge_m", "cost", "lower_bound", "gap", "travel_s")
-        return {
-            "status": str(plan.status),
-            "solved": plan.solved,
-            "metric": plan.metric,
-            "parts": parts,
-            "rides": rides,
-            "seconds": round(sum(plan.stats.seconds.values()), 6),
-        } | {name: finite(getattr(plan, name)) for name in figures}
+        figures = ("length_m", "charge_m", "travel_s")
+        return (
+            facts_of(plan, parts)
+            | {"rides": rides}
+            | {name: finite(getattr(plan, name)) for name in figures}
+        )
 
 
 def _session(planner: HybridPlanner, file: RoomsFile | None, advice: str) -> Session:
