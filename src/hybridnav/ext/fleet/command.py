@@ -11,7 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.blocked import parsed_closing
+from hybridnav.cli.blocked import closing_lines, parsed_closing
 from hybridnav.cli.common import answer, check_picture, progress_bar, stage, timings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.plan import checked_at, one_of
@@ -153,9 +153,7 @@ def _summary(file: Path, building: hn.Building, figures: dict[str, Any]) -> str:
     radius = f"robot radius {building.robot_radius_m:g} m"
     name = printable(file.name)
     lines = [f"query      {name}, {figures['query']}, {radius}"]
-    if figures["blocked"]:
-        lines.append(f"blocked    {', '.join(figures['blocked'])}")
-    lines.append(f"status     {figures['status']}")
+    lines += [*closing_lines(figures), f"status     {figures['status']}"]
     if figures["cost"] is not None:
         lines += _route_lines(figures)
     for number, line in enumerate(figures["words"]):

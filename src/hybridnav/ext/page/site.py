@@ -195,25 +195,36 @@ class _OverFloors:
         files: Mapping[str, RoomsFile] | None,
         links: Sequence[LinkEntry],
     ) -> None:
-        advice = _IN_MODEL if files is None else _NO_FILE
         self._building = building
         self._first = building.floors[0].planner.preset.name
         self._made = {self._first: building}
         self._making = threading.Lock()
-        sessions: dict[int, Session] = {}
+        names: dict[HybridPlanner, list[str]] = {}
         for floor in building.floors:
-            if id(floor.planner) not in sessions:
-                file = (files or {}).get(floor.name)
-                sessions[id(floor.planner)] = _session(floor.planner, file, advice)
-        self.sessions = tuple(sessions[id(floor.planner)] for floor in building.floors)
-        for session in sessions.values():
-            here = [
-                floor.name
-                for floor, of in zip(building.floors, self.sessions, strict=True)
-                if of is session
-            ]
-            ends = [(link, end) for link in links for end in link.ends if end.floor in here]
-            session.caution = lambda rooms, ends=ends: self._caution(rooms, ends)  # type: ignore[misc]
+            names.setdefault(floor.planner, []).append(floor.name)
+        made = {
+            planner: self._session(planner, here, files, links) for planner, here in names.items()
+        }
+        self.sessions = tuple(made[floor.planner] for floor in building.floors)
+
+    def _session(
+        self,
+        planner: HybridPlanner,
+        names: Sequence[str],
+        files: Mapping[str, RoomsFile] | None,
+        links: Sequence[LinkEntry],
+    ) -> Session:
+        """Return the session of the floors of one map, whose planner keeps what it has prepared."""
+        model, topology = Model(planner.topology.grid), planner.topology
+        if topology.pyramid.rooms is None:
+            topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
+        file = (files or {}).get(names[0])
+        session = Session(model, topology, planner.preset, costs=planner.costs, file=file)
+        session.no_file = _IN_MODEL if files is None else _NO_FILE
+        ends = [(link, end) for link in links for end in link.ends if end.floor in names]
+        session.caution = lambda rooms: self._caution(rooms, ends)
+        session.planning.adopt(planner)
+        return session
 
     def _caution(self, rooms: Rooms, ends: Sequence[tuple[LinkEntry, EndEntry]]) -> str:
         """Return which links of the file rooms have left without their end."""
@@ -378,17 +389,6 @@ class _OverFloors:
             | {"rides": rides}
             | {name: finite(getattr(plan, name)) for name in figures}
         )
-
-
-def _session(planner: HybridPlanner, file: RoomsFile | None, advice: str) -> Session:
-    """Return the session of a floor, whose planner keeps what it has prepared."""
-    model, topology = Model(planner.topology.grid), planner.topology
-    if topology.pyramid.rooms is None:
-        topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
-    session = Session(model, topology, planner.preset, costs=planner.costs, file=file)
-    session.no_file = advice
-    session.planning.adopt(planner)
-    return session
 
 
 def _is_plain(preset: str) -> bool:
