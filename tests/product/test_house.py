@@ -5,9 +5,9 @@ from __future__ import annotations
 from tests.product.house import figures
 
 LIMITS = {
-    "code": 56_400,
-    "lines": 93_100,
-    "files": 473,
+    "code": 56_250,
+    "lines": 92_850,
+    "files": 472,
     "code outside ext": 39_100,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
@@ -18,7 +18,7 @@ LIMITS = {
     "lines visited by paper": 11_300,
     "modules of a plan and a picture": 157,
     "imports, % of the code": 10.1,
-    "lines of tests": 57_000,
+    "lines of tests": 56_950,
 }
 
 

@@ -11,14 +11,14 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import MODEL_SUFFIX, printable
-from hybridnav.cli.common import answer, check_writable, progress_bar, stage, timings
+from hybridnav.cli.common import answer, progress_bar, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import MapOrBuildingArgument
 from hybridnav.cli.reading import (
     MapOptions,
+    check_model,
     check_room_to_be,
     grow_topology,
-    is_model_file,
     load_model,
     overridden,
     with_map,
@@ -47,9 +47,12 @@ CompressOption = Annotated[
 ]
 
 
-@with_map(before="compress", without=("preset",))
+@with_map(
+    before="compress",
+    without=("preset",),
+    over_floors=lambda: extension("formats", "building").build_over_floors,
+)
 def build(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     out: OutOption,
     preset: PresetsOption = None,
@@ -63,16 +66,9 @@ def build(
 
     MAP may be a building; `hybridnav plan` takes its model.
     """
-    if not is_model_file(out):
-        raise UsageError(f"--out must end in {MODEL_SUFFIX}, got '{printable(out)}'")
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
-    check_writable(out, "--out")
-    fleet = extension("formats", "building")
-    if fleet.is_building_file(map_file):
-        fleet.check_options(fleet.refused_options(ctx, fleet.BUILD_OPTIONS))
-        fleet.build_building(fleet.BuildingSource.of(ctx.params), out, compress=compress)
-        return
+    check_model(out)
     settings = [reading.settings(map_file, preset=name) for name in preset or (None,)]
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings[0], seconds, reading)

@@ -137,9 +137,12 @@ CompareOption = Annotated[
 ]
 
 
-@with_map(before="keep")
+@with_map(
+    before="keep",
+    over_floors=lambda: extension("formats", "building").plan_over_floors,
+    alone=("no_stairs",),
+)
 def plan(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     start: StartOption = None,
     goal: GoalOption = None,
@@ -173,10 +176,9 @@ def plan(
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
+    del no_stairs  # of a building
     _check_files(plot, poses, bag)
-    where = _checked_at(at)
-    if _planned_in_building(ctx, where, no_stairs=no_stairs):
-        return
+    where = checked_at(at)
     given = parsed_costs(costs)
     check_language(language)
     settings = reading.settings(
@@ -186,7 +188,7 @@ def plan(
         smooth=smooth,
     )
     closing = parsed_closing(blocked)
-    first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
+    first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
     wanted = wanted_of(
@@ -234,27 +236,20 @@ def _check_fits(request: Request) -> None:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
 
 
-def _planned_in_building(ctx: typer.Context, at: At, *, no_stairs: bool) -> bool:
-    """Plan over floors if the map is a building, and return whether it is one."""
-    fleet = extension("formats", "building")
-    if not fleet.is_building_file(ctx.params["map_file"]):
-        if no_stairs:
-            raise UsageError("--no-stairs is for a building, and this is one map: leave it out")
-        return False
-    refused = fleet.refused_options(ctx, fleet.PLAN_OPTIONS)
-    if not fleet.plan_in_building(ctx.params, at, refused):
-        raise typer.Exit(EXIT_NOT_SOLVED)
-    return True
-
-
-def _one_of(option: str, point: Any, other: str, text: str | None) -> Waypoint:
+def one_of(option: str, point: Any, other: str, text: str | None) -> Point | str:
     """Return the start or the goal, from the one of its two options that was used."""
     if (point is None) == (text is None):
         what = "missing option" if point is None else "only one is taken, of"
         raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
+    return point if text is None else text
+
+
+def _end(option: str, point: Any, other: str, text: str | None) -> Waypoint:
+    """Return the start or the goal on a map."""
+    given = one_of(option, point, other, text)
     if isinstance(point, str):
         raise UsageError(f"--{option}: expected X,Y in metres, or X,Y,YAW, got {point!r:.80}")
-    return _parsed_waypoint(text) if text is not None else point
+    return _parsed_waypoint(given) if isinstance(given, str) else given
 
 
 def _parsed_waypoint(text: str) -> Waypoint:
@@ -267,7 +262,8 @@ def _parsed_waypoint(text: str) -> Waypoint:
     return point
 
 
-def _checked_at(at: str) -> At:
+def checked_at(at: str) -> At:
+    """Return the place in a room that is meant."""
     if at == "anywhere":
         return "anywhere"
     if at == "point":

@@ -9,9 +9,12 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+import typer
+
 import hybridnav as hn
+from hybridnav._base.extension import extension
 from hybridnav._base.files import MODEL_SUFFIX, printable
-from hybridnav.cli.common import complain, stage
+from hybridnav.cli.common import check_writable, complain, stage
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
     FreeOption,
@@ -26,7 +29,7 @@ from hybridnav.cli.options import (
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from hybridnav.cli.blocked import Closing
     from hybridnav.planner import Preset
@@ -78,7 +81,14 @@ class MapOptions:
         )
 
 
-def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+def with_map(
+    *,
+    before: str = "plot",
+    without: tuple[str, ...] = (),
+    over_floors: Callable[[], Callable[..., None]] | None = None,
+    reads: tuple[str, ...] = ("preset", "overrides", "robot_radius_m", "max_cells"),
+    alone: tuple[str, ...] = (),
+) -> Callable[[Any], Any]:
     """Give a command the options of `MapOptions`, which it takes as its argument `reading`.
 
     Parameters
@@ -87,6 +97,13 @@ def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable
         The parameter of the command before which the help lists them; they are last if it has none.
     without
         Options that the command has itself.
+    over_floors
+        Returns what runs the command if its map is a building: its parameters are the options that
+        mean something then. None for a command that takes no buildings.
+    reads
+        Options of `MapOptions` that mean something then.
+    alone
+        Options that mean something for buildings alone.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -94,16 +111,30 @@ def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable
         group = get_type_hints(MapOptions, include_extras=True)
         added = [each for each in fields(MapOptions) if each.name not in without]
 
-        @functools.wraps(command)
-        def run(**given: Any) -> None:
-            taken = {each.name: given.pop(each.name) for each in added}
-            command(**given, reading=MapOptions(**taken))
-
         own = [
             each.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
             for name, each in inspect.signature(command).parameters.items()
             if name != "reading"
         ]
+
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            runs = command
+            if over_floors is not None:
+                ctx = given.pop("ctx")
+                # Here one floor and several part: what people are told of a route, a graph or a
+                # model goes by rooms and doors on one map, by floors and links over several.
+                is_building = extension("formats", "building").is_building_file(given["map_file"])
+                runs = over_floors() if is_building else command
+                known = {*inspect.signature(runs).parameters, *reads} if is_building else alone
+                _check_options(ctx, known, is_building=is_building)
+            taken = {each.name: given.pop(each.name) for each in added}
+            named = inspect.signature(runs).parameters
+            runs(
+                **{name: value for name, value in given.items() if name in named},
+                reading=MapOptions(**taken),
+            )
+
         shared = [
             inspect.Parameter(
                 each.name,
@@ -113,6 +144,9 @@ def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable
             )
             for each in added
         ]
+        if over_floors is not None:
+            kind = inspect.Parameter.KEYWORD_ONLY
+            own.insert(0, inspect.Parameter("ctx", kind, annotation=typer.Context))
         names = [each.name for each in own]
         at = names.index(before) if before in names else len(names)
         parameters = [*own[:at], *shared, *own[at:]]
@@ -121,6 +155,18 @@ def with_map(*, before: str = "plot", without: tuple[str, ...] = ()) -> Callable
         return run
 
     return decorate
+
+
+def _check_options(ctx: typer.Context, names: Collection[str], *, is_building: bool) -> None:
+    """Refuse options for a building that are none of `names`, or for a map that are some."""
+    one, other = ("one map", "a building") if is_building else ("a building", "one map")
+    for parameter in ctx.command.params:
+        name = parameter.name or ""
+        source = ctx.get_parameter_source(name)
+        is_given = source is not None and source.name != "DEFAULT"
+        if is_given and (name in names) != is_building:
+            option = max(parameter.opts, key=len)
+            raise UsageError(f"{option} is for {one}, and this is {other}: leave it out")
 
 
 def read_preset(source: str) -> Preset:
@@ -234,6 +280,13 @@ def load_model(
 def is_model_file(path: Path) -> bool:
     """Return whether a path names a model, without loading the modules that read it."""
     return path.suffix.lower() == MODEL_SUFFIX
+
+
+def check_model(out: Path) -> None:
+    """Refuse files that can be no models."""
+    if not is_model_file(out):
+        raise UsageError(f"--out must end in {MODEL_SUFFIX}, got '{printable(out)}'")
+    check_writable(out, "--out")
 
 
 def check_room_to_be(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:

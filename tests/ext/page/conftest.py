@@ -10,7 +10,7 @@ pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
 from tests.ext.page.browser import WINDOW, Shown, browsing
-from tests.ext.page.server import building_session_of, folder_in, served, session_of, write_building
+from tests.ext.page.server import building_site_of, folder_in, served, site_of, write_building
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,15 +35,15 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture
 def client(folder: Path) -> Iterator[Client]:
     """A client of a server of the page."""
-    with served(session_of(folder / "four.yaml"), folder) as client:
+    with served(site_of(folder / "four.yaml"), folder) as client:
         yield client
 
 
 @pytest.fixture
 def building(folder: Path) -> Iterator[Client]:
     """A client of a server of a building of two floors."""
-    session = building_session_of(write_building(folder))
-    with served(session, folder) as client:
+    site = building_site_of(write_building(folder))
+    with served(site, folder) as client:
         yield client
 
 

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.ext.page import BuildingSession, Session
+from hybridnav.cli.reading import MapOptions
+from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.app import make_app
-from hybridnav.ext.page.command import building_session
+from hybridnav.ext.page.command import BuildingPage
 from hybridnav.ext.page.connections import make_server
 from hybridnav.ext.page.rooms_file import RoomsFile
 
@@ -110,6 +111,11 @@ def session_of(file: Path) -> Session:
     return Session(model, topology, settings, file=RoomsFile(file.parent, "rooms.yaml"))
 
 
+def site_of(file: Path) -> Site:
+    """Return what the command would show of a map."""
+    return Site.of_map(session_of(file))
+
+
 @dataclass(frozen=True)
 class Answer:
     """What the server answered."""
@@ -130,7 +136,7 @@ class Client:
 
     port: int
     session: Any
-    """What it shows."""
+    """The lowest floor that it shows."""
 
     @property
     def address(self) -> str:
@@ -164,25 +170,35 @@ class Client:
         return self.send("POST", f"/{TOKEN}/{name}", json.dumps(value).encode(), kind | headers)
 
 
-def building_session_of(file: Path) -> BuildingSession:
+def building_page(file: Path, robot_radius_m: float | None = 0.2) -> BuildingPage:
+    """Return what the command makes a page of a building of."""
+    return BuildingPage(file, MapOptions(robot_radius_m=robot_radius_m, max_cells=10**6))
+
+
+def building_site_of(file: Path) -> Site:
     """Return what the command would show of a building."""
-    given = {"map_file": file, "preset": None, "overrides": None}
-    return building_session(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+    return building_page(file).make(lambda _: None)
+
+
+def query_of(start: list[float], goal: list[float]) -> dict[str, Any]:
+    """Return a query between two points of a map."""
+    ends = {"start": {"floor": 0, "point": start}, "goal": {"floor": 0, "point": goal}}
+    return {**ends, "preset": "shortest"}
 
 
 @contextmanager
-def served(session: Any, folder: Path) -> Iterator[Client]:
-    """Serve a session until the end of the block."""
+def served(shown: Any, folder: Path) -> Iterator[Client]:
+    """Serve a site until the end of the block."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen()
         port = listening.getsockname()[1]
-        app = make_app(session, token=TOKEN, port=port, folder=folder)
+        app = make_app(shown, token=TOKEN, port=port, folder=folder)
         server = make_server(app)
         thread = threading.Thread(target=lambda: server.run(sockets=[listening]), daemon=True)
         thread.start()
         try:
-            yield Client(port, session)
+            yield Client(port, next(iter(getattr(shown, "sessions", ())), None))
         finally:
             server.should_exit = True
             thread.join(20)

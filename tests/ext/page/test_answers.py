@@ -12,17 +12,18 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.ext.page.tiles import Layer, map_layer, palette
+from tests.ext.page.server import query_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.ext.page.server import Client
 
-QUERY = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 
 
 def test_the_map_is_described(client: Client) -> None:
-    found = client.get("map.json").value
+    found = client.get("floor/0/map.json").value
     assert (found["rows"], found["cols"], found["resolution_m"]) == (48, 80, 0.25)
     assert [room["name"] for room in found["rooms"]["rooms"]] == ["a", "b", "c", "d"]
     assert found["presets"][0] == "shortest"
@@ -31,7 +32,7 @@ def test_the_map_is_described(client: Client) -> None:
 
 
 def test_a_tile_has_the_colour_of_every_cell(client: Client) -> None:
-    answer = client.get("tile/map/0/0/0.png?theme=light")
+    answer = client.get("floor/0/tile/map/0/0/0.png?theme=light")
     assert (answer.code, answer.headers["content-type"]) == (200, "image/png")
     pixels = np.asarray(Image.open(io.BytesIO(answer.body)).convert("RGB"))
     grid = client.session.grid
@@ -74,12 +75,12 @@ def test_unexplored_cells_have_a_colour_of_their_own() -> None:
 @pytest.mark.parametrize("level", ["0", "3", "rooms"])
 def test_levels_and_rooms_are_layers(client: Client, level: str) -> None:
     name = level if level == "rooms" else f"level-{level}"
-    assert client.get(f"tile/{name}/0/0/0.png").body.startswith(b"\x89PNG")
+    assert client.get(f"floor/0/tile/{name}/0/0/0.png").body.startswith(b"\x89PNG")
 
 
 def test_the_graph_has_every_arc_of_the_level(client: Client) -> None:
     level = client.session.planning.topology.level
-    graph = client.get(f"graph/{level.index}.json").value
+    graph = client.get(f"floor/0/graph/{level.index}.json").value
     drawn = sum(len(graph[f"{kind}_arcs"]) for kind in ("free", "rim", "unexplored"))
     assert drawn + len(graph["loops"]) == level.n_arcs
     assert len(graph["free_dots"]) + len(graph["unexplored_dots"]) == level.n_vertices
@@ -96,7 +97,7 @@ def test_a_plan_is_that_of_the_planner(client: Client) -> None:
     assert result.path is not None
     assert found["length_m"] == pytest.approx(result.cost)
     assert (found["gap"], found["lower_bound"]) == (0, pytest.approx(result.lower_bound))
-    rows_and_cols = np.array(found["line"])[:, ::-1]
+    rows_and_cols = np.array(found["parts"][0]["line"])[:, ::-1]
     np.testing.assert_allclose(frame.points_of_grid(rows_and_cols), result.path.points, atol=1e-3)
     assert found["words"] == hn.plan_tour(hn.HybridPlanner(topology), list(ends)).words()
     assert found["legs"][0]["room"] == "a"
@@ -129,9 +130,9 @@ def test_a_closure_makes_a_detour(client: Client, kind: str) -> None:
     what: Any = {
         "doors": passed[0]["door"],
         "rooms": passed[1]["room"],
-        "polygons": [[x, y] for x, y in _square(plan["line"][1])],
+        "polygons": [[x, y] for x, y in _square(plan["parts"][0]["line"][1])],
     }[kind]
-    found = client.post("plan", QUERY | {"closed": {kind: [what]}}).value
+    found = client.post("plan", QUERY | {"closed": {"floors": [{"floor": 0, kind: [what]}]}}).value
     assert found["solved"]
     assert found["length_m"] > plan["length_m"]
 
@@ -142,24 +143,26 @@ def _square(point: list[float]) -> list[tuple[float, float]]:
 
 
 def test_costs_are_an_overlay_of_the_presets_that_have_some(client: Client) -> None:
-    assert client.get("costs/shortest.json").value == {"most": None}
-    assert client.get("tile/costs-shortest/0/0/0.png").code == 422
-    most = client.get("costs/robot.json").value["most"]
+    assert client.get("floor/0/costs/shortest.json").value == {"most": None}
+    assert client.get("floor/0/tile/costs-shortest/0/0/0.png").code == 422
+    most = client.get("floor/0/costs/robot.json").value["most"]
     factors = client.session.planning.planner("robot").costs
     assert factors is not None
     free = client.session.grid.classes == hn.CellClass.FREE
     assert most == pytest.approx(factors.factors[free].max(), abs=1e-3)
-    pixels = np.asarray(Image.open(io.BytesIO(client.get("tile/costs-robot/0/0/0.png").body)))
+    pixels = np.asarray(
+        Image.open(io.BytesIO(client.get("floor/0/tile/costs-robot/0/0/0.png").body))
+    )
     assert (pixels[factors.factors == 1][:, 3] == 0).all()
     assert (pixels[~free][:, 3] == 0).all()
 
 
 def test_files_are_those_of_the_library(client: Client, folder: Path, tmp_path: Path) -> None:
     before = sorted(file.name for file in folder.iterdir())
-    graph = json.loads(client.post("export/nav2", None).body)
+    graph = json.loads(client.post("floor/0/export/nav2", None).body)
     assert graph["type"] == "FeatureCollection"
     for ending in ("csv", "geojson"):
-        content = client.post(f"export/path-{ending}", QUERY).body
+        content = client.post(f"export/path-{ending}", QUERY | {"floor": 0}).body
         file = tmp_path / f"own.{ending}"
         topology = client.session.planning.topology
         ends = topology.grid.frame.points_of_grid([(40.5, 10.5), (10.5, 70.5)]).round(6)

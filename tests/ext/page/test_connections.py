@@ -13,7 +13,7 @@ import pytest
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import connections, serve
-from tests.ext.page.server import TOKEN, folder_in, served, session_of
+from tests.ext.page.server import TOKEN, folder_in, served, site_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,9 +33,9 @@ def client(
     """A server that waits for half a second, and must say nothing."""
     monkeypatch.setattr(connections, "REQUEST_S", 0.5)
     folder = folder_in(tmp_path)
-    with served(session_of(folder / "four.yaml"), folder) as client:
+    with served(site_of(folder / "four.yaml"), folder) as client:
         yield client
-        assert client.get("rooms.json").code == 200  # it still answers
+        assert client.get("floor/0/rooms.json").code == 200  # it still answers
     assert capfd.readouterr().err == ""
 
 
@@ -63,7 +63,7 @@ def test_the_page_answers_beside_four_hundred_connections_that_wait(
     monkeypatch.setattr(connections, "REQUEST_S", 600.0)
     with ExitStack() as stack:
         made = [stack.enter_context(opened(client, HEAD)) for _ in range(400)]
-        assert client.get("map.json").code == 200
+        assert client.get("floor/0/map.json").code == 200
         still = [one for one in made if not is_over(one)]
         assert 0 < len(still) <= connections.MOST_CONNECTIONS
         # Those that have waited longest go first.
@@ -100,7 +100,7 @@ def test_a_connection_that_asks_twice_slowly_is_kept(client: Client) -> None:
     with closing(HTTPConnection("127.0.0.1", client.port, timeout=PATIENCE_S)) as kept:
         ports = set()
         for _ in range(3):
-            kept.request("GET", f"/{TOKEN}/rooms.json")
+            kept.request("GET", f"/{TOKEN}/floor/0/rooms.json")
             ports.add(kept.sock.getsockname())
             assert json.loads(kept.getresponse().read())["rooms"]
             time.sleep(0.7)  # longer than a request may take
@@ -108,6 +108,6 @@ def test_a_connection_that_asks_twice_slowly_is_kept(client: Client) -> None:
 
 
 def test_a_port_that_is_none_is_refused(tmp_path: Path) -> None:
-    session = session_of(folder_in(tmp_path) / "four.yaml")
+    site = site_of(folder_in(tmp_path) / "four.yaml")
     with pytest.raises(InvalidValueError, match="port 70000 cannot be used: expected one from 0"):
-        serve(session, tmp_path, port=70_000)
+        serve(site, tmp_path, port=70_000)

@@ -15,6 +15,7 @@ from PIL import Image
 
 import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown
+from tests.ext.page.server import query_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,12 +23,18 @@ if TYPE_CHECKING:
 
     from tests.ext.page.server import Client
 
-QUERY = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 KINDS = ("path-geojson", "path-csv", "nav2", "rooms", "model")
 
 
+def _request(kind: str) -> tuple[str, Any]:
+    """Return the address of a file, and what is sent to it."""
+    above = "floor/0/" if kind in {"nav2", "rooms"} else ""
+    return f"{above}export/{kind}", QUERY | {"floor": 0} if kind.startswith("path") else None
+
+
 def test_rooms_as_geojson_are_the_rooms(client: Client) -> None:
-    found = json.loads(client.post("export/rooms", None).body)
+    found = json.loads(client.post("floor/0/export/rooms", None).body)
     grid, labels = client.session.grid, client.session.rooms
     areas = {
         each["properties"]["room"]: shapely.geometry.shape(each["geometry"])
@@ -54,20 +61,20 @@ def test_a_full_disk_is_one_line(
     client: Client, folder: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = sorted(file.name for file in folder.iterdir())
-    value = QUERY if kind.startswith("path") else None
+    name, value = _request(kind)
 
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
         patch.setattr("hybridnav._base.files._write", full)
-        answer = client.post(f"export/{kind}", value)
+        answer = client.post(name, value)
     assert answer.code == 507
     assert "No space left" in answer.value["error"]
     assert answer.value["error"].isprintable()
     assert str(folder) not in answer.value["error"]
     assert sorted(file.name for file in folder.iterdir()) == before
-    assert client.post(f"export/{kind}", value).code == 200
+    assert client.post(name, value).code == 200
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -78,7 +85,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr("tempfile._os.mkdir", refused)
-    answer = client.post(f"export/{kind}", QUERY if kind.startswith("path") else None)
+    answer = client.post(*_request(kind))
     assert answer.code == 507
     assert "the folder maps takes no files: Read-only file system" in answer.value["error"]
     assert answer.value["error"].isprintable()

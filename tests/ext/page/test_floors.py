@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from tests.ext.page.server import building_session_of, served, session_of, write_building
+from tests.ext.page.server import building_site_of, served, session_of, write_building
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -145,7 +145,7 @@ def test_rooms_outside_the_folder_are_not_saved(folder: Path) -> None:
     text = file.read_text("utf-8").replace("more/rooms-2.yaml", "../rooms-2.yaml")
     file.write_text(text, encoding="utf-8")
     before = outside.read_bytes()
-    with served(building_session_of(file), folder) as client:
+    with served(building_site_of(file), folder) as client:
         assert client.get("floor/0/map.json").value["can_save"] is True
         assert client.get("floor/1/map.json").value["can_save"] is False
         assert "rooms: FILE" in client.get("floor/1/map.json").value["no_file"]
@@ -158,21 +158,21 @@ def test_rooms_outside_the_folder_are_not_saved(folder: Path) -> None:
 def test_floors_of_one_map_share_their_rooms(folder: Path) -> None:
     planner = session_of(folder / "four.yaml").planning.planner("shortest")
     floors = [hn.Floor(name, planner) for name in ("1", "2")]
-    from hybridnav.ext.page import BuildingSession
+    from hybridnav.ext.page import Site
 
-    with served(BuildingSession(hn.Building(floors), "twice"), folder) as client:
+    with served(Site.of_building(hn.Building(floors), "twice"), folder) as client:
         change = {"op": "rename", "room": "a", "name": "kitchen"}
         assert client.post("floor/0/edit", {"version": 0, "change": change}).code == 200
         assert client.get("floor/1/rooms.json").value["rooms"][0]["name"] == "kitchen"
 
 
 def test_a_floor_without_rooms_gets_those_that_are_found(folder: Path) -> None:
-    from hybridnav.ext.page import BuildingSession
+    from hybridnav.ext.page import Site
 
     grid = hn.load(folder / "four.yaml", robot_radius_m=0.2).grid
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
     building = hn.Building([hn.Floor("1", planner)])
-    with served(BuildingSession(building, "bare"), folder) as client:
+    with served(Site.of_building(building, "bare"), folder) as client:
         found = client.get("floor/0/rooms.json").value["rooms"]
         assert [room["name"] for room in found] == list(hn.find_rooms(grid).names)
         end = {"floor": 0, "point": [20.5, 40.5]}
@@ -208,7 +208,7 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
     model, out = tmp_path / "building.hnm", tmp_path / "changed.hnm"
     hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
     before = sorted(tmp_path.iterdir())
-    with served(building_session_of(model), tmp_path) as client:
+    with served(building_site_of(model), tmp_path) as client:
         found = client.get("floor/1/map.json").value
         assert found["can_save"] is False
         assert "Export the model" in found["no_file"]

@@ -117,7 +117,7 @@ def test_classes_of_cells_have_their_colours_in_both_themes(shown: Shown, theme:
 def test_closures_make_detours_and_are_taken_back(shown: Shown, client: Client) -> None:
     _planned(shown)
     before = shown.length_m
-    doors = client.get("rooms.json").value["doors"]
+    doors = client.get("floor/0/rooms.json").value["doors"]
     passed = next(door for door in doors if f"a → door {door['number']} " in shown.text("#way"))
     shown.mode("close")
     shown.click(*passed["at"])
@@ -194,7 +194,7 @@ def test_a_corner_of_a_room_is_moved(shown: Shown, client: Client) -> None:
     shown.click(20, 40)
     shown.wait("document.getElementById('room-name').value === 'a'")
     shown.page.click("#corners")
-    ring = client.get("outlines.json").value["rings"][0][0]
+    ring = client.get("floor/0/outlines.json").value["rings"][0][0]
     x, y = min(ring)
     shown.wait_corner(x, y)
     before = client.session.planning.topology.rooms.areas_m2[0]

@@ -74,7 +74,7 @@ def test_a_level_of_too_many_vertices_says_so_until_another_is_chosen(
     shown: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("hybridnav.ext.page.graph.MOST_VERTICES", 100)
-    assert client.get("graph/0.json").value["drawn"] is False
+    assert client.get("floor/0/graph/0.json").value["drawn"] is False
     shown.page.select_option("#colours", "level")
     shown.page.check("#show-graph")
     shown.page.fill("#level", "0")
@@ -190,7 +190,7 @@ def test_a_dead_server_is_said_after_a_drag(shown: Shown, client: Client) -> Non
     shown.click(20, 40)
     shown.wait("document.getElementById('room-name').value === 'a'")
     shown.page.click("#corners")
-    corner = min(client.get("outlines.json").value["rings"][0][0])
+    corner = min(client.get("floor/0/outlines.json").value["rings"][0][0])
     shown.wait_corner(*corner)
     shown.page.route("**/*", lambda route: route.abort())
     x, y = shown.at(*corner)
@@ -238,7 +238,7 @@ def test_all_is_done_by_the_keyboard_alone(shown: Shown, client: Client) -> None
     go("Enter")
     shown.page.focus("#map")
     area = client.session.planning.topology.rooms.areas_m2[3]
-    ring = client.get("outlines.json").value["rings"][3][0]
+    ring = client.get("floor/0/outlines.json").value["rings"][3][0]
     x, y = max(ring)
     shown.wait_painted()
     shown.wait_corner(x, y)

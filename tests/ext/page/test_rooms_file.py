@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 def _rename(client: Client, version: int, room: str, name: str) -> Any:
     change = {"op": "rename", "room": room, "name": name}
-    return client.post("edit", {"version": version, "change": change})
+    return client.post("floor/0/edit", {"version": version, "change": change})
 
 
 def test_saved_rooms_are_those_of_the_page(client: Client, folder: Path) -> None:
     assert _rename(client, 0, "a", "kitchen").value["unsaved"] == 1
     assert (folder / ".rooms.yaml.edits").exists()
-    found = client.post("save", {"version": 1}).value
+    found = client.post("floor/0/save", {"version": 1}).value
     assert (found["unsaved"], found["notice"]) == (0, "saved to rooms.yaml")
     read = hn.load_rooms(folder / "rooms.yaml", client.session.grid)
     grid, shown = client.session.grid, client.session.rooms
@@ -48,21 +48,23 @@ def test_saved_rooms_are_those_of_the_page(client: Client, folder: Path) -> None
 def test_of_two_tabs_the_later_one_is_told(client: Client) -> None:
     assert _rename(client, 0, "a", "kitchen").code == 200
     assert _rename(client, 0, "b", "hall").code == 409
-    assert client.post("undo", {"version": 0}).code == 409
-    assert client.post("save", {"version": 0}).code == 409
+    assert client.post("floor/0/undo", {"version": 0}).code == 409
+    assert client.post("floor/0/save", {"version": 0}).code == 409
     assert _rename(client, 1, "b", "hall").code == 200
     assert list(client.session.rooms.names) == ["kitchen", "hall", "c", "d"]
 
 
 def test_undo_goes_back_change_by_change(client: Client) -> None:
     _rename(client, 0, "a", "kitchen")
-    client.post("edit", {"version": 1, "change": {"op": "merge", "room": "c", "other": "d"}})
+    client.post(
+        "floor/0/edit", {"version": 1, "change": {"op": "merge", "room": "c", "other": "d"}}
+    )
     assert list(client.session.rooms.names) == ["kitchen", "b", "c"]
-    client.post("undo", {"version": 2})
+    client.post("floor/0/undo", {"version": 2})
     assert list(client.session.rooms.names) == ["kitchen", "b", "c", "d"]
-    client.post("undo", {"version": 3})
+    client.post("floor/0/undo", {"version": 3})
     assert list(client.session.rooms.names) == ["a", "b", "c", "d"]
-    assert client.post("undo", {"version": 4}).code == 422
+    assert client.post("floor/0/undo", {"version": 4}).code == 422
 
 
 def test_a_file_that_others_changed_is_not_written_over_unasked(
@@ -71,10 +73,10 @@ def test_a_file_that_others_changed_is_not_written_over_unasked(
     _rename(client, 0, "a", "kitchen")
     text = (folder / "rooms.yaml").read_text(encoding="utf-8").replace("name: d", "name: attic")
     (folder / "rooms.yaml").write_text(text, encoding="utf-8")
-    refused = client.post("save", {"version": 1})
+    refused = client.post("floor/0/save", {"version": 1})
     assert (refused.code, "changed by another program" in refused.value["error"]) == (409, True)
     assert (folder / "rooms.yaml").read_text(encoding="utf-8") == text
-    assert client.post("save", {"version": 1, "replace": True}).code == 200
+    assert client.post("floor/0/save", {"version": 1, "replace": True}).code == 200
 
 
 def test_a_full_disk_loses_neither_the_file_nor_the_names(
@@ -88,11 +90,11 @@ def test_a_full_disk_loses_neither_the_file_nor_the_names(
     monkeypatch.setattr("hybridnav._base.files._write", full)
     found = _rename(client, 0, "a", "kitchen")
     assert (found.code, "No space left" in found.value["notice"]) == (200, True)
-    assert client.post("save", {"version": 1}).code == 507
+    assert client.post("floor/0/save", {"version": 1}).code == 507
     assert list(client.session.rooms.names) == ["kitchen", "b", "c", "d"]
     assert (folder / "rooms.yaml").read_bytes() == before
     monkeypatch.undo()
-    assert client.post("save", {"version": 1}).code == 200
+    assert client.post("floor/0/save", {"version": 1}).code == 200
     assert "kitchen" in (folder / "rooms.yaml").read_text(encoding="utf-8")
 
 
@@ -122,7 +124,7 @@ def test_a_killed_server_loses_no_names(folder: Path) -> None:
             host, token = address.removeprefix("http://").rstrip("/").split("/")
             _wait_until_ready(host, token)
             body = b'{"version": 0, "change": {"op": "rename", "room": "a", "name": "kitchen"}}'
-            assert _asked(host, "POST", f"/{token}/edit", body)[0] == 200
+            assert _asked(host, "POST", f"/{token}/floor/0/edit", body)[0] == 200
         finally:
             server.send_signal(signal.SIGKILL)
     session = session_of(folder / "four.yaml")
@@ -153,7 +155,10 @@ def test_a_link_made_later_is_not_followed_either(client: Client, folder: Path) 
     (folder / "rooms.yaml").unlink()
     (folder / "rooms.yaml").symlink_to(victim)
     (folder / ".rooms.yaml.edits").symlink_to(victim)
-    codes = [_rename(client, 0, "a", "kitchen").code, client.post("save", {"version": 0}).code]
+    codes = [
+        _rename(client, 0, "a", "kitchen").code,
+        client.post("floor/0/save", {"version": 0}).code,
+    ]
     assert all(code >= 400 for code in codes)
     assert victim.read_text(encoding="utf-8") == "precious"
 
@@ -203,11 +208,11 @@ def test_a_second_save_writes_over_only_what_the_first_told_of(
     _rename(client, 0, "a", "kitchen")
     text = changed_by_others("d1")
     # A conflict of another kind has told nobody of the file.
-    assert client.post("save", {"version": 0}).code == 409
-    assert client.post("save", {"version": 1, "replace": True}).code == 409
+    assert client.post("floor/0/save", {"version": 0}).code == 409
+    assert client.post("floor/0/save", {"version": 1, "replace": True}).code == 409
     assert file.read_text(encoding="utf-8") == text
     text = changed_by_others("d1x")
-    assert client.post("save", {"version": 1, "replace": True}).code == 409
+    assert client.post("floor/0/save", {"version": 1, "replace": True}).code == 409
     assert file.read_text(encoding="utf-8") == text
-    assert client.post("save", {"version": 1, "replace": True}).code == 200
+    assert client.post("floor/0/save", {"version": 1, "replace": True}).code == 200
     assert "kitchen" in file.read_text(encoding="utf-8")

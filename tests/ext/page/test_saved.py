@@ -33,7 +33,12 @@ def test_the_file_holds_the_map_the_rooms_and_the_routes(cli: Any, folder: Path)
     assert (done.code, done.err) == (0, "")
     assert "2 routes" in done.out
     data = _data(out)
-    assert [room["name"] for room in data["map"]["rooms"]["rooms"]] == ["a", "b", "c", "d"]
+    assert [room["name"] for room in data["floors"][0]["map"]["rooms"]["rooms"]] == [
+        "a",
+        "b",
+        "c",
+        "d",
+    ]
     planned = [
         cli("plan", folder / "four.yaml", "--robot-radius", 0.2, *ends, "--json").answer
         for ends in (
@@ -58,7 +63,7 @@ def test_a_name_cannot_end_the_script(cli: Any, folder: Path) -> None:
     text = rooms.read_text("utf-8").replace("name: a", "name: </script><b>")
     rooms.write_text(text, encoding="utf-8")
     _, out = _save(cli, folder)
-    assert _data(out)["map"]["rooms"]["rooms"][0]["name"] == "</script><b>"
+    assert _data(out)["floors"][0]["map"]["rooms"]["rooms"][0]["name"] == "</script><b>"
 
 
 @pytest.mark.parametrize(
@@ -110,7 +115,7 @@ def test_the_whole_map_stays_in_view_when_the_window_changes(cli: Any, folder: P
     phone = {"width": 390, "height": 844}
     with browsing() as browser:
         _, out = _save(cli, folder)
-        known = _data(out)["map"]["known"]
+        known = _data(out)["floors"][0]["map"]["known"]
         shown = Shown(browser.new_context(viewport={"width": 1280, "height": 800}), out.as_uri())
         shown.page.set_viewport_size(phone)
         shown.wait("document.getElementById('map').clientWidth === 390")

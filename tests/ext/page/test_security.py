@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.ext.page.server import TOKEN, folder_in, served, session_of
+from tests.ext.page.server import (
+    TOKEN,
+    building_site_of,
+    folder_in,
+    query_of,
+    served,
+    site_of,
+    write_building,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,19 +24,22 @@ if TYPE_CHECKING:
 
     from tests.ext.page.server import Client
 
-QUERY = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a map, with another file above it that nothing may touch."""
-    return folder_in(tmp_path_factory.mktemp("hostile"))
+    """The folder of a building and its maps, with another file above it that nothing may touch."""
+    folder = folder_in(tmp_path_factory.mktemp("hostile"))
+    write_building(folder)
+    return folder
 
 
-@pytest.fixture(scope="module")
-def client(folder: Path) -> Iterator[Client]:
-    """One server for all hostile requests: none may change anything."""
-    with served(session_of(folder / "four.yaml"), folder) as client:
+@pytest.fixture(scope="module", params=["four.yaml", "building.yaml"])
+def client(folder: Path, request: pytest.FixtureRequest) -> Iterator[Client]:
+    """One server for all hostile requests to a map or a building: none may change anything."""
+    made = site_of if request.param == "four.yaml" else building_site_of
+    with served(made(folder / request.param), folder) as client:
         yield client
 
 
@@ -41,7 +52,7 @@ def _nothing_changes(folder: Path, client: Client) -> Any:
 
     before = files()
     yield
-    assert client.get("rooms.json").code == 200  # it still answers
+    assert client.get("floor/0/rooms.json").code == 200  # it still answers
     assert files() == before
 
 
@@ -56,6 +67,8 @@ def _nothing_changes(folder: Path, client: Client) -> Any:
         f"/{TOKEN.upper()}/map.json",
         f"//{TOKEN}/map.json",
         f"/{TOKEN}x/map.json",
+        "/floor/0/map.json",
+        f"/{TOKEN[:-1]}/floor/0/map.json",
     ],
 )
 def test_without_the_token_nothing_is_answered(client: Client, path: str) -> None:
@@ -96,9 +109,36 @@ def test_without_the_token_nothing_is_answered(client: Client, path: str) -> Non
 def test_paths_upward_and_numbers_out_of_range_are_refused(client: Client, name: str) -> None:
     from urllib.parse import quote
 
+    if name.startswith(("tile/", "graph/", "costs/")):
+        name = f"floor/0/{name}"
     answer = client.get(quote(name, safe="/%.:\\") if not name.isascii() else name)
     assert 400 <= answer.code < 500
     assert b"secret" not in answer.body or b"error" in answer.body
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("floor/2/map.json", "floor/-1/map.json", "floor/99999999999999999999/map.json"),
+        *("floor/1e0/map.json", "floor/%D9%A1/map.json", "floor//map.json", "floor/map.json"),
+        *("floor/../../secret.txt", "floor/..%2f..%2fsecret.txt/map.json", "floor/0%00/map.json"),
+        *("floor/2/tile/map/0/0/0.png", "floor/0/tile/map/0/9/0.png", "floor/+1/rooms.json"),
+        *("floor/0/../1/../../../secret.txt", "floor/0/graph/-1.json", "tile/map/0/0/0.png"),
+        "rooms.json",
+    ],
+)
+def test_floors_that_are_none_are_refused(client: Client, name: str) -> None:
+    answer = client.get(name)
+    assert 400 <= answer.code < 500
+    assert b"secret" not in answer.body or b"error" in answer.body
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [("nav2", None), ("rooms", None), ("../x", None), ("path-csv", None), ("path-csv", QUERY)],
+)
+def test_files_that_a_site_has_not_are_refused(client: Client, kind: str, value: Any) -> None:
+    assert 400 <= client.post(f"export/{kind}", value).code < 500
 
 
 @pytest.mark.parametrize(
@@ -119,9 +159,11 @@ def test_foreign_origins_and_hosts_are_refused(
     client: Client, headers: dict[str, str], method: str
 ) -> None:
     if method == "GET":
-        assert client.get("map.json", **headers).code == 403
+        for name in ("map.json", "floor/0/map.json"):
+            assert client.get(name, **headers).code == 403
     else:
-        assert client.post("save", {"version": 0}, **headers).code == 403
+        assert client.post("plan", QUERY, **headers).code == 403
+        assert client.post("floor/0/save", {"version": 0}, **headers).code == 403
 
 
 def test_its_own_origin_is_welcome(client: Client) -> None:
@@ -132,43 +174,61 @@ def test_its_own_origin_is_welcome(client: Client) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"start": [1e300, 0]},
-        {"start": [math.inf, 0]},
-        {"start": [math.nan, 0]},
-        {"start": [10**400, 0]},
-        {"start": ["1", "2"]},
-        {"start": [True, False]},
-        {"start": [1, 2, 3]},
+        {"start": {"floor": 0, "point": [1e300, 0]}},
+        {"start": {"floor": 0, "point": [math.inf, 0]}},
+        {"start": {"floor": 0, "point": [math.nan, 0]}},
+        {"start": {"floor": 0, "point": [10**400, 0]}},
+        {"start": {"floor": 0, "point": ["1", "2"]}},
+        {"start": {"floor": 0, "point": [True, False]}},
+        {"start": {"floor": 0, "point": [1, 2, 3]}},
         {"start": None},
         {"start": {"x": 1}},
+        {"start": [1, 1]},
+        {"start": {"floor": 2, "point": [1, 1]}},
+        {"start": {"floor": 10**30, "point": [1, 1]}},
+        {"start": {"floor": -1, "point": [1, 1]}},
+        {"start": {"floor": "0", "point": [1, 1]}},
+        {"start": {"floor": True, "point": [1, 1]}},
+        {"start": {"floor": 0.0, "point": [1, 1]}},
+        {"start": {"floor": 0}},
+        {"goal": None},
+        {"stairs": 1},
         {"preset": "../planners/shortest"},
         {"preset": "/etc/passwd"},
         {"preset": "no-such-preset"},
         {"preset": 1},
-        {"closed": {"doors": [10**30]}},
-        {"closed": {"doors": ["1"]}},
-        {"closed": {"doors": [999999]}},
-        {"closed": {"rooms": ["no such room"]}},
-        {"closed": {"rooms": [["a"]]}},
-        {"closed": {"polygons": [[[0, 0], [1, 1]]]}},
-        {"closed": {"polygons": [[[0, 0], [9, 9], [9, 0], [0, 9]]]}},
-        {"closed": {"polygons": [[[0, 0]] * 1001]}},
-        {"closed": {"files": ["/etc/passwd"]}},
+        {"closed": {"floors": [{"floor": 0, "doors": [10**30]}]}},
+        {"closed": {"floors": [{"floor": 0, "doors": ["1"]}]}},
+        {"closed": {"floors": [{"floor": 0, "doors": [999999]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["no such room"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": [["a"]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0], [1, 1]]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0], [9, 9], [9, 0], [0, 9]]]}]}},
+        {"closed": {"floors": [{"floor": 0, "polygons": [[[0, 0]] * 1001]}]}},
+        {"closed": {"floors": [{"floor": 0, "files": ["/etc/passwd"]}]}},
+        {"closed": {"doors": [1]}},
+        {"closed": {"links": ["no such link"]}},
+        {"closed": {"links": "lift"}},
+        {"closed": {"links": [1]}},
+        {"closed": {"floors": [{"floor": 7, "rooms": ["a"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["e"]}]}},
+        {"closed": {"floors": [{"floor": 0, "rooms": ["a"]}] * 2}},
         {"more": 1},
     ],
 )
 def test_wrong_types_and_huge_numbers_are_refused(client: Client, change: dict[str, Any]) -> None:
     for name in ("plan", "optimum", "alternatives", "export/path-csv"):
-        answer = client.post(name, QUERY | change)
+        floor = {"floor": 0} if name.startswith("export") else {}
+        answer = client.post(name, QUERY | floor | change)
         if name == "optimum" and change.get("preset") == "no-such-preset":
             continue  # it has a preset of its own
         assert answer.code == 422
         assert answer.value["error"]
-        assert "\n" not in answer.value["error"]
+        assert answer.value["error"].isprintable()
 
 
 @pytest.mark.parametrize("value", [None, [], 1, "plan", {}, {"version": 0}, {"version": -1}])
-@pytest.mark.parametrize("name", ["plan", "alternatives", "edit", "at"])
+@pytest.mark.parametrize("name", ["plan", "alternatives", "floor/0/edit", "floor/0/at"])
 def test_what_is_no_request_is_refused(client: Client, name: str, value: Any) -> None:
     assert client.post(name, value).code == 422
 
@@ -194,7 +254,7 @@ def test_what_is_no_request_is_refused(client: Client, name: str, value: Any) ->
     ],
 )
 def test_changes_that_are_none_are_refused(client: Client, change: dict[str, Any]) -> None:
-    answer = client.post("edit", {"version": 0, "change": change})
+    answer = client.post("floor/0/edit", {"version": 0, "change": change})
     assert answer.code == 422
     assert client.session.rooms.names == ("a", "b", "c", "d")
 
@@ -219,7 +279,7 @@ def test_bodies_that_are_no_json_are_refused(
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])
 def test_other_methods_are_refused(client: Client, method: str) -> None:
-    assert client.send(method, f"/{TOKEN}/save").code in {403, 405}
+    assert client.send(method, f"/{TOKEN}/floor/0/save").code in {403, 405}
 
 
 def test_answers_may_not_be_framed_sniffed_or_reached_from_elsewhere(client: Client) -> None:

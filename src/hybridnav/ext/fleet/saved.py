@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor, Known
-from hybridnav.ext.fleet.links import LinkKind  # noqa: TC001 - pydantic reads it
+from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
 from hybridnav.planner.saved.container import buffers_of
 from hybridnav.planner.saved.parts import plain
 from hybridnav.planner.saved.structures import BUILDING, FLOOR
@@ -18,7 +18,6 @@ from hybridnav.planner.saved.structures import BUILDING, FLOOR
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from hybridnav.ext.fleet.links import Link
     from hybridnav.planner import HybridPlanner
     from hybridnav.planner.saved.container import Part
 
@@ -36,30 +35,12 @@ class _FloorValues(_Values):
     map: Annotated[int, Field(ge=0, lt=_MOST_MAPS)]
 
 
-class _EndValues(_Values):
-    floor: str
-    position_m: tuple[float, float]
-    yaw_rad: float | None
-
-
-class LinkValues(_Values):
-    """A link, as a model states it."""
-
-    name: str
-    kind: LinkKind
-    ends: Annotated[list[_EndValues], Field(max_length=10_000)]
-    wait_s: float
-    ride_s: float
-    cost_m: float
-    max_radius_m: float
-
-
 class BuildingValues(_Values):
     """A building, as a model states it."""
 
     speed_m_s: float
     floors: Annotated[list[_FloorValues], Field(min_length=1, max_length=10_000)]
-    links: Annotated[list[LinkValues], Field(max_length=10_000)]
+    links: Annotated[list[Link], Field(max_length=10_000)]
 
 
 def building_parts(  # noqa: PLR0913 - a building, taken apart

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,12 +21,7 @@ from hybridnav.cli.options import (
     RoomsOption,
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
-from hybridnav.ext.fleet.command import (
-    BuildingSource,
-    check_options,
-    is_building_file,
-    refused_options,
-)
+from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.findings_text import (
     FAIL_ON,
     SHOWN,
@@ -45,25 +40,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraphCheck, BuildingGraphReport
     from hybridnav.ext.graphs import Finding, GraphCheck
 
-
-CHECK_OPTIONS = frozenset(
-    {
-        *(
-            "map_file",
-            "graph_file",
-            "out",
-            "ignore",
-            "fail_on",
-            "preset",
-            "robot_radius_m",
-            "max_cells",
-        ),
-        *("align", "match", "pairs", "no_stairs", "as_json"),
-    }
-)
-"""Parameters of `hybridnav check` that mean something for a building."""
-ONLY_BUILDINGS = frozenset({"align", "match", "pairs", "no_stairs"})
-"""Those that mean nothing for one map."""
 
 AlignOption = Annotated[
     bool,
@@ -96,61 +72,54 @@ NoStairsOption = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class BuildingOptions:
-    """What `hybridnav check` takes for buildings alone."""
-
-    align: bool
-    match: Sequence[str]
-    pairs: int
-    stairs: bool
-
-
-def check_building(given: Mapping[str, Any], how: BuildingOptions) -> bool:
-    """Check the graph of a building, print a summary, and return whether that is a failure.
-
-    Parameters
-    ----------
-    given
-        The values of the parameters of `hybridnav check` by their names.
-    how
-        Those for buildings alone.
-    """
+def _check_over_floors(
+    *,
+    map_file: Path,
+    graph_file: Path,
+    out: Path | None,
+    ignore: list[str] | None,
+    fail_on: str,
+    align: bool,
+    match: list[str] | None,
+    pairs: int,
+    no_stairs: bool,
+    as_json: bool,
+    reading: MapOptions,
+) -> None:
+    """Check the graph of a building, and print a summary; see `check`."""
     from hybridnav.ext.fleet import check_building_graph, judge_building_graph, match_graph  # noqa: PLC0415 - on demand
     from hybridnav.ext.fleet.link_nodes import SAME_POINT_M  # noqa: PLC0415
+    from hybridnav.ext.graphs import BUILDING_KINDS, KINDS  # noqa: PLC0415
 
+    _check_given(ignore, KINDS | BUILDING_KINDS, fail_on, out)
     seconds: dict[str, float] = {}
-    file = given["graph_file"]
-    names = _names_of(how.match)
-    with stage(f"reading {file}", seconds, "graph"):
-        graph = hn.load_building_graph(file)
-    building = BuildingSource.of({**given, "overrides": ()}).load(seconds)
+    names = _names_of(match or ())
+    with stage(f"reading {graph_file}", seconds, "graph"):
+        graph = hn.load_building_graph(graph_file)
+    building = load_floors(map_file, reading, seconds)
     with stage("checking", seconds, "check"):
-        matched = match_graph(building, graph, floors=names, align=how.align)
+        matched = match_graph(building, graph, floors=names, align=align)
         found = check_building_graph(matched)
     report = None
-    if how.pairs:
+    if pairs:
         with stage("comparing routes", seconds, "routes"):
-            report = judge_building_graph(matched, pairs=how.pairs, stairs=how.stairs)
-    ignored = given["ignore"] or ()
-    if given["as_json"]:
-        figures = _building_check_figures(found, report, ignored) | {"seconds": seconds}
-        answer(json.dumps(figures, allow_nan=False) + "\n")
-    else:
-        lines = _building_check_summary(found, report, ignored)
-        if not how.align and matched.away_m > SAME_POINT_M:
-            away = f"links stop up to {matched.away_m:.2f} m from those of the building"
-            lines.append(f"hint       {away}: --align, if floors have other frames than their maps")
-        lines.append(f"seconds    {timings(seconds)}")
-        answer("\n".join(lines) + "\n")
-    if given["out"] is not None:
-        from hybridnav.ext.graphs.page import render_building_check  # noqa: PLC0415 - on demand
+            report = judge_building_graph(matched, pairs=pairs, stairs=not no_stairs)
+    from hybridnav.ext.graphs.page import building_facts, render_building_check  # noqa: PLC0415
 
-        write_page(render_building_check(found, report), given["out"])
+    cases = () if report is None else report.contradictions
+    whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
+    wrong = _counted(whole, ignore)
+    more = [f"{'' if n else 'routes':<10} {_line(text)}" for n, text in enumerate(cases[:SHOWN])]
+    if not align and matched.away_m > SAME_POINT_M:
+        away = f"links stop up to {matched.away_m:.2f} m from those of the building"
+        more.append(f"hint       {away}: --align, if floors have other frames than their maps")
+    facts = [(name, _line(text)) for name, text in building_facts(found, report)]
+    lines = [*_summary(facts, wrong), *more]
+    _respond(_building_figures(found, report, wrong), lines, seconds, as_json=as_json)
+    if out is not None:
+        write_page(render_building_check(found, report), out)
     # An answer that the building contradicts is an error.
-    is_refuted = report is not None and bool(report.contradictions)
-    level = given["fail_on"]
-    return (is_refuted and level != "never") or fails(_all(_wrong(found, ignored)), level)
+    _end(wrong, fail_on, is_refuted=bool(cases))
 
 
 def _names_of(texts: Sequence[str]) -> dict[str, str]:
@@ -166,51 +135,16 @@ def _names_of(texts: Sequence[str]) -> dict[str, str]:
     return names
 
 
-def _wrong(found: BuildingGraphCheck, ignored: Collection[str]) -> dict[str, list[Finding]]:
-    """Return the findings that count, by the name of their floor; those of the whole by ""."""
-    whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
-    return {
-        name: [each for each in findings if each.kind not in ignored]
-        for name, findings in whole.items()
-    }
-
-
-def _all(wrong: Mapping[str, list[Finding]]) -> list[Finding]:
-    return [each for findings in wrong.values() for each in findings]
-
-
-def _building_check_summary(
-    found: BuildingGraphCheck, report: BuildingGraphReport | None, ignored: Collection[str]
-) -> list[str]:
-    from hybridnav.ext.graphs.page import building_facts  # noqa: PLC0415 - on demand
-
-    lines = [f"{name:<10} {_line(text)}" for name, text in building_facts(found, report)]
-    wrong = _wrong(found, ignored)
-    lines.append(count_line(_all(wrong)))
-    for name, findings in wrong.items():
-        lines += found_lines(findings, f" on floor {name}" if name else "")
-    cases = () if report is None else report.contradictions
-    for number, text in enumerate(cases[:SHOWN]):
-        lines.append(f"{'' if number else 'routes':<10} {_line(text)}")
-    return lines
-
-
-def _building_check_figures(
-    found: BuildingGraphCheck, report: BuildingGraphReport | None, ignored: Collection[str]
+def _building_figures(
+    found: BuildingGraphCheck,
+    report: BuildingGraphReport | None,
+    wrong: Mapping[str, list[Finding]],
 ) -> dict[str, Any]:
-    wrong = _wrong(found, ignored)
     return {
         "graph": found.matched.name,
         "robot_radius_m": found.matched.building.robot_radius_m,
         "floors": {
-            name: {
-                "nodes": check.graph.n_nodes,
-                "edges": check.graph.n_edges,
-                "free_nodes": int(check.is_free.sum()),
-                "clear_edges": int(check.is_clear.sum()),
-                "in_sight": check.in_sight,
-                "findings": found_figures(wrong[name]),
-            }
+            name: _sizes(check) | {"findings": found_figures(wrong[name])}
             for name, check in found.floors.items()
         },
         "links": {
@@ -258,9 +192,13 @@ IgnoreOption = Annotated[
 ]
 
 
-@with_map(before="align")
+@with_map(
+    before="align",
+    over_floors=lambda: _check_over_floors,
+    reads=("preset", "robot_radius_m", "max_cells"),
+    alone=("align", "match", "pairs", "no_stairs"),
+)
 def check(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     graph_file: GraphArgument,
     out: PageOption = None,
@@ -285,20 +223,11 @@ def check(
     Exits with 0 when no error or warning is found, with 1 otherwise (--fail-on), with 2 when it is
     called wrongly, and with 3 when a file cannot be read.
     """
-    check_level(fail_on)
-    check_output(out, "--out", (".html",))
+    from hybridnav.ext.graphs import KINDS  # noqa: PLC0415 - loads numpy
+
+    del align, match, pairs, no_stairs  # of a building
+    _check_given(ignore, KINDS, fail_on, out)
     check_picture(plot)
-    if is_building_file(map_file):
-        _check_kinds(ignore, is_building=True)
-        check_options(refused_options(ctx, CHECK_OPTIONS))
-        how = BuildingOptions(align, match or (), pairs, stairs=not no_stairs)
-        if check_building(ctx.params, how):
-            raise typer.Exit(EXIT_NOT_SOLVED)
-        return
-    _check_kinds(ignore, is_building=False)
-    given = refused_options(ctx, [name for name in ctx.params if name not in ONLY_BUILDINGS])
-    if given:
-        raise UsageError(f"{given[0]} is for a building, and this is one map: leave it out")
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     with stage(f"reading {graph_file}", seconds, "graph"):
@@ -308,51 +237,79 @@ def check(
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)
     with stage("checking", seconds, "check"):
         found = hn.check_graph(topology, graph, along_lines=along_lines)
-    wrong = [each for each in found.findings if each.kind not in (ignore or ())]
-    lines = [*_summary(found, wrong), f"seconds    {timings(seconds)}"]
-    whole = json.dumps(_figures(found, wrong) | {"seconds": seconds}, allow_nan=False)
-    answer((whole if as_json else "\n".join(lines)) + "\n")
-    if out is not None:
-        from hybridnav.ext.graphs.page import render_check  # noqa: PLC0415 - on demand
+    from hybridnav.ext.graphs.page import check_facts, render_check  # noqa: PLC0415 - on demand
 
+    wrong = _counted({"": found.findings}, ignore)
+    facts = [(name, printable(text)) for name, text in check_facts(found)]
+    _respond(_figures(found, wrong[""]), _summary(facts, wrong), seconds, as_json=as_json)
+    if out is not None:
         write_page(render_check(found), out)
     if plot is not None:
         from hybridnav.ext.graphs import plot_graph_check  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
 
         save_figure(plot_graph_check(found), plot)
-    if fails(wrong, fail_on):
-        raise typer.Exit(EXIT_NOT_SOLVED)
+    _end(wrong, fail_on)
 
 
-def _check_kinds(ignored: list[str] | None, *, is_building: bool) -> None:
-    from hybridnav.ext.graphs import BUILDING_KINDS, KINDS  # noqa: PLC0415 - loads numpy
-
-    known = KINDS | BUILDING_KINDS if is_building else KINDS
+def _check_given(
+    ignored: list[str] | None, known: Collection[str], level: str, out: Path | None
+) -> None:
+    check_level(level)
+    check_output(out, "--out", (".html",))
     unknown = [kind for kind in ignored or () if kind not in known]
     if unknown:
         raise UsageError(f"--ignore must be one of {', '.join(known)}, got {unknown[0]!r:.80}")
 
 
-def _summary(found: GraphCheck, wrong: list[Finding]) -> list[str]:
-    from hybridnav.ext.graphs.page import check_facts  # noqa: PLC0415 - on demand
+def _counted(
+    found: Mapping[str, Sequence[Finding]], ignored: list[str] | None
+) -> dict[str, list[Finding]]:
+    """Return the findings that count, by the name of their floor; those of the whole by ""."""
+    return {
+        name: [each for each in findings if each.kind not in (ignored or ())]
+        for name, findings in found.items()
+    }
 
-    lines = [f"{name:<10} {printable(text)}" for name, text in check_facts(found)]
-    return [*lines, count_line(wrong), *found_lines(wrong)]
+
+def _summary(facts: Sequence[tuple[str, str]], wrong: Mapping[str, list[Finding]]) -> list[str]:
+    lines = [f"{name:<10} {text}" for name, text in facts]
+    lines.append(count_line(chain.from_iterable(wrong.values())))
+    for name, findings in wrong.items():
+        lines += found_lines(findings, f" on floor {name}" if name else "")
+    return lines
+
+
+def _respond(
+    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
+) -> None:
+    whole = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    answer((whole if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
+
+
+def _end(wrong: Mapping[str, list[Finding]], level: str, *, is_refuted: bool = False) -> None:
+    """End the command with 1 where something is as bad as a level."""
+    if (is_refuted and level != "never") or fails(chain.from_iterable(wrong.values()), level):
+        raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _sizes(check: GraphCheck) -> dict[str, Any]:
+    return {
+        "nodes": check.graph.n_nodes,
+        "edges": check.graph.n_edges,
+        "free_nodes": int(check.is_free.sum()),
+        "clear_edges": int(check.is_clear.sum()),
+        "in_sight": check.in_sight,
+    }
 
 
 def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
-    graph = found.graph
     return {
-        "graph": graph.name,
-        "format": graph.format,
+        "graph": found.graph.name,
+        "format": found.graph.format,
         "map": found.grid.name,
         "robot_radius_m": found.grid.robot_radius_m,
-        "nodes": graph.n_nodes,
-        "edges": graph.n_edges,
-        "free_nodes": int(found.is_free.sum()),
-        "clear_edges": int(found.is_clear.sum()),
-        "in_sight": found.in_sight,
+        **_sizes(found),
         "doors": {"passed": found.doors[0], "all": found.doors[1]},
         "rooms": {"with_node": found.rooms[0], "all": found.rooms[1]},
         "findings": found_figures(wrong),

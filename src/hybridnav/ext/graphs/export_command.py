@@ -16,8 +16,7 @@ from hybridnav.cli.common import answer, check_output, check_picture, progress_b
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import JsonOption, MapOrBuildingArgument, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
-from hybridnav.ext.fleet.command import check_options, is_building_file, refused_options
-from hybridnav.ext.fleet.export_command import EXPORT_OPTIONS, export_building
+from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     AnchorOption,
@@ -28,6 +27,8 @@ from hybridnav.ext.graphs.fleet_options import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
 
 _ENDINGS = {
@@ -112,9 +113,12 @@ ReportOption = Annotated[
 ]
 
 
-@with_map(before="as_json")
+@with_map(
+    before="as_json",
+    over_floors=lambda: _export_over_floors,
+    reads=("preset", "robot_radius_m", "seed", "max_cells"),
+)
 def export(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     out: OutOption,
     kind: FormatOption = "nav2",
@@ -140,20 +144,14 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    if kind not in _ENDINGS:
-        raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    _check_out(kind, out)
     if polylines and (report is not None or plot is not None or lanes_m is not None):
         raise UsageError(
             "--polylines does not go with --report, --plot and --lanes, which are for straight "
             "edges: leave them out"
         )
-    check_output(out, "--out", _ENDINGS[kind])
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
-    if is_building_file(map_file):
-        check_options(refused_options(ctx, EXPORT_OPTIONS))
-        export_building(fleet, ctx.params | {"spacing_m": _spacing(ctx.params)})
-        return
     if fleet is not None and polylines:
         raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:
@@ -176,14 +174,14 @@ def export(
     if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
             _write_parts(topology, kind, out, frame)
-        answer(_parts_answer(topology, kind, (out, map_file), seconds, as_json=as_json))
+        _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
         return
     began = time.perf_counter()
     with progress_bar("building the graph") as advance:
         graph = hn.build_route_graph(
             topology,
             nodes=nodes,
-            spacing_m=_spacing(ctx.params),
+            spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
             stretch=stretch,
             seed=settings.pyramid.seed,
             progress=advance,
@@ -200,11 +198,9 @@ def export(
             judged = hn.judge_route_graph(graph, pairs=report)
     figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None else {"left_out": list(left_out)}
-    text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
-    lines = _summary(out, written, graph.grid, judged)
-    lines += [f"left out   {printable(each)}" for each in left_out]
-    lines += [*(_ids_line(written) if fleet is None else []), f"seconds    {timings(seconds)}"]
-    answer((text if as_json else "\n".join(lines)) + "\n")
+    lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
+    lines += _ids_line(written) if fleet is None else []
+    _respond(figures, lines, seconds, as_json=as_json)
     if plot is not None:
         from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
@@ -212,11 +208,85 @@ def export(
         save_figure(plot_route_graph(graph), plot)
 
 
-def _spacing(given: dict[str, Any]) -> float:
+def _export_over_floors(
+    *,
+    map_file: Path,
+    out: Path,
+    kind: str,
+    nodes: int | None,
+    spacing_m: float | None,
+    stretch: float,
+    anchor: str | None,
+    vehicles: list[str] | None,
+    no_doors: bool,
+    as_json: bool,
+    reading: MapOptions,
+) -> None:
+    """Write the graph of a building, and print a summary; see `export`."""
+    _check_out(kind, out)
+    fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
+    if fleet is None:
+        raise UsageError(
+            f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
+        )
+    from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
+
+    seconds: dict[str, float] = {}
+    building = load_floors(map_file, reading, seconds)
+    began = time.perf_counter()
+    with progress_bar("building the graphs") as advance:
+        graph = hn.building_graph(
+            building,
+            name=map_file.stem,
+            nodes=nodes,
+            spacing_m=_spacing(spacing_m, is_near=False),
+            stretch=stretch,
+            seed=reading.seed or 0,
+            progress=advance,
+        )
+    seconds["graph"] = round(time.perf_counter() - began, 6)
+    with stage(f"writing {out}", seconds, "write"):
+        left_out = fleet.write_building(align_floors(graph), out)
+    figures = {
+        "graph": str(out),
+        "map": str(map_file),
+        "floors": {
+            floor.name: {"nodes": floor.graph.n_nodes, "edges": floor.graph.n_edges}
+            for floor in graph.floors
+        },
+        "links": [link.name for link in graph.links],
+        "left_out": list(left_out),
+    }
+    lines = [f"graph      {printable(out)}"]
+    for number, floor in enumerate(graph.floors):
+        counts = f"{floor.graph.n_nodes:,} nodes, {floor.graph.n_edges:,} edges"
+        lines.append(f"{'' if number else 'floors':<10} {printable(floor.name)}: {counts}")
+    links = ", ".join(printable(link.name) for link in graph.links) or "none"
+    lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
+    _respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
+
+
+def _respond(
+    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
+) -> None:
+    text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    answer((text if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
+
+
+def _left_out_lines(left_out: Iterable[str]) -> list[str]:
+    return [f"left out   {printable(each)}" for each in left_out]
+
+
+def _check_out(kind: str, out: Path) -> None:
+    """Refuse formats that are none, and files of other ones."""
+    if kind not in _ENDINGS:
+        raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    check_output(out, "--out", _ENDINGS[kind])
+
+
+def _spacing(given_m: float | None, *, is_near: bool) -> float:
     """Return the spacing that is given, or that of the format."""
-    is_near = given["kind"] == "nav2" and given["lanes_m"] is None
-    spacing_m: float | None = given["spacing_m"]
-    return spacing_m if spacing_m is not None else _NEAR_M if is_near else _FAR_M
+    return given_m if given_m is not None else _NEAR_M if is_near else _FAR_M
 
 
 def _check_plain(kind: str, given: dict[str, bool]) -> None:
@@ -249,30 +319,21 @@ def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) 
 
 
 def _parts_answer(
-    topology: hn.TopologicalMap,
-    kind: str,
-    files: tuple[Path, Path],
-    seconds: dict[str, float],
-    *,
-    as_json: bool,
-) -> str:
-    """Return what is printed of rooms or places that were written."""
+    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the figures and lines that are printed of rooms or places that were written."""
     out, map_file = files
     counts = {"places": topology.n_places, "arcs": topology.n_arcs}
     if kind == "rooms":
         doors = len(topology.rooms.listed_doors)
         counts = {"rooms": int(topology.rooms.is_listed.sum()), "doors": doors}
-    if as_json:
-        figures = counts | {"file": str(out), "map": str(map_file), "seconds": seconds}
-        return json.dumps(figures, allow_nan=False) + "\n"
     grid = topology.grid
     counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     lines = [
         f"file       {printable(out)}, {counted}",
         f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
-        f"seconds    {timings(seconds)}",
     ]
-    return "\n".join(lines) + "\n"
+    return counts | {"file": str(out), "map": str(map_file)}, lines
 
 
 def _summary(

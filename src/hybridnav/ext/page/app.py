@@ -13,26 +13,21 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
-from hybridnav.ext.page.floors import BuildingSession
-from hybridnav.ext.page.opening import BuildingOpening, Opening, PreparingError
+from hybridnav.ext.page.opening import PreparingError
 from hybridnav.ext.page.page import (
     ASSETS,
-    KINDS,
     POLICY,
     asset,
     exported,
-    exported_building,
+    exported_floor,
     live_page,
 )
+from hybridnav.ext.page.planning import GRID
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
     Edit,
-    FloorsAlternativesQuery,
-    FloorsPathQuery,
-    FloorsPlanQuery,
-    FloorsQuery,
-    PathQuery,
+    PartQuery,
     PlanQuery,
     Save,
     Undo,
@@ -48,7 +43,9 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
+    from hybridnav.ext.page.opening import Opening
     from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
 
 _MOST_BYTES = 2_000_000
@@ -114,19 +111,13 @@ class Guard:
         return None
 
 
-def make_app(
-    shown: Session | Opening | BuildingSession | BuildingOpening,
-    *,
-    token: str,
-    port: int,
-    folder: Path,
-) -> ASGIApp:
+def make_app(shown: Site | Opening, *, token: str, port: int, folder: Path) -> ASGIApp:
     """Return the application of a page.
 
     Parameters
     ----------
     shown
-        What it shows: a map or a building, or one that is still being prepared.
+        What it shows: a site, or one that is still being prepared.
     token
         The first part of every path.
     port
@@ -138,82 +129,85 @@ def make_app(
     routes = [
         Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
         *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
+        *_Answers(shown, folder).routes(at),
     ]
-    if isinstance(shown, BuildingSession | BuildingOpening):
-        on_floor = _OnMap(lambda request: shown.floor(request.path_params["floor"]), folder)
-        routes += _OverFloors(shown, folder).routes(at) + on_floor.routes(f"{at}/floor/{{floor}}")
-    else:
-        routes += _OnMap(lambda _: shown, folder).routes(at)
     return Guard(Starlette(routes=routes), token, port)
 
 
-class _OnMap:
-    """What each request about one map does.
+class _Answers:
+    """What each request does."""
 
-    Parameters
-    ----------
-    of
-        Returns what a request is about.
-    folder
-        Where temporary files are written.
-    """
-
-    def __init__(self, of: Callable[[Request], Session | Opening], folder: Path) -> None:
-        self._of, self._folder = of, folder
+    def __init__(self, shown: Site | Opening, folder: Path) -> None:
+        self._shown, self._folder = shown, folder
 
     def routes(self, at: str) -> list[Route]:
-        """Return the routes below a path."""
+        """Return the routes below a path: those of the whole site, and those of its floors."""
+        floor = f"{at}/floor/{{floor}}"
         gets: dict[str, Callable[[Request], Any]] = {
-            "map.json": lambda request: self._of(request).describe(),
-            "state.json": lambda request: self._of(request).state(),
-            "rooms.json": lambda request: self._session(request).describe_rooms(),
-            "outlines.json": lambda request: self._session(request).outlines(),
-            "graph/{level}.json": lambda request: self._session(request).graph(
+            f"{at}/map.json": lambda _: self._shown.describe(),
+            f"{at}/state.json": lambda _: self._shown.state(),
+            f"{floor}/map.json": lambda request: self._floor(request).describe(),
+            f"{floor}/rooms.json": lambda request: self._session(request).describe_rooms(),
+            f"{floor}/outlines.json": lambda request: self._session(request).outlines(),
+            f"{floor}/graph/{{level}}.json": lambda request: self._session(request).graph(
                 request.path_params["level"]
             ),
-            "costs/{preset}.json": lambda request: self._session(request).costs(
+            f"{floor}/costs/{{preset}}.json": lambda request: self._session(request).costs(
                 request.path_params["preset"]
             ),
         }
-        acts: dict[str, tuple[type[BaseModel], Callable[[Session, Any], Any]]] = {
-            "plan": (PlanQuery, lambda session, query: session.planning.plan(query)),
-            "optimum": (PathQuery, lambda session, query: session.planning.optimum(query)),
-            "alternatives": (
-                AlternativesQuery,
-                lambda session, query: session.planning.alternatives(query),
+        posts: dict[str, tuple[type[BaseModel], Callable[[Request, Any], Any]]] = {
+            f"{at}/plan": (PlanQuery, lambda _, query: self._planned(query)),
+            f"{at}/optimum": (
+                PlanQuery,
+                lambda _, query: self._planned(
+                    query.model_copy(update={"preset": GRID, "brief": True})
+                ),
             ),
-            "at": (At, lambda session, asked: {"room": session.room_at(asked.point)}),
-            "edit": (Edit, lambda session, asked: session.edit(asked)),
-            "undo": (Undo, lambda session, asked: session.undo(asked.version)),
-            "save": (Save, lambda session, asked: session.save(asked)),
+            f"{at}/alternatives": (
+                AlternativesQuery,
+                lambda _, query: self._shown.site.routes(query).alternatives(query),
+            ),
+            f"{floor}/at": (
+                At,
+                lambda request, asked: {"room": self._session(request).room_at(asked.point)},
+            ),
+            f"{floor}/edit": (Edit, lambda request, asked: self._session(request).edit(asked)),
+            f"{floor}/undo": (
+                Undo,
+                lambda request, asked: self._session(request).undo(asked.version),
+            ),
+            f"{floor}/save": (Save, lambda request, asked: self._session(request).save(asked)),
         }
-        tile = f"{at}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
+        files = {at: self._export, floor: self._export_floor}
+        tile = f"{floor}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
         return [
             Route(tile, _get(self._tile, "image/png")),
-            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
-            *(Route(f"{at}/{name}", _get_json(answer)) for name, answer in gets.items()),
+            *(Route(path, _get_json(answer)) for path, answer in gets.items()),
+            *(Route(path, _post(*each), methods=["POST"]) for path, each in posts.items()),
             *(
-                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
-                for name, (kind, act) in acts.items()
+                Route(f"{above}/export/{{kind}}", _post_file(answer), methods=["POST"])
+                for above, answer in files.items()
             ),
         ]
 
-    def _session(self, request: Request) -> Session:
-        """Return the session, once it is there."""
-        shown = self._of(request)
-        return shown.session if isinstance(shown, Opening) else shown
+    def _floor(self, request: Request) -> Any:
+        """Return what is there of the floor in an address."""
+        return self._shown.floor(request.path_params["floor"])
 
-    def _act(
-        self, kind: type[BaseModel], act: Callable[[Session, Any], Any]
-    ) -> Callable[[Request, Any], Any]:
-        return lambda request, value: act(self._session(request), checked(kind, value))
+    def _session(self, request: Request) -> Session:
+        """Return the session of the floor in an address, once it is there."""
+        return self._shown.site.floor(request.path_params["floor"])
+
+    def _planned(self, query: PlanQuery) -> dict[str, Any]:
+        return self._shown.site.routes(query).plan(query)
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
-        kind = request.path_params["kind"]
-        query = checked(PathQuery, value) if value else None
-        return KINDS.get(kind, ""), exported(
-            self._session(request).planning, kind, query, self._folder
-        )
+        site, query = self._shown.site, checked(PartQuery, value) if value else None
+        return exported(site, request.path_params["kind"], query, self._folder)
+
+    def _export_floor(self, request: Request, _: Any) -> tuple[str, bytes]:
+        return exported_floor(self._session(request), request.path_params["kind"], self._folder)
 
     def _tile(self, request: Request) -> bytes:
         place = request.path_params
@@ -222,47 +216,8 @@ class _OnMap:
             raise InvalidValueError("a tile has three whole numbers")
         zoom, row, col = map(int, numbers)
         theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
-        return self._of(request).layer(place["layer"]).png(zoom, row, col, theme)
-
-
-class _OverFloors:
-    """What each request about a whole building does."""
-
-    def __init__(self, shown: BuildingSession | BuildingOpening, folder: Path) -> None:
-        self._shown, self._folder = shown, folder
-
-    def routes(self, at: str) -> list[Route]:
-        """Return the routes below a path."""
-        acts: dict[str, tuple[type[BaseModel], Callable[[BuildingSession, Any], Any]]] = {
-            "plan": (FloorsPlanQuery, lambda building, query: building.plan(query)),
-            "optimum": (FloorsQuery, lambda building, query: building.optimum(query)),
-            "alternatives": (
-                FloorsAlternativesQuery,
-                lambda building, query: building.alternatives(query),
-            ),
-        }
-        return [
-            Route(f"{at}/map.json", _get_json(lambda _: self._shown.describe())),
-            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
-            *(
-                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
-                for name, (kind, act) in acts.items()
-            ),
-        ]
-
-    def _session(self) -> BuildingSession:
-        """Return the session, once it is there."""
-        return self._shown.session if isinstance(self._shown, BuildingOpening) else self._shown
-
-    def _act(
-        self, kind: type[BaseModel], act: Callable[[BuildingSession, Any], Any]
-    ) -> Callable[[Request, Any], Any]:
-        return lambda _, value: act(self._session(), checked(kind, value))
-
-    def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
-        kind = request.path_params["kind"]
-        query = checked(FloorsPathQuery, value) if value else None
-        return exported_building(self._session(), kind, query, self._folder)
+        found: bytes = self._floor(request).layer(place["layer"]).png(zoom, row, col, theme)
+        return found
 
 
 def _error(message: str, code: int) -> JSONResponse:
@@ -306,12 +261,12 @@ def _get_json(read: Callable[[Any], Any]) -> Any:
     return answer
 
 
-def _post(act: Callable[[Request, Any], Any]) -> Any:
+def _post(kind: type[BaseModel], act: Callable[[Request, Any], Any]) -> Any:
     async def answer(request: Request) -> Response:
         value = await _body(request)
         if isinstance(value, Response):
             return value
-        return _json(await _done(lambda: act(request, value)))
+        return _json(await _done(lambda: act(request, checked(kind, value))))
 
     return answer
 

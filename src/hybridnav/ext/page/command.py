@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
@@ -15,26 +15,24 @@ from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import BesideRoomsOption, MapOrBuildingArgument
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
-from hybridnav.ext.fleet.command import (
-    BuildingSource,
-    check_options,
-    is_building_file,
-    refused_options,
-)
+from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     import hybridnav as hn
-    from hybridnav.ext.fleet.files.entries import FloorEntry
-    from hybridnav.ext.page import BuildingOpening, BuildingSession, Opening, Session
-    from hybridnav.ext.page.requests import FloorsPlanQuery, PlanQuery
+    from hybridnav.cli.costs import Costs
+    from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
+    from hybridnav.ext.page import Opening, Site
     from hybridnav.ext.page.rooms_file import RoomsFile
 
 
 _ROOMS = "rooms.yaml"
 _TWO = 2
+_FAR_M = 1e6
+"""Metres beyond which no map reaches."""
+_POINT = r"[^:]+,[^:]+"
 
 SaveOption = Annotated[
     Path | None,
@@ -60,9 +58,8 @@ BrowserOption = Annotated[
 ]
 
 
-@with_map()
+@with_map(over_floors=lambda: _view_over_floors)
 def view(
-    ctx: typer.Context,
     map_file: MapOrBuildingArgument,
     save: SaveOption = None,
     routes: RouteOption = None,
@@ -77,36 +74,49 @@ def view(
 
     MAP may be a building: the page then has its floors.
     """
+    _check_save(save, routes)
+    for text in routes or ():
+        _ends(text, ("",))
+    page = MapPage.read(map_file, rooms_file, parsed_costs(costs), reading)
+    _show(page, save, routes, port, browser=browser)
+
+
+def _view_over_floors(
+    *,
+    map_file: Path,
+    save: Path | None,
+    routes: list[str] | None,
+    port: int,
+    browser: bool,
+    reading: MapOptions,
+) -> None:
+    """Open a building as a page; see `view`."""
+    _check_save(save, routes)
+    _show(BuildingPage(map_file, reading), save, routes, port, browser=browser)
+
+
+def _check_save(save: Path | None, routes: list[str] | None) -> None:
     check_output(save, "--save", (".html",))
     if routes and save is None:
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
-    if is_building_file(map_file):
-        check_options(refused_options(ctx, VIEW_OPTIONS))
-        if save is not None:
-            save_building(building_session(ctx.params), save, routes or ())
-        else:
-            _serve(building_opening(ctx.params), map_file.parent, port, browser=browser)
-        return
-    pairs = [_endpoints(text) for text in routes or ()]
-    given = parsed_costs(costs)
-    settings = reading.settings(
-        map_file, preset=PRESET if given else None, overrides=given.overrides
-    )
-    model = load_model(map_file, settings, {}, reading)
-    check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
-    rooms_path = map_file.parent / _ROOMS if rooms_file is None else rooms_file
-    make = _maker(model, settings, rooms_path, given.read(model.grid))
-    if save is not None:
-        _save(make(lambda _: None), save, pairs, settings.name)
-        return
-    from hybridnav.ext.page import Opening  # noqa: PLC0415 - loads numba and matplotlib
-
-    _serve(Opening(model.grid, make), rooms_path.parent, port, browser=browser)
 
 
-def _serve(
-    shown: Opening | BuildingOpening | BuildingSession, folder: Path, port: int, *, browser: bool
+def _show(
+    source: MapPage | BuildingPage,
+    save: Path | None,
+    routes: list[str] | None,
+    port: int,
+    *,
+    browser: bool,
 ) -> None:
+    """Write a page into a file, or serve it."""
+    if save is not None:
+        _save(source.make(lambda _: None), save, routes or ())
+    else:
+        _serve(source.opening(), source.folder, port, browser=browser)
+
+
+def _serve(shown: Opening | Site, folder: Path, port: int, *, browser: bool) -> None:
     """Serve a page until Ctrl-C, and print its address."""
     from hybridnav.ext.page import serve  # noqa: PLC0415 - loads numba and matplotlib
 
@@ -120,127 +130,111 @@ def _serve(
     serve(shown, folder, port=port, ready=ready)
 
 
-def _maker(
-    model: hn.Model, settings: hn.Preset, rooms_path: Path, costs: hn.CostLayer | None
-) -> Callable[[Callable[[str], None]], Session]:
-    """Return what makes the session of a map, in a thread; the file of rooms is read now."""
-    # These load numba and matplotlib, which help and wrong usage can do without.
-    import hybridnav as hn  # noqa: PLC0415
-    from hybridnav.ext.page import Session  # noqa: PLC0415
-    from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415
+@dataclass(frozen=True)
+class MapPage:
+    """The page of one map; the file of its rooms is read before it opens."""
 
-    file = RoomsFile(rooms_path.parent, rooms_path.name)
-    given = hn.load_rooms(rooms_path, model.grid) if rooms_path.exists() else model.rooms
+    model: hn.Model
+    settings: hn.Preset
+    file: RoomsFile
+    rooms: hn.RoomLabels | None
+    costs: hn.CostLayer | None
 
-    def make(tell: Callable[[str], None]) -> Session:
-        rooms = given
+    @classmethod
+    def read(cls, file: Path, rooms_file: Path | None, costs: Costs, reading: MapOptions) -> Self:
+        """Read a map, and its rooms."""
+        # These load numba, which help and wrong usage can do without.
+        import hybridnav as hn  # noqa: PLC0415
+        from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415
+
+        preset = PRESET if costs else None
+        settings = reading.settings(file, preset=preset, overrides=costs.overrides)
+        model = load_model(file, settings, {}, reading)
+        check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
+        path = file.parent / _ROOMS if rooms_file is None else rooms_file
+        kept = RoomsFile(path.parent, path.name)
+        rooms = hn.load_rooms(path, model.grid) if path.exists() else model.rooms
+        return cls(model, settings, kept, rooms, costs.read(model.grid))
+
+    @property
+    def folder(self) -> Path:
+        """The only folder in which anything is written."""
+        return self.file.folder
+
+    def opening(self) -> Opening:
+        """Return what the page shows at once: the cells."""
+        from hybridnav.ext.page import Opening  # noqa: PLC0415 - loads numba and matplotlib
+
+        return Opening(self.model.grid, self.make)
+
+    def make(self, tell: Callable[[str], None]) -> Site:
+        """Return what the page shows then."""
+        # These load numba and matplotlib, which help and wrong usage can do without.
+        import hybridnav as hn  # noqa: PLC0415
+        from hybridnav.ext.page import Session, Site  # noqa: PLC0415
+
+        rooms = self.rooms
         if rooms is None:
             tell("finding rooms")
-            rooms = hn.find_rooms(model.grid)
+            rooms = hn.find_rooms(self.model.grid)
         tell("building places")
-        topology = model.grown(settings.pyramid, rooms)
-        return Session(model, topology, settings, costs=costs, file=file)
-
-    return make
-
-
-def _endpoints(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the two points of `X,Y:X,Y`."""
-    points = [read_point(part) for part in text.split(":")]
-    good = [p for p in points if p is not None and len(p) == _TWO and all(map(math.isfinite, p))]
-    if len(points) != _TWO or len(good) != _TWO:
-        raise UsageError(f"--route must be X,Y:X,Y in metres, got {text!r:.80}")
-    return good[0], good[1]
+        topology = self.model.grown(self.settings.pyramid, rooms)
+        return Site.of_map(
+            Session(self.model, topology, self.settings, costs=self.costs, file=self.file)
+        )
 
 
-def _save(
-    session: Session,
-    path: Path,
-    pairs: list[tuple[tuple[float, ...], tuple[float, ...]]],
-    preset: str,
-) -> None:
-    import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
+@dataclass(frozen=True)
+class BuildingPage:
+    """The page of a building."""
 
-    from hybridnav.ext.page import save_page  # noqa: PLC0415 - loads numba and matplotlib
-    from hybridnav.ext.page.requests import PlanQuery  # noqa: PLC0415
+    file: Path
+    reading: MapOptions
 
-    queries: list[PlanQuery] = []
-    for start, goal in pairs:
-        first, last = session.grid.frame.positions_of(np.array([start, goal]))[:, ::-1].tolist()
-        queries.append(PlanQuery(start=first, goal=last, preset=preset))
-    save_page(session, path, queries)
-    size = path.stat().st_size / 1e6
-    answer(f"page       {printable(path)}, {size:.1f} MB, {len(queries)} routes\n")
+    @property
+    def folder(self) -> Path:
+        """The only folder in which anything is written."""
+        return self.file.parent
 
+    def opening(self) -> Opening | Site:
+        """Return what the page shows at once: the cells of the lowest floor, or a model, which has
+        all that it needs."""
+        # These load numba and matplotlib, which wrong usage can do without.
+        from hybridnav.ext.fleet.files.read import load_floor  # noqa: PLC0415
+        from hybridnav.ext.page import Opening  # noqa: PLC0415
 
-# `hybridnav view` for a building of several floors.
+        entries = self._entries()
+        if entries is None:
+            return self.make(lambda _: None)
+        lowest = load_floor(
+            entries.floors[0],
+            self.folder,
+            robot_radius_m=self.reading.robot_radius_m,
+            preset=preset_of_floors(self.reading),
+            max_cells=self.reading.max_cells,
+        )
+        names = [floor.name for floor in entries.floors]
+        return Opening(lowest.grid, self.make, name=self.file.stem, floors=names)
 
-VIEW_OPTIONS = frozenset(
-    {
-        *("map_file", "save", "routes", "port", "browser"),
-        *("preset", "overrides", "robot_radius_m", "max_cells"),
-    }
-)
-"""Parameters of `hybridnav view` that mean something for a building."""
-_POINT = r"[^:]+,[^:]+"
+    def make(self, tell: Callable[[str], None]) -> Site:
+        """Load the building, and return what the page shows then."""
+        from hybridnav.ext.page import Site  # noqa: PLC0415 - loads numba and matplotlib
 
+        entries, name = self._entries(), self.file.stem
+        n_floors = 0 if entries is None else len(entries.floors)
+        tell(f"reading {n_floors} floors" if n_floors != 1 else "reading the floor")
+        building = load_floors(self.file, self.reading, {})
+        if entries is None:
+            return Site.of_building(building, name)
+        files = _rooms_files(entries.floors, self.folder)
+        return Site.of_building(building, name, files, entries.links)
 
-def building_opening(given: Mapping[str, Any]) -> BuildingOpening | BuildingSession:
-    """Return what the page of a building shows at once: the cells of its lowest floor, or a model,
-    which has all that it needs.
+    def _entries(self) -> Entries | None:
+        """Return what the file of the building describes; None for a model."""
+        from hybridnav.ext.fleet.files.entries import read_building_entries  # noqa: PLC0415
+        from hybridnav.planner.saved import is_model  # noqa: PLC0415
 
-    Parameters
-    ----------
-    given
-        The values of the parameters of `hybridnav view` by their names.
-    """
-    # These load numba and matplotlib, which wrong usage can do without.
-    from hybridnav.ext.fleet.files.entries import read_building_entries  # noqa: PLC0415
-    from hybridnav.ext.fleet.files.read import load_floor  # noqa: PLC0415
-    from hybridnav.ext.page import BuildingOpening  # noqa: PLC0415
-    from hybridnav.planner.saved import is_model  # noqa: PLC0415
-
-    file: Path = given["map_file"]
-    if is_model(file):
-        return building_session(given)
-    floors = read_building_entries(file).floors
-    source = BuildingSource.of(given)
-    lowest = load_floor(
-        floors[0],
-        file.parent,
-        robot_radius_m=source.robot_radius_m,
-        preset=source.settings,
-        max_cells=source.max_cells,
-    )
-
-    def make(tell: Callable[[str], None]) -> BuildingSession:
-        tell(f"reading {len(floors)} floors" if len(floors) > 1 else "reading the floor")
-        return building_session(given)
-
-    names = [floor.name for floor in floors]
-    return BuildingOpening(file.stem, names, lowest.grid, make)
-
-
-def building_session(given: Mapping[str, Any]) -> BuildingSession:
-    """Load a building, and return what its page shows.
-
-    Parameters
-    ----------
-    given
-        The values of the parameters of `hybridnav view` by their names.
-    """
-    building = BuildingSource.of(given).load({})
-    # These load numba and matplotlib, which wrong usage can do without.
-    from hybridnav.ext.fleet.files.entries import read_building_entries  # noqa: PLC0415
-    from hybridnav.ext.page import BuildingSession  # noqa: PLC0415
-    from hybridnav.planner.saved import is_model  # noqa: PLC0415
-
-    file: Path = given["map_file"]
-    if is_model(file):
-        return BuildingSession(building, file.stem)
-    entries = read_building_entries(file)
-    files = _rooms_files(entries.floors, file.parent)
-    return BuildingSession(building, file.stem, files, entries.links)
+        return None if is_model(self.file) else read_building_entries(self.file)
 
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
@@ -257,45 +251,47 @@ def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsF
     return found
 
 
-def save_building(session: BuildingSession, path: Path, routes: Sequence[str]) -> None:
-    """Write the page of a building into a file.
+# The page as a file.
 
-    Parameters
-    ----------
-    session
-        What it shows.
-    path
-        The file.
-    routes
-        The routes as they were typed, `FLOOR:X,Y:FLOOR:X,Y`.
-    """
+
+def _save(site: Site, path: Path, routes: Sequence[str]) -> None:
+    """Write a page into a file, with routes as they were typed."""
     from hybridnav.ext.page import save_page  # noqa: PLC0415 - loads numba and matplotlib
+    from hybridnav.ext.page.requests import FloorPoint, PlanQuery  # noqa: PLC0415
 
-    save_page(session, path, [_query(text, session) for text in routes])
-    floors, size = len(session.sessions), path.stat().st_size / 1e6
-    counts = f"{floors} floors, {size:.1f} MB, {len(routes)} routes"
-    answer(f"page       {printable(path)}, {counts}\n")
-
-
-def _query(text: str, session: BuildingSession) -> FloorsPlanQuery:
-    """Return the query of a route as it was typed."""
-    from hybridnav.ext.page.graph import in_grid  # noqa: PLC0415 - loads numpy
-    from hybridnav.ext.page.requests import FloorPoint, FloorsPlanQuery  # noqa: PLC0415
-
-    names = session.describe()["floors"]
-    floor = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    found = re.fullmatch(rf"({floor}):({_POINT}):({floor}):({_POINT})", text)
-    if found is None:
-        raise UsageError(
-            "--route of a building must be FLOOR:X,Y:FLOOR:X,Y, floors of "
-            f"{', '.join(names):.200}, got {text!r:.80}"
+    queries = []
+    for text in routes:
+        start, goal = (
+            FloorPoint(
+                floor=number,
+                point=list(site.sessions[number].grid.frame.position_of(*point)[::-1]),
+            )
+            for number, point in _ends(text, site.names)
         )
+        queries.append(PlanQuery(start=start, goal=goal, preset=site.routes().presets[0]))
+    save_page(site, path, queries)
+    counts = f"{path.stat().st_size / 1e6:.1f} MB, {len(routes)} routes"
+    floors = f"{len(site.names)} floors, " if site.names[0] else ""
+    answer(f"page       {printable(path)}, {floors}{counts}\n")
+
+
+def _ends(text: str, names: Sequence[str]) -> list[tuple[int, tuple[float, ...]]]:
+    """Return the floors and points of a route as it was typed, `X,Y:X,Y` for a map."""
+    before = {f"{name}:" if name else "": number for number, name in enumerate(names)}
+    floor = "|".join(re.escape(each) for each in sorted(before, key=len, reverse=True))
+    found = re.fullmatch(rf"({floor})({_POINT}):({floor})({_POINT})", text)
+    expected = "must be X,Y:X,Y in metres"
+    if names[0]:
+        listed = f"{', '.join(names):.200}"
+        expected = f"of a building must be FLOOR:X,Y:FLOOR:X,Y, floors of {listed}"
+    refusal = f"--route {expected}, got {text!r:.80}"
+    if found is None:
+        raise UsageError(refusal)
     ends = []
-    for name, typed in (found.group(1, 2), found.group(3, 4)):
-        number = names.index(name)
+    for prefix, typed in (found.group(1, 2), found.group(3, 4)):
         point = read_point(typed)
-        if point is None or len(point) != 2 or not all(abs(part) < 1e6 for part in point):  # noqa: PLR2004
-            raise UsageError(f"--route: {typed!r:.80} is no point X,Y in metres")
-        at = in_grid(point, session.sessions[number].grid)
-        ends.append(FloorPoint(floor=number, point=at))
-    return FloorsPlanQuery(start=ends[0], goal=ends[1], preset=session.preset)
+        if point is None or len(point) != _TWO or not all(abs(part) < _FAR_M for part in point):
+            no_point = f"--route: {typed!r:.80} is no point X,Y in metres"
+            raise UsageError(no_point if names[0] else refusal)
+        ends.append((before[prefix], point))
+    return ends

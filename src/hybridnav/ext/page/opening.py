@@ -12,10 +12,10 @@ from hybridnav.ext.page.graph import map_facts
 from hybridnav.ext.page.tiles import hex_colours, map_layer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
-    from hybridnav.ext.page.floors import BuildingSession
     from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Layer
     from hybridnav.maps import OccupancyGrid
 
@@ -28,48 +28,53 @@ class PreparingError(HybridNavError):
 
 
 class Opening:
-    """A map on a page, whose rooms, places and planner are prepared in a thread. Threads share it.
+    """A site on a page that begins with the cells of its lowest floor. Threads share it.
+
+    The rooms, places and planners of its floors are prepared in a thread.
 
     Parameters
     ----------
     grid
-        The map.
+        The map of the lowest floor.
     make
-        Makes the session; it is given what to call with the name of each stage.
-    also
-        Returns other sessions whose routes are prepared after that, for the other floors of a
-        building.
+        Makes the site; it is given what to call with the name of each stage.
+    name
+        What the page calls it; None for the name of the map.
+    floors
+        Names of the floors, from the lowest to the highest; one map has none.
 
     Examples
     --------
-    >>> from hybridnav.ext.page import Opening, Session
+    >>> from hybridnav.ext.page import Opening, Session, Site
     >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
     >>> model = hn.load("figure1.hnm")
     >>> def make(tell):
     ...     tell("finding rooms")
     ...     topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
-    ...     return Session(model, topology, model.fitted(None))
+    ...     return Site.of_map(Session(model, topology, model.fitted(None)))
     >>> opening = Opening(model.grid, make)
-    >>> opening.describe()["ready"]
+    >>> opening.floor("0").describe()["ready"]
     False
     >>> opening.begin()
     >>> opening.wait()
-    >>> opening.describe()["ready"]
+    >>> opening.floor("0").describe()["ready"]
     True
     """
 
     def __init__(
         self,
         grid: OccupancyGrid,
-        make: Callable[[Callable[[str], None]], Session],
+        make: Callable[[Callable[[str], None]], Site],
         *,
-        also: Callable[[], Iterable[Session]] = tuple,
+        name: str | None = None,
+        floors: Sequence[str] = ("",),
     ) -> None:
-        self._grid, self._make, self._also = grid, make, also
-        self._layer = map_layer(grid)
+        self._make, self._floors = make, list(floors)
+        self._name = grid.name if name is None else name
+        self._cells = Cells(grid, lambda: self._stage)
         self._began = time.monotonic()
         self._stage = "preparing the map"
-        self._session: Session | None = None
+        self._site: Site | None = None
         self.problem: Exception | None = None
         """Why it could not be prepared; None while all is well."""
         self._thread = threading.Thread(target=self._prepare, daemon=True)
@@ -93,12 +98,12 @@ class Opening:
 
     def _prepare(self) -> None:
         try:
-            session = self._make(self._tell)
-            session.describe()  # rooms and their names, while nobody waits for them
-            self._session = session
+            site = self._make(self._tell)
+            site.sessions[0].describe()  # rooms and their names, while nobody waits for them
+            self._site = site
             self._tell("preparing routes")
-            for each in (session, *self._also()):
-                planner = each.planning.planner(each.planning.presets[0])
+            for session in dict.fromkeys(site.sessions):
+                planner = session.planning.planner(session.planning.presets[0])
                 planner.prepare(progress=self._count)
         except Exception as error:  # noqa: BLE001 - it is raised where the page is served
             self.problem = error
@@ -113,30 +118,55 @@ class Opening:
         self._stage = stage
 
     @property
-    def session(self) -> Session:
-        """The session.
+    def site(self) -> Site:
+        """The site.
 
         Raises
         ------
         PreparingError
             While it is not there.
         """
-        if self._session is None:
+        if self._site is None:
             raise PreparingError(f"not yet: {self._stage}")
-        return self._session
+        return self._site
+
+    def floor(self, text: str) -> Session | Cells:
+        """Return what is there of a floor by its number, as it stands in an address.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such floor.
+        PreparingError
+            When it is not there yet.
+        """
+        return self._cells if self._site is None and text == "0" else self.site.floor(text)
 
     def state(self) -> dict[str, Any]:
         """Return how far it is: whether rooms and places are there, and what is being done."""
         return {
-            "ready": self._session is not None,
+            "ready": self._site is not None,
             "stage": self._stage,
             "seconds": round(time.monotonic() - self._began, 1),
         }
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page needs to know of the map: its cells alone, until the rest is there."""
-        if self._session is not None:
-            return self._session.describe()
+        """Return what a page needs to know beside its maps: the floors alone, until the rest is
+        there."""
+        if self._site is not None:
+            return self._site.describe()
+        facts: dict[str, Any] = {"name": self._name, "ready": False, "floors": self._floors}
+        return facts | {"links": [], "presets": []}
+
+
+class Cells:
+    """A floor of which only the cells are there."""
+
+    def __init__(self, grid: OccupancyGrid, stage: Callable[[], str]) -> None:
+        self._grid, self._layer, self._stage = grid, map_layer(grid), stage
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page needs to know to draw the cells."""
         nothing: dict[str, Any] = {"rooms": [], "doors": [], "version": 0, "unsaved": 0}
         return map_facts(self._grid, self._layer.n_zooms) | {
             "ready": False,
@@ -150,120 +180,13 @@ class Opening:
         }
 
     def layer(self, name: str) -> Layer:
-        """Return a layer; until all is there, only `map`.
+        """Return the layer `map`.
 
         Raises
         ------
         PreparingError
-            When it is not there yet.
+            When another one is asked for.
         """
-        if self._session is None and name == "map":
-            return self._layer
-        return self.session.layer(name)
-
-
-# The page of a building that opens before all its floors are there.
-
-
-class BuildingOpening:
-    """A building on a page that begins with the cells of its lowest floor. Threads share it.
-
-    Parameters
-    ----------
-    name
-        What the page calls it.
-    floors
-        Names of the floors, from the lowest to the highest.
-    grid
-        The map of the lowest floor.
-    make
-        Makes the session; it is given what to call with the name of each stage.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.page import BuildingOpening, BuildingSession
-    >>> grid = hn.example_map("figure1")
-    >>> def make(tell):
-    ...     tell("reading floors")
-    ...     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    ...     return BuildingSession(hn.Building([hn.Floor("1", planner)]), "one floor")
-    >>> opening = BuildingOpening("one floor", ["1"], grid, make)
-    >>> opening.floor("0").describe()["ready"]
-    False
-    >>> opening.begin()
-    >>> opening.wait()
-    >>> opening.floor("0").describe()["ready"]
-    True
-    """
-
-    def __init__(
-        self,
-        name: str,
-        floors: Sequence[str],
-        grid: OccupancyGrid,
-        make: Callable[[Callable[[str], None]], BuildingSession],
-    ) -> None:
-        self._name, self._floors, self._make = name, list(floors), make
-        self._made: BuildingSession | None = None
-        self._lowest = Opening(grid, self._first, also=self._others)
-
-    def _first(self, tell: Callable[[str], None]) -> Session:
-        made = self._make(tell)
-        self._made = made
-        return made.sessions[0]
-
-    def _others(self) -> Iterable[Session]:
-        assert self._made is not None  # noqa: S101 - they come after the first
-        return dict.fromkeys(self._made.sessions[1:])
-
-    def begin(self, *, on_failure: Callable[[], object] = lambda: None) -> None:
-        """Begin to prepare; see `Opening.begin`."""
-        self._lowest.begin(on_failure=on_failure)
-
-    def wait(self) -> None:
-        """Wait until all is prepared, or has failed."""
-        self._lowest.wait()
-
-    @property
-    def problem(self) -> Exception | None:
-        """Why it could not be prepared; None while all is well."""
-        return self._lowest.problem
-
-    @property
-    def session(self) -> BuildingSession:
-        """The session.
-
-        Raises
-        ------
-        PreparingError
-            While it is not there.
-        """
-        self._lowest.session  # noqa: B018 - raises while it is not there
-        assert self._made is not None  # noqa: S101 - the session of its lowest floor is there
-        return self._made
-
-    def floor(self, text: str) -> Session | Opening:
-        """Return what is there of a floor by its number, as it stands in an address.
-
-        Raises
-        ------
-        InvalidValueError
-            When there is no such floor.
-        PreparingError
-            When it is not there yet.
-        """
-        try:
-            return self.session.floor(text)
-        except PreparingError:
-            if text != "0":
-                raise
-            return self._lowest
-
-    def describe(self) -> dict[str, Any]:
-        """Return what a page needs to know of the building: its floors alone, until the rest is
-        there."""
-        try:
-            return self.session.describe()
-        except PreparingError:
-            facts: dict[str, Any] = {"name": self._name, "floors": self._floors, "ready": False}
-            return facts | {"links": [], "presets": []}
+        if name != "map":
+            raise PreparingError(f"not yet: {self._stage()}")
+        return self._layer

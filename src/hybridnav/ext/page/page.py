@@ -13,7 +13,6 @@ from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs import build_route_graph
 from hybridnav.ext.graphs.files import export_nav2
-from hybridnav.ext.page.floors import BuildingSession
 from hybridnav.ext.page.tiles import TILE
 from hybridnav.planner import export_path, export_rooms
 from hybridnav.planner.saved import save
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav._base.typing import PathLike
-    from hybridnav.ext.page.planning import Planning
-    from hybridnav.ext.page.requests import FloorsPathQuery, FloorsPlanQuery, PathQuery, PlanQuery
+    from hybridnav.ext.page.requests import PartQuery, PlanQuery
     from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Layer, Theme
 
 
@@ -93,17 +92,13 @@ _MOST_CELLS = 4_000_000
 _THEMES: tuple[Theme, ...] = ("light", "dark")
 
 
-def save_page(
-    shown: Session | BuildingSession,
-    path: PathLike,
-    queries: Sequence[PlanQuery | FloorsPlanQuery] = (),
-) -> None:
+def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> None:
     """Write the page with its maps, their rooms and some routes into one HTML file.
 
     Parameters
     ----------
-    shown
-        What it shows: a map, or a building with all its floors.
+    site
+        What it shows.
     path
         The file; one that exists is replaced.
     queries
@@ -117,25 +112,24 @@ def save_page(
     Examples
     --------
     >>> from pathlib import Path
-    >>> from hybridnav.ext.page import Session, save_page
+    >>> from hybridnav.ext.page import Session, Site, save_page
     >>> grid = hn.example_map("figure1")
     >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
     >>> model = hn.load("figure1.hnm")
     >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
-    >>> save_page(Session(model, topology, model.fitted(None)), "page.html")
+    >>> save_page(Site.of_map(Session(model, topology, model.fitted(None))), "page.html")
     >>> Path("page.html").read_text()[:15]
     '<!doctype html>'
     """
-    if isinstance(shown, BuildingSession):
-        most = _MOST_CELLS // len(shown.sessions)
-        floors = [_map(session, most) for session in shown.sessions]
-        data: dict[str, Any] = {"map": shown.describe(), "floors": floors}
-    else:
-        data = _map(shown, _MOST_CELLS)
-    plan: Any = shown.plan if isinstance(shown, BuildingSession) else shown.planning.plan
-    data["routes"] = [
-        query.model_dump(include={"start", "goal", "preset"}) | plan(query) for query in queries
-    ]
+    most = _MOST_CELLS // len(site.sessions)
+    data: dict[str, Any] = {
+        "map": site.describe(),
+        "floors": [_map(session, most) for session in site.sessions],
+        "routes": [
+            query.model_dump(include={"start", "goal", "preset"}) | site.routes(query).plan(query)
+            for query in queries
+        ],
+    }
     try:
         replace_file(Path(path), whole_page(data).encode())
     except OSError as error:
@@ -180,46 +174,19 @@ KINDS = {
     "path-csv": "path.csv",
 }
 """Name of the file of each kind."""
-_OF_BUILDING = ("model", "path-geojson", "path-csv")
+WHOLE = ("model", "path-geojson", "path-csv")
+"""Those that are about the whole site; the others are about a floor."""
 
 
-def exported(planning: Planning, kind: str, query: PathQuery | None, folder: Path) -> bytes:
-    """Return the content of a file.
-
-    Parameters
-    ----------
-    planning
-        The planners.
-    kind
-        One of `KINDS`.
-    query
-        The query whose path is written; None for a file without a path.
-    folder
-        Where a temporary folder may lie for the time of the writing.
-
-    Raises
-    ------
-    InvalidValueError
-        When the kind is not known, or a path is wanted without a query.
-    """
-    if kind not in KINDS:
-        raise InvalidValueError(f"a file is one of {', '.join(KINDS)}, got {kind!r:.80}")
-    if kind.startswith("path") and query is None:
-        raise InvalidValueError("a path needs a start and a goal")
-    return _content(KINDS[kind], _writer(planning, kind, query), folder)
-
-
-def exported_building(
-    building: BuildingSession, kind: str, query: FloorsPathQuery | None, folder: Path
-) -> tuple[str, bytes]:
-    """Return the name and the content of a file about a whole building.
+def exported(site: Site, kind: str, query: PartQuery | None, folder: Path) -> tuple[str, bytes]:
+    """Return the name and the content of a file about a whole site.
 
     Parameters
     ----------
-    building
-        The building.
+    site
+        The site.
     kind
-        `model`, or `path-geojson` or `path-csv` for the part of a route on one floor.
+        One of `WHOLE`.
     query
         The query whose path is written, and the floor; None for the model.
     folder
@@ -231,21 +198,50 @@ def exported_building(
         When the kind is not known, a path is wanted without a query, or the route does not visit
         the floor.
     """
-    if kind not in _OF_BUILDING:
-        raise InvalidValueError(f"a file is one of {', '.join(_OF_BUILDING)}, got {kind!r:.80}")
+    _check_kind(kind, WHOLE)
     if kind == "model":
-        made = building.building(building.preset)
-        return KINDS[kind], _content(
-            KINDS[kind], lambda file: save(made, file, compress=True), folder
-        )
+        kept = site.routes().kept()
+        return _content(kind, lambda file: save(kept, file, compress=True), folder)
     if query is None:
         raise InvalidValueError("a path needs a start, a goal and a floor")
-    parts = building.on_floor(query)
-    return KINDS[kind], _content(KINDS[kind], lambda file: export_path(parts, file), folder)
+    part = site.routes(query).on_floor(query)
+    return _content(kind, lambda file: export_path(part, file), folder)
 
 
-def _content(name: str, write: Callable[[Path], None], folder: Path) -> bytes:
-    """Return what a writer writes; its temporary folder lies where the page may write."""
+def exported_floor(session: Session, kind: str, folder: Path) -> tuple[str, bytes]:
+    """Return the name and the content of a file about a floor.
+
+    Parameters
+    ----------
+    session
+        The floor.
+    kind
+        `nav2` or `rooms`.
+    folder
+        As for `exported`.
+
+    Raises
+    ------
+    InvalidValueError
+        When the kind is not known.
+    """
+    _check_kind(kind, [each for each in KINDS if each not in WHOLE])
+    topology = session.planning.topology
+    if kind == "nav2":
+        graph = build_route_graph(topology)
+        return _content(kind, lambda file: export_nav2(graph, file), folder)
+    return _content(kind, lambda file: export_rooms(topology.rooms, file), folder)
+
+
+def _check_kind(kind: str, known: Sequence[str]) -> None:
+    if kind not in known:
+        raise InvalidValueError(f"a file is one of {', '.join(known)}, got {kind!r:.80}")
+
+
+def _content(kind: str, write: Callable[[Path], None], folder: Path) -> tuple[str, bytes]:
+    """Return the name of a file and what a writer writes; its temporary folder lies where the page
+    may write."""
+    name = KINDS[kind]
     try:
         with tempfile.TemporaryDirectory(prefix=".hybridnav-", dir=folder) as inside:
             file = Path(inside) / name
@@ -254,21 +250,9 @@ def _content(name: str, write: Callable[[Path], None], folder: Path) -> bytes:
             except MapError as error:
                 # What the temporary folder is called helps nobody.
                 raise MapError(str(error).replace(printable(file), name)) from None
-            return file.read_bytes()
+            return name, file.read_bytes()
     except OSError as error:
         where = printable(folder.resolve().name)
         raise MapError(
             f"{name} cannot be written: the folder {where} takes no files: {error.strerror}"
         ) from None
-
-
-def _writer(planning: Planning, kind: str, query: PathQuery | None) -> Callable[[Path], None]:
-    topology = planning.topology
-    if kind == "nav2":
-        return lambda file: export_nav2(build_route_graph(topology), file)
-    if kind == "model":
-        return lambda file: save(planning.planner(planning.presets[0]), file, compress=True)
-    if kind == "rooms" or query is None:
-        return lambda file: export_rooms(topology.rooms, file)
-    result = planning.outcome(query)
-    return lambda file: export_path(result, file)

@@ -13,7 +13,14 @@ from hybridnav.ext.page.graph import in_grid, in_metres
 from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
 
 if TYPE_CHECKING:
-    from hybridnav.ext.page.requests import AlternativesQuery, Closed, PathQuery, PlanQuery
+    from hybridnav.ext.fleet import BuildingPlan
+    from hybridnav.ext.page.requests import (
+        AlternativesQuery,
+        FloorClosed,
+        PartQuery,
+        PathQuery,
+        PlanQuery,
+    )
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
     from hybridnav.planner.saved import Model
@@ -87,21 +94,25 @@ class Planning:
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
         planner, points = self.planner(query.preset), self._points(query)
-        closed = self.blocked(query.closed)
+        closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
         tour = plan_tour(planner, points, blocked=closed)
         return self._facts(tour.results[0]) | self._itinerary(tour)
 
-    def outcome(self, query: PathQuery) -> PlanResult:
+    def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
-        closed = self.blocked(query.closed)
-        return self.planner(query.preset).plan(*self._points(query), blocked=closed)
+        points, closed = self._points(query), self._closed(query)
+        return self.planner(query.preset).plan(*points, blocked=closed)
 
-    def optimum(self, query: PathQuery) -> dict[str, Any]:
-        """Return the shortest path of cells on the whole grid."""
-        on_grid = query.model_copy(update={"preset": GRID})
-        return self._facts(self.outcome(on_grid))
+    def kept(self) -> HybridPlanner:
+        """Return what a model of the map holds."""
+        return self.planner(self.presets[0])
+
+    @property
+    def links(self) -> list[dict[str, Any]]:
+        """The links that join a map with others: none."""
+        return []
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes that differ for people."""
@@ -112,7 +123,7 @@ class Planning:
             goal,
             query.count,
             by=query.by,
-            blocked=self.blocked(query.closed),
+            blocked=self._closed(query),
         )
         routes = [
             self._facts(each.result)
@@ -123,13 +134,18 @@ class Planning:
         return {"routes": routes, "complete": found.complete, "note": found.note}
 
     def _points(self, query: PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        start, goal = (in_metres(point, self.grid) for point in (query.start, query.goal))
+        start, goal = (in_metres(end.point, self.grid) for end in (query.start, query.goal))
         if not self.planner(query.preset).needs_headings:
             return start, goal
         yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
         return (*start, yaw), (*goal, yaw)
 
-    def blocked(self, closed: Closed) -> Blocked | None:
+    def _closed(self, query: PathQuery) -> Blocked | None:
+        if query.closed.links:
+            raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
+        return next(map(self.blocked, query.closed.floors), None)
+
+    def blocked(self, closed: FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
 
         Raises
@@ -150,21 +166,12 @@ class Planning:
         return Blocked(doors=closed.doors, rooms=closed.rooms, polygons=areas)
 
     def _facts(self, result: PlanResult) -> dict[str, Any]:
-        """Return the figures and the line of a plan; None stands for what is not finite."""
-        figures: dict[str, float | None] = {
-            "length_m": result.path.length_m if result.path is not None else None,
-            "cost": result.cost,
-            "lower_bound": result.lower_bound,
-            "gap": result.gap,
-        }
-        line = [] if result.path is None else in_grid(result.path.points, self.grid)
-        return {
-            "status": str(result.status),
-            "solved": result.solved,
-            "metric": result.metric,
-            "line": line,
-            "seconds": round(sum(result.stats.seconds.values()), 6),
-        } | {name: finite(value) for name, value in figures.items()}
+        """Return the figures and the line of a plan."""
+        path = result.path
+        lines = [] if path is None else [in_grid(path.points, self.grid)]
+        parts = [{"floor": 0, "line": line} for line in lines]
+        length_m = None if path is None else path.length_m
+        return facts_of(result, parts) | {"length_m": finite(length_m)}
 
     def _itinerary(self, tour: Tour) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
@@ -180,6 +187,18 @@ class Planning:
             "words": tour.words(),
             "places": list(route.places) if route is not None else [],
         }
+
+
+def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of a plan, and its lines floor by floor; None stands for what is not
+    finite."""
+    return {
+        "status": str(plan.status),
+        "solved": plan.solved,
+        "metric": plan.metric,
+        "parts": parts,
+        "seconds": round(sum(plan.stats.seconds.values()), 6),
+    } | {name: finite(getattr(plan, name)) for name in ("cost", "lower_bound", "gap")}
 
 
 def finite(value: float | None) -> float | None:

@@ -33,9 +33,17 @@ class _Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
-class Closed(_Strict):
-    """What is closed: doors by number, rooms by name, polygons in grid units."""
+class FloorPoint(_Strict):
+    """A point in grid units of a floor, by the number of the floor."""
 
+    floor: FloorNumber
+    point: Point
+
+
+class FloorClosed(_Strict):
+    """What is closed on a floor: doors by number, rooms by name, polygons in grid units."""
+
+    floor: FloorNumber
     doors: Annotated[list[int], Field(max_length=10_000)] = []
     rooms: Annotated[list[Name], Field(max_length=10_000)] = []
     polygons: Annotated[
@@ -47,13 +55,21 @@ class Closed(_Strict):
         return bool(self.doors or self.rooms or self.polygons)
 
 
-class PathQuery(_Strict):
-    """A query between two points in grid units."""
+class Closed(_Strict):
+    """What is closed: links by name, and the rest by floor."""
 
-    start: Point
-    goal: Point
+    links: Annotated[list[Name], Field(max_length=10_000)] = []
+    floors: Annotated[list[FloorClosed], Field(max_length=100)] = []
+
+
+class PathQuery(_Strict):
+    """A query between two points of any floors."""
+
+    start: FloorPoint
+    goal: FloorPoint
     preset: _PresetName
     closed: Closed = Closed()
+    stairs: bool = True
 
 
 class PlanQuery(PathQuery):
@@ -63,55 +79,13 @@ class PlanQuery(PathQuery):
 
 
 class AlternativesQuery(PathQuery):
-    """Some routes between two points."""
+    """Some routes between two points; `by` counts on one map, over floors they differ by links."""
 
     count: Annotated[int, Field(ge=2, le=5)] = 3
     by: Literal["doors", "homotopy"] = "doors"
 
 
-class FloorPoint(_Strict):
-    """A point in grid units of a floor of a building, by the number of the floor."""
-
-    floor: FloorNumber
-    point: Point
-
-
-class FloorClosed(Closed):
-    """What is closed on a floor."""
-
-    floor: FloorNumber
-
-
-class BuildingClosed(_Strict):
-    """What is closed in a building: links by name, and the rest by floor."""
-
-    links: Annotated[list[Name], Field(max_length=10_000)] = []
-    floors: Annotated[list[FloorClosed], Field(max_length=100)] = []
-
-
-class FloorsQuery(_Strict):
-    """A query between two points on any floors of a building."""
-
-    start: FloorPoint
-    goal: FloorPoint
-    preset: _PresetName
-    closed: BuildingClosed = BuildingClosed()
-    stairs: bool = True
-
-
-class FloorsPlanQuery(FloorsQuery):
-    """A plan over floors; brief while an end is dragged."""
-
-    brief: bool = False
-
-
-class FloorsAlternativesQuery(FloorsQuery):
-    """Some routes by different links."""
-
-    count: Annotated[int, Field(ge=2, le=5)] = 3
-
-
-class FloorsPathQuery(FloorsQuery):
+class PartQuery(PathQuery):
     """The part of a route on one floor, to be written."""
 
     floor: FloorNumber

@@ -7,18 +7,17 @@ import socket
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.page.opening import BuildingOpening, Opening
+from hybridnav.ext.page.opening import Opening
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav.ext.page.floors import BuildingSession
-    from hybridnav.ext.page.session import Session
+    from hybridnav.ext.page.site import Site
 
 
 def serve(
-    shown: Session | Opening | BuildingSession | BuildingOpening,
+    shown: Site | Opening,
     folder: Path,
     *,
     port: int = 0,
@@ -29,7 +28,7 @@ def serve(
     Parameters
     ----------
     shown
-        What the page shows: a map or a building, or one that is prepared meanwhile.
+        What the page shows: a site, or one that is prepared meanwhile.
     folder
         The only folder in which anything is written.
     port
@@ -48,17 +47,17 @@ def serve(
     --------
     >>> from contextlib import suppress
     >>> from pathlib import Path
-    >>> from hybridnav.ext.page import Session, serve
+    >>> from hybridnav.ext.page import Session, Site, serve
     >>> grid = hn.example_map("figure1")
     >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
     >>> model = hn.load("figure1.hnm")
     >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
-    >>> session = Session(model, topology, model.fitted(None))
+    >>> site = Site.of_map(Session(model, topology, model.fitted(None)))
     >>> def ready(address):
     ...     print(address[:17])
     ...     raise KeyboardInterrupt  # as Ctrl-C does
     >>> with suppress(KeyboardInterrupt):
-    ...     serve(session, Path(), ready=ready)
+    ...     serve(site, Path(), ready=ready)
     http://127.0.0.1:
     """
     try:
@@ -81,7 +80,7 @@ def serve(
         port = listening.getsockname()[1]
         app = make_app(shown, token=token, port=port, folder=folder)
         server = make_server(app)
-        opening = shown if isinstance(shown, Opening | BuildingOpening) else None
+        opening = shown if isinstance(shown, Opening) else None
         if opening is not None:
             opening.begin(on_failure=lambda: setattr(server, "should_exit", True))
         if ready is not None:

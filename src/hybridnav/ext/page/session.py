@@ -137,10 +137,6 @@ class Session:
             "rooms": self.describe_rooms(),
         }
 
-    def state(self) -> dict[str, Any]:
-        """Return that everything is there; see `Opening.state`."""
-        return {"ready": True, "stage": ""}
-
     def describe_rooms(self) -> dict[str, Any]:
         """Return the rooms, their doors, and the state of their file."""
         with self._lock:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav.errors import InvalidValueError, MapError, ModelError
-from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
+from hybridnav.ext.fleet import Building, Floor
 from hybridnav.ext.fleet.floors import Known
-from hybridnav.ext.fleet.saved import BuildingValues, LinkValues
+from hybridnav.ext.fleet.saved import BuildingValues
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.planner import load_preset
@@ -65,8 +65,7 @@ def open_building(
     planners, are_same = [planner for planner, _ in made], all(is_same for _, is_same in made)
     try:
         floors = [Floor(one.name, planners[one.map], one.elevation_m) for one in values.floors]
-        links = [_link(one) for one in values.links]
-        building = Building(floors, links, speed_m_s=values.speed_m_s)
+        building = Building(floors, values.links, speed_m_s=values.speed_m_s)
     except InvalidValueError as error:
         raise MapError(f"{where}: {error}") from None
     if are_same:
@@ -90,12 +89,6 @@ def _map_of(part: FiledPart, number: int, max_cells: int) -> Model:
     FLOOR.check_version(part)
     where = f"{part.where}, map {number}"
     return model_of(parts_within(part.stored("model"), where), where, max_cells)
-
-
-def _link(values: LinkValues) -> Link:
-    ends = tuple(LinkEnd(end.floor, end.position_m, end.yaw_rad) for end in values.ends)
-    numbers: dict[str, Any] = values.model_dump(exclude={"name", "kind", "ends"})
-    return Link(name=values.name, kind=values.kind, ends=ends, **numbers)
 
 
 def _known(filed: FiledPart, building: Building) -> Sequence[Known]:

@@ -39,15 +39,10 @@ export class Closures {
     return this.list.filter((each) => each.kind === "links").map((each) => each.what);
   }
 
-  // What a query sends: of a map, or of all floors of a building.
+  // What a query sends, of all floors.
   get asked() {
-    if (!this.page.floors.isBuilding) return this.on(0);
     const numbers = [...new Set(this.list.filter((each) => each.kind !== "links").map((each) => each.floor))];
     return { links: this.links, floors: numbers.map((floor) => ({ floor, ...this.on(floor) })) };
-  }
-
-  get nothing() {
-    return this.page.floors.isBuilding ? { links: [], floors: [] } : NOTHING;
   }
 
   // Close something, or open it again.
@@ -119,7 +114,7 @@ export class Closures {
     const areas = this.list.filter((each) => each.kind === "polygons");
     const names = { doors: ({ what }) => `door ${what}`, polygons: (each) => `area ${areas.indexOf(each) + 1}` };
     const items = this.list.map((each, at) => {
-      const where = floors.isBuilding && each.floor !== null ? `, floor ${floors.nameOf(each.floor)}` : "";
+      const where = each.floor === null ? "" : floors.named(each.floor, (name) => `, floor ${name}`);
       const text = (names[each.kind]?.(each) ?? each.what) + where;
       const open = () => this.#become(this.list.toSpliced(at, 1));
       return element("li", {}, text, element("button", { onclick: open, ariaLabel: `Open ${text}` }, "Open"));

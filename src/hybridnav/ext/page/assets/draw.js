@@ -148,10 +148,9 @@ export function paintNames(scene, rooms, taken, chosen) {
   }
 }
 
-// The lines of a route on one floor; those on a map are all of it.
+// The lines of a route on one floor.
 function linesOf(route, floor) {
-  const lines = route.parts ? route.parts.filter((part) => part.floor === floor).map((part) => part.line) : [route.line];
-  return lines.filter((line) => line?.length);
+  return route.parts.filter((part) => part.floor === floor && part.line.length).map((part) => part.line);
 }
 
 export function paintRoutes(scene, routes, chosen, floor) {

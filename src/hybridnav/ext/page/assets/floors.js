@@ -3,7 +3,7 @@
 import { element } from "./route.js";
 
 export class Floors {
-  names = []; // from the lowest to the highest; none for a single map
+  names = [""]; // from the lowest to the highest; a map is one floor without a name
   links = [];
   at = 0; // the number of the one that is shown
   #wanted = 0;
@@ -15,36 +15,34 @@ export class Floors {
     this.byId = (id) => document.getElementById(id);
   }
 
-  get isBuilding() {
-    return this.names.length > 0;
+  nameOf(number) {
+    return this.names[number];
   }
 
-  nameOf(number) {
-    return this.isBuilding ? this.names[number] : "";
+  // A text with the name of a floor in it, empty for a floor without one: nothing names a map's.
+  named(number, text) {
+    return this.names[number] && text(this.names[number]);
   }
 
   // Take over what the first answer says, and return the map to begin with.
   async begin(whole) {
-    if (!whole.links) return whole;
     Object.assign(this, { names: whole.floors, links: whole.links, title: whole.name, presets: whole.presets });
     this.#maps = [];
     const numbers = this.names.map((_, number) => number).reverse(); // as in a house, the highest on top
     this.byId("floor").replaceChildren(...numbers.map((number) => element("option", { value: number }, this.names[number])));
-    this.byId("floors").hidden = false;
-    document.documentElement.classList.add("building");
-    this.page.link.base = "floor/0/";
+    this.byId("floors").hidden = !this.names[0];
+    document.documentElement.classList.toggle("building", Boolean(this.names[0]));
     return this.map(0);
   }
 
   async map(number) {
-    if (!this.isBuilding) return this.page.map;
     this.#maps[number] ??= await this.page.link.get("map", `floor/${number}/`);
     return this.#maps[number];
   }
 
   // Show another floor; return whether it has changed.
   async show(number) {
-    if (!this.isBuilding || (number === this.at && number === this.#wanted) || !(number in this.names)) return false;
+    if ((number === this.at && number === this.#wanted) || !(number in this.names)) return false;
     const { scene } = this.page;
     this.#wanted = number;
     const map = await this.map(number);
@@ -82,7 +80,7 @@ export class Floors {
 
   // "2: 1.5, 3" as [2, "1.5, 3"]; a text without a floor is about the one that is shown.
   split(text) {
-    const colon = this.isBuilding ? text.lastIndexOf(":") : -1;
+    const colon = this.names[0] ? text.lastIndexOf(":") : -1;
     if (colon < 0) return [this.at, text];
     return [this.names.indexOf(text.slice(0, colon).trim()), text.slice(colon + 1)];
   }

@@ -9,7 +9,7 @@ export class Failure extends Error {
 
 export class LiveLink {
   isLive = true;
-  base = ""; // before the names of what is about one floor of a building
+  base = "floor/0/"; // before the names of what is about one floor
 
   async #fetched(path, options) {
     let response;
@@ -52,8 +52,7 @@ export class LiveLink {
 
 export class SavedLink {
   isLive = false;
-
-  base = "";
+  base = "floor/0/";
 
   constructor(data) {
     this.data = data;

@@ -166,7 +166,7 @@ function connectView() {
   on("floor-down", "click", () => showFloor(page.floors.at - 1));
   page.canvas.addEventListener("keydown", reported((event) => {
     const step = { PageUp: 1, PageDown: -1 }[event.key];
-    return step && page.floors.isBuilding && page.map.ready ? showFloor(page.floors.at + step) : null;
+    return step && page.map.ready ? showFloor(page.floors.at + step) : null;
   }, false));
   document.querySelectorAll("input[name=mode]").forEach((input) => input.addEventListener("change", () => {
     page.closures.endArea(false);
@@ -175,11 +175,10 @@ function connectView() {
   }));
 }
 
-// The name of a file; what is about one floor of a building has the floor in it.
+// The name of a file; what is about one floor of several has the floor in it.
 function fileOf(kind) {
-  if (!page.floors.isBuilding || kind === "model") return FILES[kind];
-  const floor = page.floors.nameOf(page.floors.at).replaceAll(/[^\p{L}\p{N}]+/gu, "-");
-  return FILES[kind].replace(".", `-${floor}.`);
+  const floor = kind === "model" ? "" : page.floors.named(page.floors.at, (name) => `-${name.replaceAll(/[^\p{L}\p{N}]+/gu, "-")}`);
+  return FILES[kind].replace(".", `${floor}.`);
 }
 
 function connectExport() {
@@ -194,10 +193,9 @@ function connectExport() {
       page.say("Set a start and a goal first", true);
       return;
     }
-    const { isBuilding, at } = page.floors;
     page.say("Writing…");
-    const asked = isPath ? page.routes.query(isBuilding ? { floor: at } : {}) : null;
-    const isWhole = isPath || kind === "model"; // of the building, not of a floor
+    const asked = isPath ? page.routes.query({ floor: page.floors.at }) : null;
+    const isWhole = isPath || kind === "model"; // not of one floor
     download(await page.link.file(kind, asked, isWhole ? "" : page.link.base), fileOf(kind));
     page.say("");
   })));
@@ -220,9 +218,8 @@ function connectExport() {
 
 function describe() {
   const { map, floors } = page;
-  const title = floors.title ?? map.name;
-  document.title = `${title} - hybridnav`;
-  byId("title").textContent = title;
+  document.title = `${floors.title} - hybridnav`;
+  byId("title").textContent = floors.title;
   stateFacts();
   byId("level").max = Math.max(0, map.levels.length - 1);
   byId("level").value = map.place_level ?? 0;
@@ -233,14 +230,14 @@ function stateFacts() {
   const { map, floors } = page;
   const size = [map.cols, map.rows].map((n) => n.toLocaleString("en"));
   const rooms = map.ready ? `, ${page.names.shown.rooms.length} rooms` : "";
-  const floor = floors.isBuilding ? `Floor ${floors.nameOf(floors.at)}: ` : "";
+  const floor = floors.named(floors.at, (name) => `Floor ${name}: `);
   byId("facts").textContent = `${floor}${size.join(" × ")} cells of ${map.resolution_m} m, robot radius ${map.robot_radius_m} m${rooms}`;
 }
 
 function listChoices() {
-  const { map, floors } = page;
+  const { floors } = page;
   const options = (names) => names.map((name) => element("option", { value: name }, name));
-  byId("preset").replaceChildren(...options(floors.presets ?? map.presets));
+  byId("preset").replaceChildren(...options(floors.presets));
   byId("close-link").replaceChildren(element("option", { value: "" }, "choose…"), ...options(floors.links.map((link) => link.name)));
 }
 
@@ -261,7 +258,7 @@ const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseco
 // Show how far the server is, until there is nothing more to do or `isEnough` says so.
 async function followed(isEnough) {
   for (;;) {
-    const state = await page.link.get("state");
+    const state = await page.link.get("state", "");
     const { stage } = state;
     byId("progress").hidden = !stage;
     byId("stage").textContent = stage ? `${stage[0].toUpperCase()}${stage.slice(1)}, ${Math.round(state.seconds)} s` : "";
@@ -289,7 +286,7 @@ async function prepared() {
 }
 
 async function begin() {
-  const whole = await page.link.get("map");
+  const whole = await page.link.get("map", "");
   page.map = await page.floors.begin(whole);
   page.scene = new Scene(page.canvas, page.map, page.link);
   page.routes = new Routes(page);
@@ -309,7 +306,7 @@ async function begin() {
   page.scene.version = page.map.rooms.version;
   page.names.list();
   page.names.show();
-  if (page.floors.isBuilding) page.floors.note();
+  page.floors.note();
   await page.pictures.showLayer();
   page.pictures.useTheme();
   page.canvas.dataset.ready = "true";

@@ -64,10 +64,9 @@ export class Routes {
   }
 
   query(more = {}) {
-    const { floors, closures } = this.page;
+    const { closures } = this.page;
     const preset = this.byId("preset").value;
-    if (floors.isBuilding) return { ...this.ends, preset, closed: closures.asked, stairs: this.byId("stairs").checked, ...more };
-    return { start: this.ends.start.point, goal: this.ends.goal.point, preset, closed: closures.asked, ...more };
+    return { ...this.ends, preset, closed: closures.asked, stairs: this.byId("stairs").checked, ...more };
   }
 
   // Plans are about all floors: their names have nothing before them.
@@ -86,8 +85,7 @@ export class Routes {
   }
 
   #textOf(floor, text) {
-    const { floors } = this.page;
-    return floors.isBuilding ? `${floors.nameOf(floor)}: ${text}` : text;
+    return this.page.floors.named(floor, (name) => `${name}: `) + text;
   }
 
   clicked(point) {
@@ -166,7 +164,7 @@ export class Routes {
   }
 
   #planOpen(asked) {
-    return this.#post("plan", { ...asked, closed: this.page.closures.nothing, brief: true });
+    return this.#post("plan", { ...asked, closed: {}, brief: true });
   }
 
   // An answer about the ends of now, null for one that came after they were moved.
@@ -190,8 +188,7 @@ export class Routes {
       return;
     }
     this.page.say("Looking for routes…");
-    const by = this.page.floors.isBuilding ? {} : { by: this.byId("by").value };
-    const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value), ...by }));
+    const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value), by: this.byId("by").value }));
     if (!found) return;
     if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
     this.show();
@@ -210,7 +207,7 @@ export class Routes {
   // Routes of a saved page have ends of their own.
   #takeEnds() {
     const { start, goal } = this.routes[this.chosen] ?? {};
-    if (start) this.ends = start.point ? { start, goal } : { start: { floor: 0, point: start }, goal: { floor: 0, point: goal } };
+    if (start) this.ends = { start, goal };
   }
 
   take(routes) {
@@ -232,7 +229,7 @@ export class Routes {
     this.#showWay(route);
     this.#showCards();
     this.byId("others-note").textContent = "";
-    if (this.page.floors.isBuilding) this.page.floors.note();
+    this.page.floors.note();
     if (route) this.page.say(route.solved ? "" : `No route: ${route.status}`, !route.solved);
   }
 
@@ -264,13 +261,10 @@ export class Routes {
   }
 
   #showWay(route) {
-    const legs = route?.legs ?? [];
-    const parts = legs.map((leg) => leg.room + (leg.door ? ` → door ${leg.door}` : ""));
-    for (const [at, part] of (route?.parts ?? []).entries()) {
-      const ride = route.rides[at];
-      parts.push(`floor ${this.page.floors.nameOf(part.floor)}${ride ? ` → ${ride.link}` : ""}`);
-    }
-    this.byId("way").textContent = parts.join(" → ");
+    const steps = route?.rides
+      ? route.parts.flatMap((part, at) => [`floor ${this.page.floors.nameOf(part.floor)}`, route.rides[at]?.link])
+      : (route?.legs ?? []).flatMap((leg) => [leg.room, leg.door && `door ${leg.door}`]);
+    this.byId("way").textContent = steps.filter(Boolean).join(" → ");
     this.byId("words").replaceChildren(...(route?.words ?? []).map((line) => element("li", {}, line)));
   }
 

@@ -1,0 +1,397 @@
+"""What one page shows: a session for each floor, and routes over all of them."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet import Building, Floor
+from hybridnav.ext.page.graph import in_grid, in_metres
+from hybridnav.ext.page.planning import facts_of, finite
+from hybridnav.ext.page.session import Session
+from hybridnav.planner import Tour, load_preset, preset_names
+from hybridnav.planner.saved import Model
+from hybridnav.topology.rooms import find_rooms
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from hybridnav.ext.fleet import BuildingPlan
+    from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
+    from hybridnav.ext.page.requests import (
+        AlternativesQuery,
+        PartQuery,
+        PathQuery,
+        PlanQuery,
+    )
+    from hybridnav.ext.page.rooms_file import RoomsFile
+    from hybridnav.planner import Blocked, HybridPlanner, PlanResult
+    from hybridnav.topology.rooms import Rooms
+
+_MOST_DIGITS = 3
+_NO_FILE = (
+    "Changes of rooms of this floor cannot be saved here: give the floor rooms: FILE in the file "
+    "of the building, inside its folder, or export the model, which keeps them."
+)
+_IN_MODEL = (
+    "This building is a model: Save is for maps. Export the model to keep changes of rooms; they "
+    "are lost when the command ends."
+)
+_NEAR_M = 1.0
+"""Metres from a door within which the end of a link is taken to be at it."""
+
+
+class Routes(Protocol):
+    """What plans between points of the floors of a site, in grid units.
+
+    One floor and several differ here alone: on one map a route is described by its rooms and doors,
+    and others differ from it by these; over floors both go by links.
+    """
+
+    @property
+    def presets(self) -> list[str]:
+        """The names to choose from, the one of the start first."""
+
+    @property
+    def links(self) -> list[dict[str, Any]]:
+        """The links between the floors, as plain values."""
+
+    def plan(self, query: PlanQuery) -> dict[str, Any]:
+        """Return a plan with its certificate; unless it is brief, with words."""
+
+    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
+        """Return some routes that differ for people."""
+
+    def on_floor(self, query: PartQuery) -> PlanResult | Tour:
+        """Return the part of a route on one floor, to be written."""
+
+    def kept(self) -> HybridPlanner | Building:
+        """Return what a model holds."""
+
+
+class Site:
+    """What a page shows: a map, or the floors of a building. Threads may share it.
+
+    A map is a site of one floor, whose name is empty: nothing on the page names it.
+
+    Parameters
+    ----------
+    name
+        What the page calls it.
+    floors
+        The floors by their names, from the lowest to the highest.
+    routes
+        Returns what plans over them now: changes of rooms make it anew.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.page import Site
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> Site.of_building(hn.Building(floors), "two floors").describe()["floors"]
+    ['1', '2']
+    """
+
+    def __init__(
+        self, name: str, floors: Mapping[str, Session], routes: Callable[[], Routes]
+    ) -> None:
+        self.name = name
+        self.names, self.sessions = tuple(floors), tuple(floors.values())
+        self._routes = routes
+
+    @classmethod
+    def of_map(cls, session: Session) -> Self:
+        """Return the site of one map."""
+        return cls(session.grid.name, {"": session}, lambda: session.planning)
+
+    @classmethod
+    def of_building(
+        cls,
+        building: Building,
+        name: str,
+        files: Mapping[str, RoomsFile] | None = None,
+        links: Sequence[LinkEntry] = (),
+    ) -> Self:
+        """Return the site of a building.
+
+        Floors without rooms get those that `find_rooms` finds. Floors of one map have one session:
+        a change of its rooms is one on both.
+
+        Parameters
+        ----------
+        building
+            The building.
+        name
+            What the page calls it.
+        files
+            The files of rooms by the names of floors; rooms of other floors cannot be saved. None
+            for a building that no file describes, such as that of a model.
+        links
+            The links as the file of the building describes them: a page that saves rooms says which
+            of them name a room or a door that is there no more.
+        """
+        routes = _OverFloors(building, files, links)
+        names = [floor.name for floor in building.floors]
+        return cls(name, dict(zip(names, routes.sessions, strict=True)), lambda: routes)
+
+    @property
+    def site(self) -> Site:
+        """The site itself; see `Opening.site`."""
+        return self
+
+    def floor(self, text: str) -> Session:
+        """Return the session of a floor by its number, as it stands in an address.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such floor.
+        """
+        is_number = text.isascii() and text.isdigit() and len(text) < _MOST_DIGITS
+        number = int(text) if is_number else -1
+        self._check(number, text)
+        return self.sessions[number]
+
+    def _check(self, number: int, given: object) -> None:
+        if not 0 <= number < len(self.sessions):
+            raise InvalidValueError(
+                f"floors are from 0 to {len(self.sessions) - 1}, got {given!r:.40}"
+            )
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page needs to know beside its maps."""
+        routes = self._routes()
+        facts = {"name": self.name, "ready": True, "floors": list(self.names)}
+        return facts | {"links": routes.links, "presets": routes.presets}
+
+    def state(self) -> dict[str, Any]:
+        """Return that everything is there; see `Opening.state`."""
+        return {"ready": True, "stage": ""}
+
+    def routes(self, query: PathQuery | None = None) -> Routes:
+        """Return what answers a query, whose floors there are, each closed once.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such floor, or one is given twice.
+        """
+        closed = [] if query is None else [each.floor for each in query.closed.floors]
+        for number in closed if query is None else (query.start.floor, query.goal.floor, *closed):
+            self._check(number, number)
+        if len(set(closed)) < len(closed):
+            raise InvalidValueError(f"a floor is given twice: {closed}"[:200])
+        return self._routes()
+
+
+class _OverFloors:
+    """Routes over the floors of a building; see `Site.of_building`."""
+
+    def __init__(
+        self,
+        building: Building,
+        files: Mapping[str, RoomsFile] | None,
+        links: Sequence[LinkEntry],
+    ) -> None:
+        self._building = building
+        self._first = building.floors[0].planner.preset.name
+        self._made = {self._first: building}
+        self._making = threading.Lock()
+        names: dict[HybridPlanner, list[str]] = {}
+        for floor in building.floors:
+            names.setdefault(floor.planner, []).append(floor.name)
+        made = {
+            planner: self._session(planner, here, files, links) for planner, here in names.items()
+        }
+        self.sessions = tuple(made[floor.planner] for floor in building.floors)
+
+    def _session(
+        self,
+        planner: HybridPlanner,
+        names: Sequence[str],
+        files: Mapping[str, RoomsFile] | None,
+        links: Sequence[LinkEntry],
+    ) -> Session:
+        """Return the session of the floors of one map, whose planner keeps what it has prepared."""
+        model, topology = Model(planner.topology.grid), planner.topology
+        if topology.pyramid.rooms is None:
+            topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
+        file = (files or {}).get(names[0])
+        session = Session(model, topology, planner.preset, costs=planner.costs, file=file)
+        session.no_file = _IN_MODEL if files is None else _NO_FILE
+        ends = [(link, end) for link in links for end in link.ends if end.floor in names]
+        session.caution = lambda rooms: self._caution(rooms, ends)
+        session.planning.adopt(planner)
+        return session
+
+    def _caution(self, rooms: Rooms, ends: Sequence[tuple[LinkEntry, EndEntry]]) -> str:
+        """Return which links of the file rooms have left without their end."""
+        lost = []
+        for link, end in ends:
+            names = (*rooms.names, *rooms.labels.points)
+            if end.room is not None and end.room not in names:
+                lost.append(f"link {link.name} names room {end.room}")
+            elif end.door is not None and not self._is_at(rooms, link.name, end):
+                lost.append(f"link {link.name} names door {end.door}")
+        if not lost:
+            return ""
+        what = ", ".join(lost)
+        return f"{what}, which is there no more: change it in the file of the building"
+
+    def _is_at(self, rooms: Rooms, link: str, end: EndEntry) -> bool:
+        """Return whether the end of a link still lies at its door, which merged rooms have lost."""
+        placed = self._building.link(link).end_on(end.floor)
+        door = next((door for door in rooms.doors if door.number == end.door), None)
+        if placed is None or door is None:
+            return False
+        return math.dist(placed.position_m, door.position) <= max(door.width_m, _NEAR_M)
+
+    @property
+    def presets(self) -> list[str]:
+        """The names to choose from, the one of the start first."""
+        others = [name for name in preset_names() if name != self._first and _is_plain(name)]
+        return [self._first, *others]
+
+    @property
+    def links(self) -> list[dict[str, Any]]:
+        """The links as plain values."""
+        building, number_of = self._building, self._number_of
+        return [
+            {
+                "name": link.name,
+                "kind": link.kind,
+                "fits": link.admits(building.robot_radius_m),
+                "ends": [
+                    {
+                        "floor": number_of[end.floor],
+                        "at": in_grid(end.position_m, self.sessions[number_of[end.floor]].grid),
+                    }
+                    for end in link.ends
+                ],
+            }
+            for link in building.links
+        ]
+
+    @property
+    def _number_of(self) -> dict[str, int]:
+        return {floor.name: number for number, floor in enumerate(self._building.floors)}
+
+    def kept(self) -> Building:
+        """Return what a model of the building holds."""
+        return self._with(self._first)
+
+    def _with(self, preset: str) -> Building:
+        """Return the building with planners by a preset, of the rooms as they are now.
+
+        Raises
+        ------
+        HybridNavError
+            When there is no such preset, or it cannot plan on a floor or over floors.
+        """
+        planners = [session.planning.planner(preset) for session in self.sessions]
+        with self._making:
+            made = self._made.get(preset)
+            if made is None or any(
+                floor.planner is not planner
+                for floor, planner in zip(made.floors, planners, strict=True)
+            ):
+                floors = [
+                    Floor(floor.name, planner, floor.elevation_m)
+                    for floor, planner in zip(self._building.floors, planners, strict=True)
+                ]
+                speed_m_s = self._building.speed_m_s
+                made = Building(floors, self._building.links, speed_m_s=speed_m_s)
+                self._made[preset] = made
+            return made
+
+    def plan(self, query: PlanQuery) -> dict[str, Any]:
+        """Return a plan over floors with its certificate; unless it is brief, with words."""
+        plan = self._outcome(query)
+        return self._facts(plan) | ({} if query.brief else {"words": plan.words()})
+
+    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
+        """Return some routes by different links."""
+        start, goal = self._ends(query)
+        building, how = self._with(query.preset), self._how(query)
+        found = building.alternatives(start, goal, query.count, **how)
+        routes = [self._facts(plan) | {"words": plan.words()} for plan in found]
+        few = len(routes) < query.count
+        note = "there are no more routes by other links up to twice as dear" if few else ""
+        return {"routes": routes, "complete": not few, "note": note}
+
+    def on_floor(self, query: PartQuery) -> Tour:
+        """Return the parts of a route on one floor, to be written.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no route, or it does not visit the floor.
+        """
+        name = self._building.floors[query.floor].name
+        plan = self._outcome(query)
+        here = [
+            part for floor, part in zip(plan.floors, plan.results, strict=True) if floor == name
+        ]
+        if not plan.solved:
+            raise InvalidValueError(f"there is no route: {plan.status}")
+        if not here:
+            raise InvalidValueError(f"the route does not visit floor {name}: choose another floor")
+        return Tour(tuple(here), ())
+
+    def _outcome(self, query: PathQuery) -> BuildingPlan:
+        start, goal = self._ends(query)
+        return self._with(query.preset).plan(start, goal, **self._how(query))
+
+    def _ends(self, query: PathQuery) -> list[tuple[str, tuple[float, float]]]:
+        return [
+            (
+                self._building.floors[end.floor].name,
+                in_metres(end.point, self.sessions[end.floor].grid),
+            )
+            for end in (query.start, query.goal)
+        ]
+
+    def _how(self, query: PathQuery) -> dict[str, Any]:
+        """Return the conditions of a query, as `Building.plan` takes them."""
+        blocked: dict[str, Blocked] = {}
+        for each in query.closed.floors:
+            closed = self.sessions[each.floor].planning.blocked(each)
+            if closed is not None:
+                blocked[self._building.floors[each.floor].name] = closed
+        links, stairs = query.closed.links, query.stairs
+        return {"blocked": blocked, "closed_links": links, "stairs": stairs}
+
+    def _facts(self, plan: BuildingPlan) -> dict[str, Any]:
+        """Return the figures and lines of a plan, and its rides."""
+        number_of = self._number_of
+        parts = []
+        for name, result in zip(plan.floors, plan.results, strict=True):
+            number = number_of[name]
+            assert result.path is not None  # noqa: S101 - a plan without a route has no parts
+            line = in_grid(result.path.points, self.sessions[number].grid)
+            parts.append({"floor": number, "line": line})
+        rides = [
+            {
+                "link": ride.link.name,
+                "kind": ride.link.kind,
+                "from": number_of[ride.from_floor],
+                "to": number_of[ride.to_floor],
+                "seconds": ride.seconds,
+                "charge_m": ride.charge_m,
+            }
+            for ride in plan.rides
+        ]
+        figures = ("length_m", "charge_m", "travel_s")
+        return (
+            facts_of(plan, parts)
+            | {"rides": rides}
+            | {name: finite(getattr(plan, name)) for name in figures}
+        )
+
+
+def _is_plain(preset: str) -> bool:
+    """Return whether a preset plans over floors: without headings."""
+    ompl = load_preset(preset).planner.sampling
+    return ompl is None or not ompl.has_heading
