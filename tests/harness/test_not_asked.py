@@ -55,7 +55,7 @@ def folder(tmp_path_factory):
         baselines=(f"{__name__}:Narrow",),
         methods=(
             NamedMethod("baseline", "HPA*", "HPA* (20)", {"cluster_cells": 20}),
-            NamedMethod("preset", "octile", "near", {"planner.corridor": "neighbours"}),
+            NamedMethod("preset", "octile", "near", {"planner.allow_unexplored": True}),
         ),
         pairs=N_PAIRS,
         repeat=2,
@@ -113,7 +113,7 @@ def test_the_table_of_methods_has_the_reason(folder, study):
     assert rows["HPA* (20)"]["settings"] == "cluster_cells 20"
     assert rows["near"]["kind"] == "preset octile"
     assert (rows["octile"]["kind"], rows["grid-astar"]["kind"]) == ("preset", "baseline")
-    assert "corridor neighbours" in str(rows["near"]["settings"])
+    assert "allow_unexplored true" in str(rows["near"]["settings"])
     assert str(rows["octile"]["version"]).startswith("hybridnav ")
     for text in ((folder / file).read_text() for file in ("report.html", "summary.md")):
         assert LIMIT in text

@@ -87,7 +87,7 @@ class FoundMethod:
     Parameters
     ----------
     method
-        Answers a `Query` with a `Found`. Its `name`, `n_nodes`, `n_edges`, `memory_bytes`,
+        Answers a `Query` with a `Found`; its `prepare`, if it has one, is called here. Its `name`, `n_nodes`, `n_edges`, `memory_bytes`,
         `version` and `settings` are shown if it has them.
     grid
         The map.
@@ -95,6 +95,8 @@ class FoundMethod:
 
     def __init__(self, method: search.Method, grid: OccupancyGrid) -> None:
         self._method, self._frame = method, grid.frame
+        if callable(prepare := getattr(method, "prepare", None)):
+            prepare()
         cells = int((grid.classes == CellClass.FREE).sum())
         known = {"n_nodes": cells, "n_edges": 0, "memory_bytes": 0, "version": "", "settings": ""}
         for name, default in {"name": type(method).__name__, **known}.items():

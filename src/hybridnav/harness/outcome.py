@@ -73,7 +73,8 @@ class Outcome:
         return bool(self.preparation["status"] != NOT_ASKED)
 
     @cached_property
-    def _matched(self) -> list[Record | None]:
+    def matched(self) -> list[Record | None]:
+        """The method's record of each pair in the arrays, None for none."""
         own = {query_key(record): record for record in self.records}
         return [own.get(query_key(record)) for record in self.references]
 
@@ -89,7 +90,7 @@ class Outcome:
 
     def figure(self, key: str) -> FloatArray:
         """Return one number of each record."""
-        values = (record and record.get(key) for record in self._matched)
+        values = (record and record.get(key) for record in self.matched)
         return np.array([math.nan if value is None else value for value in values], dtype=float)
 
     @cached_property
@@ -119,7 +120,7 @@ class Outcome:
     def _lengths(self) -> dict[str, FloatArray]:
         """What was found and the optima: of the method's own paths without faults, of the grid's
         paths that stand in for them, and of all."""
-        figure, own = self.figure, [record or {} for record in self._matched]
+        figure, own = self.figure, [record or {} for record in self.matched]
         of_grid = np.nan_to_num(figure("by_grid")) > 0
         faulty = np.array([bool(record.get("faults")) for record in own], dtype=np.bool_)
         lines = np.array([is_any_angle(record) for record in own], dtype=np.bool_)
@@ -170,7 +171,7 @@ class Outcome:
     def _efforts(self) -> dict[str, FloatArray]:
         """Times, and the things taken from the queues of searches: none of a method that counts
         none."""
-        figure, own = self.figure, [record or {} for record in self._matched]
+        figure, own = self.figure, [record or {} for record in self.matched]
         solved = np.isfinite(self._lengths["lengths_m"])
         seconds, asked = figure("seconds"), figure("asked_seconds")
         answered = np.where(np.isfinite(asked), asked, seconds)
@@ -216,7 +217,7 @@ class Outcome:
     def by_grid(self) -> float:
         """Number of paths that are the grid's, because the method found none; NaN for a method
         without such a fallback."""
-        known = [record for record in self._matched if record and record.get("by_grid") is not None]
+        known = [record for record in self.matched if record and record.get("by_grid") is not None]
         return float(sum(record["by_grid"] for record in known)) if known else math.nan
 
     @property
@@ -237,7 +238,7 @@ class Outcome:
             if not np.nansum(self.figure("expanded_nodes")) > 0:
                 return math.nan
         else:
-            paths = ((record or {}).get("path") for record in self._matched)
+            paths = ((record or {}).get("path") for record in self.matched)
             steps = np.array([math.nan if path is None else path_steps(path) for path in paths])
         return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(steps))
 

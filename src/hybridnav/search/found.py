@@ -176,7 +176,13 @@ class Change(NamedTuple):
 
 
 class Method(Protocol):
-    """A search for paths on one map. A class that derives from it need only write `find`."""
+    """A search for paths on one map. A class that derives from it need only write `metric`, `find`
+    and a constructor, `Class(grid, *, costs=None, allow_unexplored=False)`.
+
+    The same class serves both: a planner, by `method: module:Class` in a preset, gives it the
+    keywords; the harness, by `--baseline module:Class`, the grid alone, and costs in a run with
+    costs. `prepare` is called once, before the first query.
+    """
 
     metric: Metric
     """The metric of all its paths, `octile`, `weighted` or `any-angle`."""

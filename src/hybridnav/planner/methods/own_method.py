@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +26,8 @@ def own_method(site: Site, settings: PlannerSettings) -> Method:
     """Import the class that settings name as their method, and make a method of it.
 
     The class is called with the grid, the keywords `costs` and `allow_unexplored`, and those of
-    `settings`. It needs `metric` and `find`; the defaults of `Method` stand for what it leaves out.
+    `settings`. It needs `metric` and `find`; `prepare`, if it has one, is called once, before the
+    first query.
 
     Raises
     ------
@@ -37,7 +40,10 @@ def own_method(site: Site, settings: PlannerSettings) -> Method:
         made = own(site.grid, **keywords, **settings.settings)
         metric, find = made.metric, made.find
     except Exception as error:
-        why = f"it makes no method of the map, {one_line(error)}: expected metric and find(query)"
+        why = (
+            f"it makes no method of the map, {one_line(error)}: expected a class of (grid, *, "
+            "costs, allow_unexplored) with metric and find(query)"
+        )
         raise refused(settings.method, why, "planner.method") from error
     if metric not in _METRICS or not callable(find):
         why = f"its metric is {brief(metric)}, expected one of {', '.join(_METRICS)}"
@@ -55,6 +61,8 @@ class OwnMethod(Method):
     def __init__(self, name: str, own: Any, refiner: GridRefiner) -> None:
         self._name, self._own, self._refiner = name, own, refiner
         self.metric = own.metric
+        self._is_prepared = not callable(getattr(own, "prepare", None))
+        self._preparing = threading.RLock()  # a progress callback may plan
 
     @property
     def prepared(self) -> Prepared | None:
@@ -62,23 +70,28 @@ class OwnMethod(Method):
         return None
 
     def prepare(self, progress: Progress = no_progress) -> object:
-        """Prepare the user's method, if it has that ability; see `Method`."""
-        own = getattr(self._own, "prepare", None)
-        if callable(own):
-            own()
+        """Prepare the user's method, once, if it has that ability; see `Method`."""
+        with self._preparing:
+            if not self._is_prepared:
+                self._own.prepare()
+                self._is_prepared = True
         return super().prepare(progress)
 
     def find(self, query: Query) -> Found:
-        """Find a path; see `Method`.
+        """Find a path, and time it if the method does not; see `Method`.
 
         Raises
         ------
         PresetError
             When the answer is no `Found`, or its path does not lead from start to goal.
         """
+        self.prepare()
+        began = time.perf_counter()
         found = self._own.find(query)
         if not isinstance(found, Found):
             raise self._wrong(f"a {type(found).__name__}")
+        if not found.stats.seconds:
+            found.stats.seconds["find"] = time.perf_counter() - began
         if not found.has_path:
             return found
         ends = [tuple(cell) for cell in np.asarray(found.cells)[[0, -1]].tolist()]
