@@ -19,7 +19,7 @@ from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
 )
 
 import hybridnav as hn
-from benchmarks.explore import narrow_world, widest_point
+from benchmarks.subjects.explore import narrow_world, widest_point
 from hybridnav.ext.graphs import build_route_graph
 from hybridnav.ext.live.explore import explore
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser, SimulatedSonars

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import hybridnav as hn
-from benchmarks.mapping import compare, map_log
+from benchmarks.subjects.mapping import compare, map_log
 from tests.layers import grid_of
 
 if TYPE_CHECKING:

@@ -12,9 +12,10 @@ import pytest
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks import _queries_scale, queries
-from benchmarks._queries_measure import measure, presets_of, read
-from benchmarks._queries_tables import page
+from benchmarks.common import read
+from benchmarks.subjects import _queries_scale, queries
+from benchmarks.subjects._queries_measure import measure, presets_of
+from benchmarks.subjects._queries_tables import page
 
 if TYPE_CHECKING:
     from hybridnav.harness.tables import Row

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks._study_data import part_figures
+from benchmarks.subjects._study_data import part_figures
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common

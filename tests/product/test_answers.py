@@ -8,8 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks._study_maps import maps_of
-from benchmarks.answers import ANSWERS, command_answers, differences, file_answers, map_answers
+from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects.answers import (
+    ANSWERS,
+    command_answers,
+    differences,
+    file_answers,
+    map_answers,
+)
 
 DATA = os.environ.get("HYBRIDNAV_DATA")
 EXPECTED = json.loads(ANSWERS.read_text())

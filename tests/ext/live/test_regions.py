@@ -13,8 +13,8 @@ from hypothesis.stateful import invariant, rule, run_state_machine_as_test
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import random_changes, with_classes
+from benchmarks.common import OFFICE, with_classes
+from benchmarks.subjects.online import random_changes
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRegions
 from hybridnav.maps import Frame, OccupancyGrid

@@ -18,8 +18,8 @@ from hypothesis.stateful import (
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import random_changes
+from benchmarks.common import OFFICE
+from benchmarks.subjects.online import random_changes
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlineRooms
 from hybridnav.maps import Frame, OccupancyGrid

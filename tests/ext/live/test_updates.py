@@ -19,8 +19,8 @@ from hypothesis.stateful import (
 )
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import area_of, random_changes, with_classes
+from benchmarks.common import OFFICE, with_classes
+from benchmarks.subjects.online import area_of, random_changes
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, cellwise
 from hybridnav.maps import Frame, OccupancyGrid

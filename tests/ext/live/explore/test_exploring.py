@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.explore import missed_cells, narrow_world, widest_point
+from benchmarks.subjects.explore import missed_cells, narrow_world, widest_point
 from hybridnav.ext.live.explore import By, Exploration, Goals, Step, explore, laser_all_round
 from hybridnav.ext.live.explore.doubts import doubtful_spots, narrow_spots
 from hybridnav.ext.live.explore.robot import Robot
