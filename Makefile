@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
-NOJIT_TESTS := tests/pyramid/test_blocks.py tests/pyramid/test_invariants.py tests/search/test_search.py
+NOJIT_TESTS := tests/pyramid/test_invariants.py tests/search/test_search.py
 
 # quarter or whole; the folder of the maps.
 STUDY ?= quarter

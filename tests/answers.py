@@ -5,8 +5,6 @@
 `tests/product/test_processors.py` runs it as different processors do, and compares.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

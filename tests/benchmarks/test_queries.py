@@ -1,11 +1,9 @@
 """The table of queries: figures on both optima, broken promises, and runs that go on."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +14,7 @@ from benchmarks.common import read
 from benchmarks.subjects import _queries_scale, queries
 from benchmarks.subjects._queries_measure import measure, presets_of
 from benchmarks.subjects._queries_tables import page
-
-if TYPE_CHECKING:
-    from hybridnav.harness.tables import Row
+from hybridnav.harness.tables import Row
 
 MAP = "figure1/figure1.yaml"
 FILES = {MAP: Path(__file__).parents[2] / "maps" / MAP}

@@ -1,7 +1,5 @@
 """The runner of the benchmarks: it knows all subjects, and each command that a page gives works."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

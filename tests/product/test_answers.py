@@ -1,7 +1,5 @@
 """The answers file: whatever is planned, built and written stays what it is, bit for bit."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,15 +1,14 @@
 """The searches against scipy's and networkx's: grid A*, distances in fields, cheapest arcs."""
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from hybridnav._base.fields import field_distances
 from hybridnav._base.moves import (
@@ -27,12 +26,9 @@ from hybridnav.search.kernels import astar as _astar_kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import block_labels, class_grids, drawn, examples
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Bools = NDArray[np.bool_]
-    Cells = NDArray[np.int64]
-    Labels = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+Cells = NDArray[np.int64]
+Labels = NDArray[np.int32]
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -1,7 +1,5 @@
 """Pictures of graphs: asked what they show, not compared with pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ from hybridnav.viz import plot_dual, plot_figure1, plot_topology, save_figure, s
 from hybridnav.viz.boundaries import Boundaries, boundary_line
 from hybridnav.viz.fields import Field, Loops
 from hybridnav.viz.topology import Arc
-from tests.strategies import drawn, examples, occupancy_grid, scenes
+from tests.strategies import drawn, examples, level_of, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[2] / "maps"
 SOME = settings(max_examples=examples(25), deadline=None)
@@ -43,13 +41,6 @@ def two_doors():
     cells[5:7, [4, 14]] = 1.0
     grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(1.0), name="two doors")
     return DualGraphPyramid.build(grid, merge_distance_m=30.0)[-1]
-
-
-def level_of(scene, index):
-    pyramid = DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, seed=scene.seed
-    )
-    return pyramid[min(index, len(pyramid) - 1)]
 
 
 def found(ax, gid):
