@@ -18,9 +18,8 @@ from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.judges import judge_line, judge_path
 from hybridnav.harness.outcome import loss_of
-from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
+from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.maps.files.movingai import read_scenarios
 from hybridnav.planner import load_preset
 
 if TYPE_CHECKING:
@@ -38,9 +37,6 @@ OPEN_SHARE = 0.1
 than the merge distance."""
 N_WARM = 3
 """Pairs that every planner answers before the clock runs."""
-_ROUNDED = 0.004
-"""Cells, and share, by which the optimum that a scenario file states may differ: some are rounded,
-some count 1.41 for a diagonal."""
 SLACK = 1e-9
 """Relative difference of two lengths that is rounding."""
 
@@ -84,8 +80,7 @@ def measure(
     presets
         Those of `presets_of`.
     asked
-        How many pairs, and the seed of those that are sampled; whether they are problems of the
-        map's scenario file instead.
+        How many pairs, and their seed.
 
     Returns
     -------
@@ -99,7 +94,7 @@ def measure(
     InvalidValueError
         When the map has no pair of cells to ask for.
     """
-    queries = _pairs(path, grid, asked)
+    queries = sample_pairs(grid, asked["asked"], seed=asked["seed"])
     if not queries:
         raise hn.InvalidValueError(f"map {grid.name} has no two free cells that are joined")
     is_movingai = path.suffix == ".map"
@@ -135,14 +130,6 @@ def measure(
             "broken": len(faults[name]),
         }
     return list(rows.values()), [f"{name}: {line}" for name in faults for line in faults[name]]
-
-
-def _pairs(path: Path, grid: hn.OccupancyGrid, asked: Mapping[str, int]) -> list[Pair]:
-    """The pairs of a map: sampled, or spread evenly over its scenario file."""
-    if not asked["scenarios"]:
-        return sample_pairs(grid, asked["asked"], seed=asked["seed"])
-    stated = scenario_pairs(grid, read_scenarios(path.with_name(path.name + ".scen")))
-    return evenly_spread(stated, asked["asked"])
 
 
 def _endpoints(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:
@@ -206,11 +193,6 @@ def _ask(
             result = planners[name].plan(*endpoints)
             results[name] = result, 1e6 * (time.perf_counter() - began)
         expected = results[YARDSTICK][0].status
-        stated, found_m = pair.stated_optimum_cells, results[YARDSTICK][0].cost
-        if stated is not None and not math.isclose(
-            found_m / grid.resolution_m, stated, rel_tol=_ROUNDED, abs_tol=_ROUNDED
-        ):
-            faults[YARDSTICK].append(f"{pair.start} to {pair.goal}: {stated} cells are stated")
         for name, (result, _) in results.items():
             wrong = _faults(grid, pair, result)
             wrong += [] if result.status == expected else [f"{result.status}, not {expected}"]

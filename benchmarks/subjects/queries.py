@@ -12,11 +12,6 @@ already are not measured again.
 The answers are checked as well: paths are legal, statuses agree with A*'s, lower bound <= optimum
 <= cost in the metric of the path, gap <= epsilon. Where one is not, it is listed on stderr and the
 exit code is 1.
-
-`--scenarios` takes MovingAI maps alone, and instead of sampled pairs the problems of each map's
-scenario file, spread evenly over it; A*'s lengths must then be those that the file states.
-
-With `--scale` one building, tiled to so many millions of cells: see `_queries_scale`.
 """
 
 from __future__ import annotations
@@ -30,9 +25,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hybridnav as hn
-from benchmarks.common import DATA, OFFICE, SEED, Refused, maps_of, option, read
+from benchmarks.common import DATA, SEED, Refused, maps_of, option, read
 from benchmarks.subjects._queries_measure import measure, presets_of, warm_up
-from benchmarks.subjects._queries_scale import scale
 from benchmarks.subjects._queries_tables import n_broken, page
 from hybridnav.harness.tables import to_csv
 
@@ -43,7 +37,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.tables import Row
 
 Asked = dict[str, int]
-"""Pairs that were asked for, their seed, and whether they are those of scenario files."""
+"""Pairs that were asked for, and their seed."""
 _WORDS = frozenset({"map", "preset", "kind", "metric", "error"})
 
 
@@ -97,30 +91,19 @@ OPTIONS = [
     option("--maps", action="append", default=[], metavar="GLOB"),
     option("--pairs", type=int),
     SEED,
-    option("--scenarios", action="store_true"),
-    option("--scale", metavar="MILLIONS"),
 ]
 
 
 def main(given: Namespace) -> int:
     """Run and print the tables."""
     names = [] if given.data is None else maps_of(given.data, given.maps)
-    if given.scenarios:
-        names = [name for name in names if name.endswith(".map")]
-    if given.scale is not None:
-        if given.maps and len(names) != 1:
-            raise Refused(f"--scale tiles one map, --maps matches {len(names)}")
-        file = given.data / names[0] if given.maps else OFFICE
-        millions = [float(text) for text in given.scale.split(",")]
-        print(scale(file, millions, pairs=given.pairs or 100, seed=given.seed))
-        return 0
     if not names:
         raise Refused("no map: the table needs --data or HYBRIDNAV_DATA, and --maps that match")
     all_presets = ",".join(name for name in hn.preset_names() if name != "ompl")
     presets = presets_of((given.presets or all_presets).split(","))
     files = {name: given.data / name for name in names}
     try:
-        pairs = {"asked": given.pairs or 200, "seed": given.seed, "scenarios": given.scenarios}
+        pairs = {"asked": given.pairs or 200, "seed": given.seed}
         rows = run(files, presets, given.out, pairs)
     except hn.InvalidValueError as error:
         raise Refused(str(error)) from error
