@@ -16,7 +16,7 @@ LIMITS = {
     "lines visited by paper": 11_300,
     "modules of a plan and a picture": 157,
     "imports, % of the code": 10.1,
-    "lines of tests": 55_850,
+    "lines of tests": 55_800,
 }
 
 

@@ -211,7 +211,14 @@ def test_a_map_with_a_side_too_long_for_16_bits_is_searched_too() -> None:
         assert_legal(found.cells, free)
 
 
-def assert_states(data: Path, name: str, step: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [
+        *((name, 4) for name in scenario_files()[::8][:QUICK_FILES]),
+        *(pytest.param(name, 1, marks=pytest.mark.full) for name in scenario_files()),
+    ],
+)
+def test_lengths_are_those_that_scenarios_state(data: Path, name: str, step: int) -> None:
     grid, problems = problem_set(data / "movingai" / name)
     free = grid.classes == CellClass.FREE
     both = searches(free)
@@ -221,20 +228,6 @@ def assert_states(data: Path, name: str, step: int) -> None:
         assert found.cells is not None
         assert_legal(found.cells, free)
         assert problem.states(found.cells), scenario
-
-
-@pytest.mark.parametrize("name", scenario_files()[::8][:QUICK_FILES])
-def test_lengths_are_those_that_some_scenarios_state(data: Path, name: str) -> None:
-    assert_states(data, name, step=4)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", scenario_files())
-def test_lengths_are_those_that_all_scenarios_state(data: Path, name: str) -> None:
-    assert_states(data, name, step=1)
-
-
-SEEDS = st.integers(0, 2**32 - 1)
 
 
 def some_map(rng: np.random.Generator) -> Any:
@@ -264,7 +257,7 @@ def changed(free: Any, rng: np.random.Generator) -> Any:
 
 
 @settings(max_examples=examples(60), deadline=None)
-@given(SEEDS, st.booleans())
+@given(seeds, st.booleans())
 def test_paths_after_changes_are_shortest(seed: int, contracted: bool) -> None:  # noqa: FBT001
     rng = np.random.default_rng(seed)
     free = some_map(rng)
