@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
-NOJIT_TESTS := tests/pyramid/test_blocks.py tests/pyramid/test_invariants.py tests/search/test_search.py
+NOJIT_TESTS := tests/pyramid/test_invariants.py tests/search/test_search.py
 
 # quarter or whole; the folder of the maps.
 STUDY ?= quarter
@@ -46,7 +46,7 @@ site: setup
 # stopped goes on. Planners of others are asked if they can be installed.
 study: setup
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --editable '.[bench]'
-	HYBRIDNAV_DATA='$(HYBRIDNAV_DATA)' $(BIN)/python -m benchmarks.study --study $(STUDY)
+	HYBRIDNAV_DATA='$(HYBRIDNAV_DATA)' $(BIN)/python -m benchmarks study --study $(STUDY)
 
 # On all cores, a file of tests to each in turn.
 unit: setup
@@ -75,7 +75,7 @@ $(READY): requirements.lock pyproject.toml
 	touch $(READY)
 
 maps: setup
-	$(BIN)/python -m benchmarks.worlds maps
+	$(BIN)/python -m benchmarks worlds maps
 
 # Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
 lock:

@@ -5,8 +5,6 @@
 `tests/product/test_processors.py` runs it as different processors do, and compares.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys
@@ -19,7 +17,7 @@ from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
 )
 
 import hybridnav as hn
-from benchmarks.explore import narrow_world, widest_point
+from benchmarks.subjects.explore import narrow_world, widest_point
 from hybridnav.ext.graphs import build_route_graph
 from hybridnav.ext.live.explore import explore
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser, SimulatedSonars

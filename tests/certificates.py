@@ -1,10 +1,8 @@
 """Plans held against what they prove: lower bound <= optimum <= cost."""
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +10,7 @@ import pytest
 import hybridnav as hn
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
-
-if TYPE_CHECKING:
-    from tests.strategies import Scene
+from tests.strategies import Scene
 
 Cell = tuple[int, int]
 

@@ -1,10 +1,9 @@
 """Alternatives by doors of a random floor: what holds of them by lengths as by costs."""
 
-from __future__ import annotations
-
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -13,12 +12,7 @@ import shapely
 
 import hybridnav as hn
 from hybridnav.harness.judges import judge_path
-from tests.floors import random_floor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.floors import Floor
+from tests.floors import Floor, random_floor
 
 
 @dataclass(frozen=True)

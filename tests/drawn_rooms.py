@@ -1,10 +1,9 @@
 """Maps with rooms, drawn with a letter for each room."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
+from PIL import Image
 
 import hybridnav as hn
 
@@ -50,6 +49,17 @@ def topology_of(lines, doors=None, *, robot_radius_m=0.0, **frame):
         (letters == "#").astype(np.float32), hn.Frame(SIDE, **frame), robot_radius_m=robot_radius_m
     )
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+
+
+def write_ros(folder, name, pixels, side=SIDE):
+    """Write a ROS map of grey values, y up, with cells of so many metres; return its YAML file."""
+    Image.fromarray(np.asarray(pixels)[::-1].astype(np.uint8)).save(folder / f"{name}.pgm")
+    path = folder / f"{name}.yaml"
+    path.write_text(
+        f"image: {name}.pgm\nresolution: {side}\norigin: [0, 0, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return path
 
 
 @cache

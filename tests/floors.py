@@ -1,7 +1,5 @@
 """Random floors of rooms with doors of one cell, and every way through them, by networkx."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
@@ -38,7 +36,7 @@ class Floor:
         """Label of the room of a cell."""
         return int(self.label_of[cell])
 
-    def moves(self, *, doors: set[int] | None = None) -> nx.Graph[Cell]:
+    def moves(self, *, doors: set[int] | None = None) -> "nx.Graph[Cell]":
         """The legal moves inside rooms, and through some doors, with their lengths."""
         graph: nx.Graph[Cell] = nx.Graph()
         graph.add_nodes_from((row, col) for row, col in np.argwhere(self.classes == 1).tolist())
@@ -55,7 +53,7 @@ class Floor:
                 graph.add_edge(one, other, weight=1.0)
         return graph
 
-    def darts(self, start: Cell, goal: Cell) -> nx.DiGraph[Any]:
+    def darts(self, start: Cell, goal: Cell) -> "nx.DiGraph[Any]":
         """A node for each door and direction, and the ends; edges are paths inside one room."""
         inside = self.moves(doors=set())
         away = {

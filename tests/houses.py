@@ -1,7 +1,5 @@
 """Small buildings that several tests ask: two rooms a floor, and the file of two floors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

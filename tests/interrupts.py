@@ -1,18 +1,14 @@
 """Interrupts at chosen moments: before any line of the package, or by a timer."""
 
-from __future__ import annotations
-
 import signal
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import FrameType
+from typing import Any
 
 import hybridnav
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from types import FrameType
 
 _PACKAGE = str(Path(hybridnav.__file__).parent)
 

@@ -1,7 +1,5 @@
 """Maps and layers of costs from arrays of any type."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import hybridnav as hn

@@ -1,7 +1,5 @@
 """How much memory a process of a test has taken."""
 
-from __future__ import annotations
-
 import resource
 import sys
 from pathlib import Path

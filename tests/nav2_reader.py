@@ -4,15 +4,11 @@ It follows `geojson_graph_file_loader.cpp` of nav2_route: what that loader refus
 otherwise than written, fails here. Above it asks what strict readers of GeoJSON ask.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
+from typing import Any
 
 UNSIGNED = 2**32
 

@@ -5,18 +5,13 @@ become cells by a floor, and every cell that Bresenham's line visits between the
 than one within the inscribed radius.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 from scipy import ndimage
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav import OccupancyGrid
+from hybridnav import OccupancyGrid
 
 
 class Costmap:

@@ -1,7 +1,5 @@
 """Small maps and points for tests of every preset that plans on the grid."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

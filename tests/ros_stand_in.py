@@ -4,17 +4,13 @@ Messages check the type and the range of what is assigned to their fields, as th
 Definitions are those of Nav2 (Kilted) and common_interfaces.
 """
 
-from __future__ import annotations
-
 import copy
 import sys
 import types
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import pytest
+import pytest
 
 _INTEGERS = {
     "int32": (-(2**31), 2**31 - 1),
@@ -161,7 +157,7 @@ class Time:
     def __init__(self, *, nanoseconds: int = 0) -> None:
         self.nanoseconds = nanoseconds
 
-    def __sub__(self, other: Time) -> Duration:
+    def __sub__(self, other: "Time") -> "Duration":
         return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
 
 

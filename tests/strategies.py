@@ -1,24 +1,18 @@
 """Hypothesis strategies for maps of all three classes, and maps drawn as text."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from numpy.typing import NDArray
 
 from hybridnav.maps import CellClass, Frame, OccupancyGrid, RoomLabels
-from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid import DualGraphPyramid, Linkage
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav.pyramid import Linkage
-
-    Classes = NDArray[np.uint8]
+Classes = NDArray[np.uint8]
 
 MAX_SIDE = 12 if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0" else 40
 """Largest side of a random map; kernels that run as plain Python get small ones."""
@@ -30,10 +24,14 @@ _LETTERS = {"#": CellClass.OCCUPIED, ".": CellClass.FREE, "?": CellClass.UNEXPLO
 _CLASSES = st.sampled_from([1, 1, 2, 0])
 
 
-def examples(count: int) -> int:
-    """Return how many random examples a test tries: half of those named, and more of them where
-    `HYBRIDNAV_EXAMPLES` asks for it, as `make test-full` does."""
-    return max(5, round(count * _EXAMPLES))
+IS_FULL = "HYBRIDNAV_EXAMPLES" in os.environ
+"""Whether many random examples are asked for, as `make test-full` does."""
+
+
+def examples(count: int, full: int = 0) -> int:
+    """Return how many random examples a test tries: half of those named, four times as many where
+    `IS_FULL`, or then by the same factor of a number of their own."""
+    return max(5, round((full if full and IS_FULL else count) * _EXAMPLES))
 
 
 def drawn(*lines: str) -> Classes:
@@ -47,6 +45,24 @@ def occupancy_grid(classes: Classes, *, resolution_m: float = 1.0) -> OccupancyG
     for cell_class, value in _PROBABILITY.items():
         probability[classes == cell_class] = value
     return OccupancyGrid(probability, frame=Frame(resolution_m=resolution_m), robot_radius_m=0)
+
+
+def framed(
+    classes: Classes, yaw_rad: float = 0.0, *, corner_cutting: bool = False
+) -> OccupancyGrid:
+    """The map with a resolution, an origin and a yaw that no rounding is kind to."""
+    frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
+    probability = occupancy_grid(classes).probability
+    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting, robot_radius_m=0)
+
+
+def free_cells(classes: Classes, seed: int, count: int) -> list[tuple[int, int]]:
+    """Some free cells of a map, none of a map without."""
+    free = np.argwhere(classes == CellClass.FREE)
+    if not len(free):
+        return []
+    chosen = np.random.default_rng(seed).integers(len(free), size=count)
+    return [(int(row), int(col)) for row, col in free[chosen]]
 
 
 @dataclass(frozen=True)
@@ -68,6 +84,12 @@ class Scene:
         return DualGraphPyramid.build(
             self.grid, merge_distance_m=self.merge_distance_m, linkage=linkage, seed=self.seed
         )
+
+
+def level_of(scene: Scene, index: int) -> Any:
+    """A level of the scene's pyramid, the last one where there are fewer."""
+    pyramid = scene.pyramid("radius")
+    return pyramid[min(index, len(pyramid) - 1)]
 
 
 @st.composite

@@ -1,7 +1,5 @@
 """Messages quote what they were given on one line, of at most 80 characters."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The project's own maps, generated: `python -m benchmarks.worlds maps` writes their files."""
+"""The project's own maps, generated: `python -m benchmarks worlds maps` writes their files."""
 
 from benchmarks.worlds.figure1 import figure1_world
 from benchmarks.worlds.office import office_world

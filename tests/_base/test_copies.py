@@ -1,7 +1,5 @@
 """Copies of objects that hold locks."""
 
-from __future__ import annotations
-
 import copy
 import threading
 

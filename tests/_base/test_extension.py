@@ -1,7 +1,5 @@
 """Entry points: what other packages add is found by name; what is not there is said in a line."""
 
-from __future__ import annotations
-
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any

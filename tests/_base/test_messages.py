@@ -1,7 +1,5 @@
 """Grids and paths as messages of ROS, without ROS: round trips, rotations, hostile messages."""
 
-from __future__ import annotations
-
 import array
 import json
 import math

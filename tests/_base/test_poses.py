@@ -1,7 +1,5 @@
 """Poses along a path: even, complete, and turned the way the robot drives."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

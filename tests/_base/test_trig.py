@@ -1,11 +1,9 @@
 """Sines, angles, exponentials and logarithms: right, and bit for bit the same everywhere."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,9 +12,6 @@ from numba import njit
 import hybridnav.ext.live.mapping  # noqa: F401 - its kernels make the functions known to numba
 from hybridnav._base import trig as _trig
 from hybridnav._base.trig import acos, asin, atan2, cos, exp, log, sin, tan
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 ODD = [0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e-300, -1e300, 5e-324]
 RANGES = [

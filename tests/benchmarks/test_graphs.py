@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks import _study_graphs
-from benchmarks._study_graphs import MOST_SKELETON, NODES, RouteGraphMethod, SwaggerLike
-from benchmarks._study_run import GRAPHS
-from benchmarks._swagger_like import (
+from benchmarks.subjects import _study_graphs
+from benchmarks.subjects._study_graphs import MOST_SKELETON, NODES, RouteGraphMethod, SwaggerLike
+from benchmarks.subjects._study_run import GRAPHS
+from benchmarks.subjects._swagger_like import (
     BOUNDARY_M,
     SKELETON_M,
     SPACE_M,

@@ -1,17 +1,12 @@
 """The table of maps from logs, on real logs: agreement with counting grids of the same scans."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 import hybridnav as hn
-from benchmarks.mapping import compare, map_log
+from benchmarks.subjects.mapping import compare, map_log
 from tests.layers import grid_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.mark.parametrize("name", ["intel", "orebro"])

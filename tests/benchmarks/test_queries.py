@@ -1,27 +1,24 @@
 """The table of queries: figures on both optima, broken promises, and runs that go on."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks import _queries_scale, queries
-from benchmarks._queries_measure import measure, presets_of, read
-from benchmarks._queries_tables import page
-
-if TYPE_CHECKING:
-    from hybridnav.harness.tables import Row
+from benchmarks.subjects import queries
+from benchmarks.subjects._queries_measure import presets_of
+from benchmarks.subjects._queries_tables import page
+from benchmarks.subjects.start import tiled_building
+from hybridnav.harness.tables import Row
 
 MAP = "figure1/figure1.yaml"
 FILES = {MAP: Path(__file__).parents[2] / "maps" / MAP}
-ASKED = {"asked": 12, "seed": 0, "scenarios": 0}
+ASKED = {"asked": 12, "seed": 0}
 NAMES = ("paper", "grid-astar:planner.smooth=line-of-sight")
 
 
@@ -52,19 +49,6 @@ def test_every_preset_is_set_beside_both_optima(tmp_path: Path) -> None:
     text = page(list(rows.values()))
     assert "Promises broken: 0." in text
     assert "| paper | 1 |" in text
-
-
-def test_problems_of_a_scenario_file_are_asked_and_held_against_it(tmp_path: Path) -> None:
-    path = tmp_path / "room.map"
-    path.write_text("type octile\nheight 3\nwidth 4\nmap\n....\n.@@.\n....\n")
-    problems = ((0, 0, 3, 0, 3.0), (0, 0, 3, 2, 5.0), (0, 0, 0, 2, 9.0))
-    lines = (f"0\troom.map\t4\t3\t{a}\t{b}\t{c}\t{d}\t{cost}\n" for a, b, c, d, cost in problems)
-    path.with_name("room.map.scen").write_text("version 1\n" + "".join(lines))
-    rows, wrong = measure(path, read(path), presets_of(["paper"]), {**ASKED, "scenarios": 1})
-    assert [row["pairs"] for row in rows] == [3, 3]
-    assert [row["kind"] for row in rows] == [f"MovingAI {tmp_path.name}"] * 2
-    assert len(wrong) == 1
-    assert "9.0 cells are stated" in wrong[0]
 
 
 def test_a_map_is_not_measured_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,20 +94,6 @@ def test_a_broken_promise_is_counted_and_named(
 def test_a_tiled_building_is_connected() -> None:
     free = np.zeros((9, 14), np.bool_)
     free[2:7, 3:9] = free[4, 9:13] = free[0, 0] = True
-    whole = _queries_scale._tiled(free, 1000)
+    whole = tiled_building(free, 1000)
     assert whole.size >= 1000
     assert ndimage.label(whole)[1] == 1
-
-
-def test_the_scale_table_counts_paths_that_are_not_the_shortest(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    free = np.zeros((9, 14), np.bool_)
-    free[2:7, 3:9] = free[4, 9:13] = True
-    whole = _queries_scale._tiled(free, 1000)
-    _, row = _queries_scale._rows_of(whole, pairs=4, seed=0)
-    assert (row["structure"], row["compared"], row["differ"]) == ("shortest", 4, 0)
-    monkeypatch.setattr(_queries_scale, "_by_intervals", lambda _, queries: [0.5] * len(queries))
-    _, row = _queries_scale._rows_of(whole, pairs=4, seed=0)
-    assert row["differ"] == 4
-    assert "4 paths are not the shortest" in capsys.readouterr().err

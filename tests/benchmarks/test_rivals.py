@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks._study_run import RIVALS
 from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, Tcod
 from benchmarks.rivals_any_angle import ExtremityPathfinder, OmplWhole
+from benchmarks.subjects._study_run import RIVALS
 from hybridnav.errors import InvalidValueError, OmplError, UnsuitableMapError
 from hybridnav.harness.judges import (
     CheapestCost,

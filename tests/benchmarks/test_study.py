@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from benchmarks import study
-from benchmarks._study_archive import write_archive
-from benchmarks._study_data import collect
-from benchmarks._study_maps import StudyMap
-from benchmarks._study_page import page
-from benchmarks._study_pdf import MOST_PAGES, charts_of, sheets_of
-from benchmarks._study_run import (
+from benchmarks.__main__ import main
+from benchmarks.subjects import study
+from benchmarks.subjects._study_archive import write_archive
+from benchmarks.subjects._study_data import collect
+from benchmarks.subjects._study_maps import StudyMap
+from benchmarks.subjects._study_page import page
+from benchmarks.subjects._study_pdf import MOST_PAGES, charts_of, sheets_of
+from benchmarks.subjects._study_run import (
     GRAPHS,
     PLANS,
     RIVALS,
@@ -29,8 +30,8 @@ from benchmarks._study_run import (
     rivals,
     run,
 )
-from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
-from benchmarks._study_tables import tables_of
+from benchmarks.subjects._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
+from benchmarks.subjects._study_tables import tables_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES
 from hybridnav.planner import load_preset
@@ -339,7 +340,7 @@ def test_a_second_run_asks_nothing_again(folder, monkeypatch):
 
 def test_a_run_that_is_stopped_goes_on_and_its_time_counts(tmp_path, monkeypatch):
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
-    monkeypatch.setattr("benchmarks._study_run._SPEAK_S", 0.0)
+    monkeypatch.setattr("benchmarks.subjects._study_run._SPEAK_S", 0.0)
     part = Part("lengths", ("octile",), (), 4, 0)
     figure = [StudyMap(MAPS / "figure1/figure1.yaml", "ROS")]
 
@@ -402,7 +403,7 @@ def test_a_quarter_asks_a_quarter_of_the_pairs():
 )
 def test_what_cannot_be_run_is_said_in_one_line(arguments, code, words, monkeypatch, capsys):
     monkeypatch.delenv("HYBRIDNAV_DATA", raising=False)
-    assert study.main(list(arguments)) == code
+    assert main(["study", *arguments]) == code
     err = capsys.readouterr().err
     assert words in err
     assert err.count("\n") == 1

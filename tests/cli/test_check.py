@@ -1,7 +1,5 @@
 """`hybridnav check` and `hybridnav evaluate --graph`: output, files, exit codes."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

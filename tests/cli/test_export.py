@@ -1,7 +1,5 @@
 """`hybridnav export`: a route graph from a map file."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

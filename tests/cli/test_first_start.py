@@ -1,7 +1,5 @@
 """The first start: who compiles what, the lines for the user, and what an interrupt leaves."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal

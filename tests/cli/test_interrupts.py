@@ -1,7 +1,5 @@
 """Ctrl-C at any moment of a command: exit code 130, nothing on stderr, files old or new."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -1,7 +1,5 @@
 """Models on the command line: built, planned on, listed, drawn, measured."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

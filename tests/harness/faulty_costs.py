@@ -1,14 +1,13 @@
 # ruff: noqa: D102 - what `solve` does differently is what each class says
 """Methods that plan by costs, each with one planted fault, for the harness to catch."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import hybridnav as hn
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.maps.costs import cost_along
@@ -17,10 +16,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 from tests.harness.faulty_methods import length_of
 
-if TYPE_CHECKING:
-    import hybridnav as hn
-
-    Cell = tuple[int, int]
+Cell = tuple[int, int]
 
 
 class Cheapest(GridAstar):
@@ -55,32 +51,25 @@ class DearSaidOptimal(Cheapest):
         if len(answer.cells) < 2:
             return answer
         cells = np.concatenate([answer.cells[:2], answer.cells])
-        cost_m = self.cost_m(cells)
-        return replace(
-            answer, cells=cells, by_costs=replace(claim, cost_m=cost_m, lower_bound_m=cost_m)
-        )
+        return replace(answer, cells=cells, by_costs=self.claimed(claim, self.cost_m(cells)))
+
+    def claimed(self, claim: CostClaim, cost_m: float) -> CostClaim:
+        """Return what is claimed of the dearer path."""
+        return replace(claim, cost_m=cost_m, lower_bound_m=cost_m)
 
 
-class DearSaidCheap(Cheapest):
+class DearSaidCheap(DearSaidOptimal):
     """A dearer path that claims the cost of the cheapest."""
 
-    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
-        assert answer.cells is not None
-        if len(answer.cells) < 2:
-            return answer
-        cells = np.concatenate([answer.cells[:2], answer.cells])
-        return replace(answer, cells=cells, by_costs=claim)
+    def claimed(self, claim: CostClaim, cost_m: float) -> CostClaim:  # noqa: ARG002
+        return claim
 
 
-class HonestlyDear(Cheapest):
+class HonestlyDear(DearSaidOptimal):
     """A dearer path with its true cost and the right bound: no fault."""
 
-    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
-        assert answer.cells is not None
-        if len(answer.cells) < 2:
-            return answer
-        cells = np.concatenate([answer.cells[:2], answer.cells])
-        return replace(answer, cells=cells, by_costs=replace(claim, cost_m=self.cost_m(cells)))
+    def claimed(self, claim: CostClaim, cost_m: float) -> CostClaim:
+        return replace(claim, cost_m=cost_m)
 
 
 class BoundAboveItsCost(Cheapest):

@@ -1,32 +1,25 @@
 # ruff: noqa: D102 - what `solve` does differently is what each class says
 """Methods with planted faults, for the harness to catch; workers import them by name."""
 
-from __future__ import annotations
-
 import math
 import os
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.planner import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav.maps import OccupancyGrid
-
-    Cell = tuple[int, int]
+Cell = tuple[int, int]
 
 FATAL_PAIR = "HYBRIDNAV_TEST_FATAL_PAIR"
 """Environment variable: the `Pair.key` at which `Dies` and `Hangs` do so, without its kind."""

@@ -3,6 +3,10 @@
 import os
 from pathlib import Path
 
+import numpy as np
+
+from hybridnav.maps import CellClass
+
 ROOT = Path(__file__).parents[2]
 ROOMS = [
     "####################",
@@ -39,6 +43,21 @@ def write_map(folder, lines, name="rooms"):
     path = folder / f"{name}.map"
     path.write_text(f"type octile\nheight {len(lines)}\nwidth {len(lines[0])}\nmap\n{body}")
     return path
+
+
+def free_pairs(classes, count, seed):
+    """Some pairs of free cells of a map, none of a map without."""
+    cells = np.argwhere(classes == CellClass.FREE)
+    if not len(cells):
+        return []
+    chosen = cells[np.random.default_rng(seed).integers(len(cells), size=(count, 2))]
+    return [((a, b), (c, d)) for (a, b), (c, d) in chosen.tolist()]
+
+
+def outcome_of(study, method):
+    """Return what a study holds of a method, by its class or by its name in tables."""
+    names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
+    return next(outcome for outcome in study.outcomes if outcome.label in names)
 
 
 def run_here(tasks, **_settings):

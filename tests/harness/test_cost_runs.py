@@ -1,7 +1,5 @@
 """Runs of the harness with costs: optima, planted faults, records, resume, refusals."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any
@@ -23,10 +21,10 @@ from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.records import RECORDS_FILE, decode_path, read_records
 from hybridnav.maps.costs import cost_along
 from tests.harness import faulty_costs as faulty
-from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_here, write_map
 from tests.layers import layer_of
 from tests.oracle.grid import distances, move_graph
-from tests.search.test_weighted import weighted
+from tests.search.test_grid_search import weighted
 
 FAULTS = {
     faulty.DearSaidOptimal: "is above the weighted optimum",
@@ -82,11 +80,6 @@ def scene(settings: RunSettings) -> Any:
     grid = hn.load_map(settings.maps[0], robot_radius_m=0)
     layer = hn.CostLayer.clearance(grid, inflation_radius_m=3, scaling=0.5, multiplier=6)
     return grid, layer, weighted(move_graph(grid.enterable()), layer.factors.astype(float))
-
-
-def outcome_of(study: Any, method: Any) -> Any:
-    names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
-    return next(outcome for outcome in study.outcomes if outcome.label in names)
 
 
 @pytest.mark.parametrize("method", FAULTS)

@@ -19,7 +19,15 @@ from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, ROOT, importable, label_of, name_of, write_map
+from tests.harness.small_runs import (
+    ROOMS,
+    ROOT,
+    importable,
+    label_of,
+    name_of,
+    outcome_of,
+    write_map,
+)
 
 FAULTS = {
     faulty.ThroughWall: "is not free",
@@ -77,11 +85,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def study(folder):
     return write_outputs(folder)
-
-
-def outcome_of(study, method):
-    names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
-    return next(outcome for outcome in study.outcomes if outcome.label in names)
 
 
 @pytest.mark.parametrize("method", FAULTS)

@@ -1,7 +1,5 @@
 """Graphs of others as methods: the stated policy, by brute force, and runs of the harness."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -17,7 +15,7 @@ from hybridnav.harness import RunSettings, evaluate, load_study
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
 from tests.drawn_rooms import HOUSE, topology_of
-from tests.harness.small_runs import ROOMS, run_here, write_map
+from tests.harness.small_runs import ROOMS, write_map
 from tests.strategies import class_grids, examples, occupancy_grid
 
 
@@ -86,12 +84,6 @@ def test_routes_are_those_of_the_policy(classes, data):
         assert np.allclose(answer.any_angle.points, wanted, atol=1e-6)
         length_m = sum(map(math.dist, wanted, wanted[1:]))
         assert answer.any_angle.length_m == pytest.approx(length_m)
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """No processes."""
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
 
 
 def house_graph():

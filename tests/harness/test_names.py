@@ -13,7 +13,9 @@ from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
-from tests.harness.small_runs import ROOMS, run_here, write_map
+from tests.harness.small_runs import ROOMS, write_map
+
+pytestmark = pytest.mark.usefixtures("here")
 
 CLASS = """
 from hybridnav.harness.baselines.grid import GridAstar
@@ -33,11 +35,6 @@ class Mine(GridAstar):
         answer = super().solve(start, goal)
         return answer  # mended: {}
 """
-
-
-@pytest.fixture(autouse=True)
-def _here(monkeypatch):
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
 
 
 @pytest.fixture

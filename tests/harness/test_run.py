@@ -25,7 +25,7 @@ from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, ROOT, importable, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, importable, name_of, write_map
 
 N_PAIRS = 60
 TIMES = ("seconds", "stages", "pyramid_seconds", "method_seconds", "environment")
@@ -36,12 +36,6 @@ def _importable():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", importable())
         yield
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """No processes."""
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
 
 
 @pytest.fixture(scope="module")

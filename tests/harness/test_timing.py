@@ -22,18 +22,12 @@ from hybridnav.harness.scenes import MapSpec, read_scene
 from hybridnav.harness.timing import TimingTask, circumstances_of
 from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, importable, name_of, write_map
 
 N_PAIRS, REPEAT = 12, 3
 TIMES = ("times", "date", "load")
 ANSWERS = N_PAIRS + 1
 """With the pair across components."""
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """No processes."""
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
 
 
 @pytest.fixture

@@ -1,17 +1,23 @@
-"""Frame, thresholds and inflation."""
+"""Frame, thresholds and inflation; areas as boxes of cells; runs of consecutive numbers."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from shapely import Polygon, box
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import MAX_CELLS, CellClass, Frame, OccupancyGrid
-from hybridnav.maps.centres import centres
+from hybridnav.maps.areas import box_of_area
+from hybridnav.maps.centres import centres, position_of
 from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.islands import in_runs, unique_rows
+from tests.strategies import examples
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
 
@@ -204,3 +210,98 @@ def test_the_largest_grid_is_the_largest_image_that_pillow_opens():
 
     assert Image.MAX_IMAGE_PIXELS is not None
     assert 2 * Image.MAX_IMAGE_PIXELS <= MAX_CELLS < 2**31
+
+
+FRAMES = [
+    hn.Frame(),
+    hn.Frame(0.05, (-3.0, 7.5), 0.3),
+    hn.Frame(0.1, (4e5, -5e6), -2.5),
+]
+POSITIONS = np.random.default_rng(3).uniform(-40, 40, (4, 5, 2))
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_positions_come_back_from_their_points_in_any_shape(frame: hn.Frame) -> None:
+    points = frame.points_of_grid(POSITIONS)
+    assert frame.positions_of(points) == pytest.approx(POSITIONS, abs=1e-6)
+    assert np.array_equal(frame.positions_of(points[1]), frame.positions_of(points)[1])
+    assert np.array_equal(frame.cells_of(points), np.floor(POSITIONS))
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_one_point_is_converted_like_many_and_in_kernels(frame: hn.Frame) -> None:
+    points = frame.points_of_grid(POSITIONS).reshape(-1, 2)
+    many = frame.positions_of(points)
+    assert np.array_equal([frame.position_of(x, y) for x, y in points.tolist()], many)
+    assert np.array_equal([position_of(x, y, frame.for_kernels) for x, y in points], many)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_axes_and_rates_describe_one_cell_and_one_metre(frame: hn.Frame) -> None:
+    corner, up, along = frame.points_of_grid([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert frame.axes_m == pytest.approx(np.stack([up, along]) - corner, abs=1e-8)
+    metre = frame.positions_of(corner + np.eye(2)) - frame.positions_of(corner)
+    assert frame.per_metre == pytest.approx(metre.T, abs=1e-6)
+
+
+SHAPE = (7, 9)
+COORDINATES = st.floats(-3, 12) | st.integers(-3, 12).map(float)
+
+
+def cells_of(found: tuple[int, int, int, int]) -> Any:
+    """The cells of a box, bool (rows, cols)."""
+    inside = np.zeros(SHAPE, np.bool_)
+    inside[slice(*found[:2]), slice(*found[2:])] = True
+    return inside
+
+
+@given(st.lists(COORDINATES, min_size=4, max_size=4), st.sampled_from([0.0, 0.7]))
+@settings(max_examples=examples(100))
+def test_a_box_holds_each_cell_that_an_area_overlaps(at: list[float], yaw: float) -> None:
+    (x_min, x_max), (y_min, y_max) = sorted(at[::2]), sorted(at[1::2])
+    frame = hn.Frame(0.5, (1.0, -1.0), yaw)
+    found = box_of_area((x_min, y_min, x_max, y_max), frame, SHAPE)
+    assert found == box_of_area(box(x_min, y_min, x_max, y_max), frame, SHAPE)
+    inside, bounds = cells_of(found), box(x_min, y_min, x_max, y_max)
+    for row, col in np.ndindex(SHAPE):
+        corners = [(row, col), (row, col + 1), (row + 1, col + 1), (row + 1, col)]
+        overlap = Polygon(frame.points_of_grid(corners)).intersection(bounds).area
+        assert inside[row, col] or overlap < 1e-5
+        if yaw == 0 and inside[row, col] and bounds.area > 1e-3:
+            assert overlap > 0
+
+
+def test_a_mask_and_none_are_areas_too() -> None:
+    frame, mask = hn.Frame(), np.zeros(SHAPE, np.bool_)
+    assert not cells_of(box_of_area(mask, frame, SHAPE)).any()
+    mask[2, 3] = mask[4, 5] = True
+    assert box_of_area(mask, frame, SHAPE) == (2, 5, 3, 6)
+    assert cells_of(box_of_area(None, frame, SHAPE)).all()
+    with pytest.raises(hn.InvalidValueError, match="make it for this map"):
+        box_of_area(mask.T, frame, SHAPE)
+
+
+runs = st.lists(st.tuples(st.integers(0, 10**12), st.integers(0, 9)), max_size=8)
+
+
+@given(runs)
+def test_the_numbers_of_runs_follow_one_another(drawn: list[tuple[int, int]]) -> None:
+    start, length = np.array(drawn, dtype=np.int64).reshape(-1, 2).T
+    expected = [number for first, n in drawn for number in range(first, first + n)]
+    found = in_runs(start, length)
+    assert found.dtype == np.int64
+    assert found.tolist() == expected
+
+
+@pytest.mark.parametrize("kind", [np.int32, np.int64, np.float64])
+@given(st.integers(1, 3), st.lists(st.integers(-2, 2), max_size=60))
+def test_distinct_rows_are_those_of_numpy(kind: type, width: int, drawn: list[int]) -> None:
+    rows: Any = np.array(drawn[: len(drawn) // width * width], dtype=kind).reshape(-1, width)
+    found = unique_rows(rows)
+    if not len(rows):
+        assert [len(part) for part in found] == [0, 0, 0, 0]
+        return
+    expected = np.unique(rows, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    for one, other in zip(found, expected, strict=True):
+        assert one.tolist() == other.reshape(one.shape).tolist()
+    assert found.rows.dtype == kind

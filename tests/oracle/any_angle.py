@@ -1,14 +1,7 @@
 """Ends of any-angle paths that are hard for those who search."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+from numpy.typing import NDArray
 
 Position = tuple[float, float]
 

@@ -1,7 +1,5 @@
 """What a laser scan does to each cell, by the definition: exact tests of every cell in a box."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Blocks by their definition: which squares of cells are contracted along a quadtree."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

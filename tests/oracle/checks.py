@@ -1,7 +1,5 @@
 """Assertions that hold on every level, and between levels, against the oracle."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any, Protocol
 

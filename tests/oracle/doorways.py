@@ -4,22 +4,18 @@ Doors are found by the rooms of the cells along the path, and their right angle 
 between the two ends of the door. Nothing is shared with `hybridnav.planner`.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+import hybridnav as hn
+from hybridnav.planner.guide import Instruction
 
-    import hybridnav as hn
-    from hybridnav.planner.guide import Instruction
-
-    FloatArray = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 STEP_M = 0.02
 NEAR_M, FAR_M = 0.5, 3.0

@@ -1,23 +1,19 @@
 """Grid paths judged by other means than the package's: edge lists for scipy, plain recounting."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from hybridnav.maps import OccupancyGrid
 
-    from hybridnav.maps import OccupancyGrid
-
-    Bools = NDArray[np.bool_]
-    Cells = NDArray[np.int64]
-    Floats = NDArray[np.float64]
-    Moves = sparse.csr_array[np.float64, tuple[int, int]]
+Bools = NDArray[np.bool_]
+Cells = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Moves = sparse.csr_array[np.float64, tuple[int, int]]
 
 Cell = tuple[int, int]
 

@@ -4,10 +4,8 @@ A set of cells *encloses* another when no walk of 8-neighbour steps that avoids 
 second to a ring of cells round the map. Nothing here knows a graph, a face or a self-loop.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from hypothesis import strategies as st
@@ -16,9 +14,6 @@ from scipy import ndimage
 from hybridnav.maps import CellClass
 from tests.oracle.pyramid import EAST, EIGHT, NORTH, SOUTH, WEST, AnyArray, Cell
 from tests.strategies import Scene, class_grids
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 TURN = (EAST, NORTH, WEST, SOUTH)
 _SHARE_OF_PAIRS = 0.25

@@ -1,19 +1,13 @@
 """What holds for the polygons of every convex mesh."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from hybridnav.search.mesh import MeshSearch
+from hybridnav.search.mesh import ConvexMesh, MeshSearch
 from hybridnav.search.mesh.corner_graph import find_edges
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav.search.mesh import ConvexMesh
 
 KINDS = "intervals", "landmarks", "hierarchy"
 """What a search of a mesh may search."""

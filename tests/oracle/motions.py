@@ -1,17 +1,12 @@
 """Motions of a robot judged by shapely, state by state in fine steps, in the map frame."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
-from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import CellClass, OccupancyGrid
 
 
 class ShapelyRobot:

@@ -6,8 +6,6 @@ must show. Cells are `(row, col)` with row 0 at the lowest y; a *base dart* is a
 to a 4-neighbour, written as the pair of cells.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter
@@ -85,7 +83,7 @@ class Base:
     n_obstacle_sets: int
 
     @classmethod
-    def of(cls, classes: AnyArray) -> Base:
+    def of(cls, classes: AnyArray) -> "Base":
         """Make the base of a class array."""
         vertices = classes != CellClass.OCCUPIED
         sigma = base_sigma(classes)

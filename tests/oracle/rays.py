@@ -3,22 +3,18 @@
 From each hole a ray goes up to the rim; the word of a path is the reduced list of its crossings.
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import math
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Cells = list[tuple[int, int]]
-    Word = tuple[int, ...]
+Cells = list[tuple[int, int]]
+Word = tuple[int, ...]
 
 
 def holes_of(enterable: NDArray[np.bool_], least_cells: float) -> list[tuple[int, int]]:

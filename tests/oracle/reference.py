@@ -5,18 +5,13 @@ named by the base edge it comes from, as `(cell, cell)`, at every level. It vali
 and, given the same kernels, must end with the same darts as any other implementation.
 """
 
-from __future__ import annotations
-
+import random
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tests.oracle.pyramid import AnyArray, Base, Cell, Dart, alpha, orbits
-
-if TYPE_CHECKING:
-    import random
-    from collections.abc import Collection, Iterable
 
 ALL_RULES = frozenset({1, 2, 3, 4})
 

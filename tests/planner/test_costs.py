@@ -16,7 +16,7 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.search.test_weighted import weighted
+from tests.search.test_grid_search import weighted
 from tests.strategies import class_grids, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from benchmarks._ompl_checks import CORNERS, Walls
-from benchmarks._ompl_checks import rooms as rooms_with_doors
+from benchmarks.subjects._ompl_checks import CORNERS, Walls
+from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
 from hybridnav.planner import load_preset
 from tests.refine.test_differential import assert_turns_and_drives

@@ -15,8 +15,8 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from benchmarks._ompl_checks import CORNERS, Walls
-from benchmarks._ompl_checks import rooms as rooms_with_doors
+from benchmarks.subjects._ompl_checks import CORNERS, Walls
+from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.planner import load_preset

@@ -19,7 +19,7 @@ from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.planner.test_costs import optimum_m, random_layer, scene, seeds, topology_of
-from tests.search.test_weighted import weighted
+from tests.search.test_grid_search import weighted
 from tests.strategies import class_grids, examples, occupancy_grid
 
 ROUNDING = 1e-4

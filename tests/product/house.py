@@ -3,8 +3,6 @@
 Code is a line that is not blank, no comment and no docstring (a text that stands alone).
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import os

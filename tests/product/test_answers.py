@@ -1,15 +1,19 @@
 """The answers file: whatever is planned, built and written stays what it is, bit for bit."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
 
 import pytest
 
-from benchmarks._study_maps import maps_of
-from benchmarks.answers import ANSWERS, command_answers, differences, file_answers, map_answers
+from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects.answers import (
+    ANSWERS,
+    command_answers,
+    differences,
+    file_answers,
+    map_answers,
+)
 
 DATA = os.environ.get("HYBRIDNAV_DATA")
 EXPECTED = json.loads(ANSWERS.read_text())

@@ -1,7 +1,5 @@
 """Pickles and deep copies of everything public: equal arrays, equal flags, equal answers."""
 
-from __future__ import annotations
-
 import copy
 import importlib.util
 import pickle

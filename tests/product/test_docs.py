@@ -1,7 +1,5 @@
 """The pages are complete: every public name, the notebooks, the layers, how to cite."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import os

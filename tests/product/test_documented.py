@@ -1,18 +1,14 @@
 """What docstrings hold: the parameters of kernels and public functions, the fields of tuples."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import inspect
 import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 SOURCE = Path(__file__).parents[2] / "src" / "hybridnav"
 TREES = {

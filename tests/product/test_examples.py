@@ -1,21 +1,17 @@
 """The examples in docstrings run, print what they show, and no public name lacks one."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import pkgutil
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 
 import hybridnav as hn
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "hybridnav"

@@ -1,7 +1,5 @@
 """The glossary: its words have names in the code, and the words that it rules out have none."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

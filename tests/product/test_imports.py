@@ -4,8 +4,6 @@ Imports in functions and those for type checkers count: a module that needs anot
 still cannot be understood, or moved, without it.
 """
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

@@ -1,13 +1,12 @@
 """Interrupts at any moment leave no object half changed: what follows is as if there were none."""
 
-from __future__ import annotations
-
 import ast
 import time
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +17,6 @@ from hybridnav.harness.baselines.hpa import HpaStar
 from tests.interrupts import Struck, lines_of, timer
 from tests.product.test_threads import OVER_CELLS, grid_with_rooms, told
 from tests.strategies import examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
 
 GRID = grid_with_rooms(seed=8, side=45)
 START, GOAL = GRID.frame.points_of(np.argwhere(GRID.enterable())[[0, -1]])

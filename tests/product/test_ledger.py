@@ -5,8 +5,6 @@ line for each of these that is no longer what it was: the old name, its fate, th
 What has no line must still be there.
 """
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

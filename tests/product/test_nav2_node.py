@@ -1,7 +1,5 @@
 """The node of ROS 2 in examples/, against a stand-in for ROS that follows its documented calls."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from itertools import pairwise

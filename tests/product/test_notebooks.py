@@ -1,7 +1,5 @@
 """Every notebook runs from a clean kernel, far from the checkout and on other maps."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Answers do not depend on the processor."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

@@ -1,7 +1,5 @@
 """What the pages show is what happens: their Python and their commands run, their links lead on."""
 
-from __future__ import annotations
-
 import contextlib
 import doctest
 import io

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks._study_maps import maps_of
-from benchmarks._study_page import page
-from benchmarks._study_quotes import QUOTES, Quote, found_in, quoted, update
-from benchmarks.study import FIGURES, figures_text
+from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects._study_page import page
+from benchmarks.subjects._study_quotes import QUOTES, Quote, found_in, quoted, update
+from benchmarks.subjects.study import FIGURES, figures_text
 from hybridnav.errors import InvalidValueError
 
 ROOT = Path(__file__).parents[2]

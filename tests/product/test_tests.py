@@ -1,7 +1,5 @@
 """The tests themselves: where they stand, and that they use what users use."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

@@ -1,11 +1,10 @@
 """Planners that threads share: four on one return the answers of one."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +19,6 @@ from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planner import load_preset
 from tests.strategies import occupancy_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 N_THREADS = 4
 OVER_CELLS = [name for name in hn.preset_names() if name != "ompl"]

@@ -1,7 +1,5 @@
 """Merge distances, linkages, seeds and maps at the edge of what makes sense: defined answers."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Any

@@ -1,25 +1,19 @@
 """Certainty of arcs: maps are made again with other thresholds, and the arcs looked for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.maps.clearance import greatest_within
+from hybridnav.pyramid import Level
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav.pyramid import Level
 
 _CHANCES = [0.0, 0.05, 0.1, 0.15, 0.19, 0.3, 0.5, 0.6, 0.7, 0.8, 1.0, np.nan]
 _OFTEN_FREE = [0.3, 0.1, 0.1, 0.1, 0.1, 0.05, 0.05, 0.05, 0.03, 0.03, 0.04, 0.05]

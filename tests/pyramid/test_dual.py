@@ -1,7 +1,5 @@
 """The dual of every level: faces told apart by geometry, and dual edges by walks round faces."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -15,12 +13,11 @@ from hybridnav.pyramid import DualGraphPyramid, FaceKind
 from tests.oracle.checks import crossing_darts, phi_walks
 from tests.oracle.inclusion import nested_scenes, signed_area
 from tests.oracle.pyramid import Base, boundaries, canonical, face_sequences, holes, orbits
-from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid
+from tests.strategies import IS_FULL, MAX_SIDE, drawn, examples, occupancy_grid
 
 LINKAGES = ("radius", "survivor", "diameter")
-SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=examples(40), deadline=None, derandomize=True)
-MANY = settings(max_examples=examples(300), deadline=None)
+SIDE = min(24 if IS_FULL else 20, MAX_SIDE)
+ORDINARY = settings(max_examples=examples(40, full=300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -134,18 +131,6 @@ def test_faces_of_every_level_are_told_apart_as_their_cells_say(scene, linkage):
 @ORDINARY
 def test_the_dual_of_the_dual_is_the_graph(scene, linkage):
     for level in levels_of(scene, linkage):
-        check_duality(level)
-
-
-@pytest.mark.full
-@each_linkage
-@given(scene=nested_scenes(min(24, MAX_SIDE)))
-@MANY
-def test_many_maps_have_the_dual_that_their_cells_say(scene, linkage):
-    base = Base.of(scene.classes)
-    for level in levels_of(scene, linkage):
-        check_walks(level)
-        check_kinds(level, base)
         check_duality(level)
 
 

@@ -7,8 +7,6 @@ edges are matched, who survives, or which of two parallel edges stays. If that i
 the changelog and renew the hashes with `python -m tests.pyramid.test_golden`; otherwise a bug.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
 

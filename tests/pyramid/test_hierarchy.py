@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import os
 import weakref
 from collections import Counter
 from typing import TYPE_CHECKING
@@ -12,23 +13,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba.core.registry import CPUDispatcher
 
 import hybridnav as hn
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels.sizes import level_sizes
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap
-from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid
+from tests.strategies import IS_FULL, MAX_SIDE, drawn, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 LINKAGES = ("radius", "survivor", "diameter")
-SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=examples(60), deadline=None, derandomize=True)
-MANY = settings(max_examples=examples(300), deadline=None)
+SIDE = min(24 if IS_FULL else 20, MAX_SIDE)
+ORDINARY = settings(max_examples=examples(60, full=300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -133,22 +135,10 @@ def test_kernels_are_stars_and_with_what_survives_all_arcs(scene, linkage):
 
 
 @each_linkage
-@given(scene=nested_scenes(min(14, SIDE)))
-@settings(ORDINARY, max_examples=examples(40))
+@given(scene=nested_scenes(SIDE if IS_FULL else min(14, SIDE)))
+@settings(ORDINARY, max_examples=examples(40, full=300))
 def test_kernels_applied_edge_by_edge_give_every_level(scene, linkage):
     check_replay(built(scene, linkage), scene.classes)
-
-
-@pytest.mark.full
-@each_linkage
-@given(scene=nested_scenes(min(24, MAX_SIDE)))
-@MANY
-def test_many_maps_hang_together_between_levels(scene, linkage):
-    pyramid = built(scene, linkage)
-    check_fields(pyramid)
-    check_ways(pyramid)
-    check_kernels(pyramid)
-    check_replay(pyramid, scene.classes)
 
 
 @given(scene=nested_scenes(min(14, SIDE)), seed=st.integers(0, 2**32 - 1))
@@ -277,3 +267,16 @@ def test_the_sizes_of_levels_can_be_counted_without_making_them(scene):
     assert sizes.tolist() == [
         [level.n_vertices, level.n_arcs, n] for level, n in zip(pyramid, loops, strict=True)
     ]
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled")
+def test_a_pyramid_with_rooms_is_built_by_the_same_kernels() -> None:
+    grid = occupancy_grid(np.ones((8, 64), np.uint8))
+    label_of = np.where(np.arange(64) < 32, 0, 1) + np.zeros((8, 1), np.int32)
+    hn.DualGraphPyramid.build(grid)
+    kernels = [
+        kernel for kernel in vars(_base_kernels).values() if isinstance(kernel, CPUDispatcher)
+    ]
+    before = [kernel.signatures for kernel in kernels]
+    hn.DualGraphPyramid.build(grid, rooms=hn.RoomLabels(("west", "east"), label_of))
+    assert [kernel.signatures for kernel in kernels] == before

@@ -6,8 +6,6 @@ of every level has the attribute one cell, since the maximum of ones is one; so 
 cell ever stops a contraction, and every connected set of one class ends as a single node.
 """
 
-from __future__ import annotations
-
 import networkx as nx
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The oracle itself: answers known by hand, and its agreement with an explicit contraction."""
 
-from __future__ import annotations
-
 import math
 import random
 
@@ -22,7 +20,7 @@ from tests.oracle.pyramid import (
     through_cells,
 )
 from tests.oracle.reference import ALL_RULES, PlaneMap
-from tests.strategies import class_grids, drawn, examples
+from tests.strategies import IS_FULL, class_grids, drawn, examples
 
 ISLAND = drawn("......", "..??..", "..??..", "......")
 """A free place round an unexplored island."""
@@ -180,20 +178,9 @@ def test_collapsed_maps_have_the_arcs_of_their_boundaries(classes, arcs, loops):
     assert (level.n_arcs - n_loops, n_loops) == (arcs, loops)
 
 
-@given(class_grids(max_side=14), st.randoms(use_true_random=False))
-@settings(max_examples=examples(40), deadline=None, derandomize=True)
+@given(class_grids(max_side=24 if IS_FULL else 14), st.randoms(use_true_random=False))
+@settings(max_examples=examples(40, full=3000), deadline=None)
 def test_rules_and_oracle_agree(classes, rng):
-    agree(classes, rng)
-
-
-@pytest.mark.full
-@given(class_grids(max_side=24), st.randoms(use_true_random=False))
-@settings(max_examples=examples(3000), deadline=None)
-def test_rules_and_oracle_agree_on_many_maps(classes, rng):
-    agree(classes, rng)
-
-
-def agree(classes, rng):
     base = Base.of(classes)
     plane = PlaneMap(classes)
     check_base(plane.level(), base)

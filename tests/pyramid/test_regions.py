@@ -1,11 +1,9 @@
 """Levels above the places: regions by the expansion rating, and on to the apex."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import pickle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +12,12 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
+from hybridnav.pyramid import Level
 from hybridnav.pyramid.lazy_islands import LazyIslands
 from hybridnav.pyramid.start import kinds_of
 from tests.oracle.checks import check_attributes, check_level, check_step
 from tests.oracle.pyramid import Base, boundaries
 from tests.strategies import MAX_SIDE, Scene, drawn, examples, labelled, occupancy_grid, scenes
-
-if TYPE_CHECKING:
-    from hybridnav.pyramid import Level
 
 SOME = settings(max_examples=examples(40), deadline=None, derandomize=True)
 LINKAGES = ("radius", "survivor", "diameter")

@@ -1,7 +1,5 @@
 """Robots that turn on the spot and drive straight: motions are judged like by shapely."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Motions of a robot: a disc is judged like by the judge, a shape like by shapely."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -17,16 +15,10 @@ from hybridnav.refine import MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.footprint import Footprint
 from tests.oracle.motions import ShapelyRobot, turning_poses
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, framed
 
 seeds = st.integers(0, 2**32 - 1)
 yaws = st.sampled_from([0.0, 0.7, -2.5])
-
-
-def framed(classes: Any, yaw_rad: float = 0.0, *, corner_cutting: bool = False) -> OccupancyGrid:
-    frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
-    probability = occupancy_grid(classes).probability
-    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting, robot_radius_m=0)
 
 
 def segments_of(grid: OccupancyGrid, rng: np.random.Generator, n: int) -> list[Any]:

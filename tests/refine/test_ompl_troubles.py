@@ -1,7 +1,5 @@
 """What a query with OMPL costs when the search hangs, crashes or fails: its time, no more."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -9,9 +7,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,9 +20,6 @@ from benchmarks.worlds import office_world
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planner import load_preset
 from tests.refine.troubled_query import TroubledQuery
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 pytest.importorskip("ompl")
 

@@ -1,7 +1,5 @@
 """A query that makes the search of the fork that answers it hang, crash or fail."""
 
-from __future__ import annotations
-
 import os
 import signal
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Cheapest walks on the arcs of a graph, against networkx."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import networkx as nx

@@ -1,15 +1,14 @@
 """The searches against scipy's and networkx's: grid A* and its moves."""
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from hybridnav._base.moves import (
     DIAGONAL,
@@ -26,12 +25,9 @@ from hybridnav.search.kernels import astar as _astar_kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import block_labels, class_grids, drawn, examples
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Bools = NDArray[np.bool_]
-    Cells = NDArray[np.int64]
-    Labels = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+Cells = NDArray[np.int64]
+Labels = NDArray[np.int32]
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -79,35 +75,6 @@ def cost_of(cells: Any) -> int:
     """Integer cost of a path."""
     straight, diagonal = moves(cells)
     return straight * STRAIGHT + diagonal * DIAGONAL
-
-
-@given(class_grids(), seeds)
-def test_grid_search_finds_the_length_that_dijkstra_finds(classes: Any, seed: int) -> None:
-    enterable = classes == CellClass.FREE
-    assume(enterable.any())
-    rng = np.random.default_rng(seed)
-    search = GridSearch(enterable)
-    for _ in range(4):
-        check_search(search, enterable, (random_cell(enterable, rng), random_cell(enterable, rng)))
-
-
-@given(class_grids(), seeds)
-def test_in_a_corridor_it_finds_the_length_that_dijkstra_finds_there(
-    classes: Any, seed: int
-) -> None:
-    enterable = classes != CellClass.OCCUPIED
-    rng = np.random.default_rng(seed)
-    field_of = np.where(enterable, block_labels(classes.shape, rng), np.int32(-1))
-    search = GridSearch(enterable)
-    for _ in range(4):
-        in_corridor = rng.random(int(field_of.max()) + 1) < 0.7
-        if not in_corridor.any():
-            continue
-        inside = enterable & in_corridor[field_of]
-        if inside.any():
-            endpoints = random_cell(inside, rng), random_cell(inside, rng)
-            check_search(search, enterable, endpoints, (field_of, in_corridor))
-            check_search(search, enterable, endpoints)
 
 
 @given(seeds, st.sampled_from([0.0, 0.1, 0.25, 0.4]))
@@ -205,7 +172,7 @@ def inside_of(enterable: Bools, corridor: tuple[Labels, Bools] | None) -> Bools:
 
 
 @given(cases())
-@settings(max_examples=examples(200))
+@settings(max_examples=examples(500))
 def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
     case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
 ) -> None:
@@ -213,12 +180,14 @@ def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
     inside = inside_of(enterable, corridor)
     assume(inside.any())
     search = GridSearch(enterable, corner_cutting=corner_cutting)
-    # Room for one cell in each bucket to begin with: most searches must start over.
-    with search._works.lent() as work:
-        work.waiting = np.empty(_astar_kernels.BUCKETS, dtype=np.int32)
+    # Half of all begin with room for one cell in each bucket: most of them must start over.
+    if rng.random() < 0.5:
+        with search._works.lent() as work:
+            work.waiting = np.empty(_astar_kernels.BUCKETS, dtype=np.int32)
     for _ in range(4):
         endpoints = random_cell(inside, rng), random_cell(inside, rng)
         check_search(search, enterable, endpoints, corridor, corner_cutting=corner_cutting)
+        check_search(search, enterable, endpoints, corner_cutting=corner_cutting)
 
 
 @given(cases())

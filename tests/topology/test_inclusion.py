@@ -1,7 +1,5 @@
 """Inclusion against walks between cells: what encloses what, and what goes round it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -25,12 +23,11 @@ from tests.oracle.inclusion import (
     rotations,
     sets_of,
 )
-from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
+from tests.strategies import IS_FULL, MAX_SIDE, class_grids, drawn, examples, occupancy_grid
 
 LINKAGES = ("radius", "survivor", "diameter")
-SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=examples(50), deadline=None, derandomize=True)
-MANY = settings(max_examples=examples(300), deadline=None)
+SIDE = min(24 if IS_FULL else 20, MAX_SIDE)
+ORDINARY = settings(max_examples=examples(50, full=300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -147,10 +144,14 @@ def test_what_goes_round_a_thing_is_a_tour_along_its_edge(scene, linkage):
         check_ring(topology, thing, mask)
 
 
-@given(scene=nested_scenes(min(16, SIDE)), seed=st.integers(0, 2**32 - 1))
+@given(
+    scene=nested_scenes(SIDE if IS_FULL else min(16, SIDE)),
+    seed=st.integers(0, 2**32 - 1),
+    linkage=st.sampled_from(LINKAGES),
+)
 @ORDINARY
-def test_several_connected_places_are_one_thing(scene, seed):
-    topology = topology_of(scene, "radius")
+def test_several_connected_places_are_one_thing(scene, seed, linkage):
+    topology = topology_of(scene, linkage)
     inside = insides(topology)
     for places in place_sets(topology, np.random.default_rng(seed)):
         mask = np.isin(topology.level.field_of, places)
@@ -159,8 +160,8 @@ def test_several_connected_places_are_one_thing(scene, seed):
 
 
 @each_linkage
-@given(scene=nested_scenes(min(12, SIDE)))
-@settings(ORDINARY, max_examples=examples(25))
+@given(scene=nested_scenes(SIDE if IS_FULL else min(12, SIDE)))
+@settings(ORDINARY, max_examples=examples(25, full=300))
 def test_the_places_round_a_thing_part_it_from_the_outside(scene, linkage):
     topology = topology_of(scene, linkage)
     inside = insides(topology)
@@ -222,21 +223,6 @@ def test_obstacles_and_components_are_the_connected_sets_of_the_grid(classes):
         around = grown(components == component) & wall
         assert around.any() or obstacle == 0
         assert obstacle == 0 or _walled(wall)[components == component].all()
-
-
-@pytest.mark.full
-@each_linkage
-@given(scene=nested_scenes(min(24, MAX_SIDE)), seed=st.integers(0, 2**32 - 1))
-@MANY
-def test_many_maps_tell_what_lies_inside_what(scene, linkage, seed):
-    topology = topology_of(scene, linkage)
-    inside = insides(topology)
-    check_encloses(topology, inside)
-    sets = place_sets(topology, np.random.default_rng(seed))
-    things = [(places, np.isin(topology.level.field_of, places)) for places in sets]
-    for thing, mask in [*masks_of(topology).items(), *things]:
-        check_ring(topology, thing, mask)
-        check_meaning(topology, inside, thing, mask)
 
 
 @each_linkage

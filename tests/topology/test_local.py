@@ -1,7 +1,5 @@
 """Local maps of places: laid over each other, they are the whole map."""
 
-from __future__ import annotations
-
 import networkx as nx
 import numpy as np
 import pytest

@@ -1,14 +1,13 @@
 """Small pictures of fixed scenes to compare with; `python -m tests.viz.pictures` renews them."""
 
-from __future__ import annotations
-
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
@@ -29,11 +28,6 @@ from hybridnav.viz import (
     plot_topology,
     plot_tour,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
 
 BASELINES = Path(__file__).parent / "baselines"
 FIGURE1 = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"

@@ -1,7 +1,5 @@
 """Pictures look as they did. After an intended change: `python -m tests.viz.pictures`, and look."""
 
-from __future__ import annotations
-
 import inspect
 import itertools
 import subprocess

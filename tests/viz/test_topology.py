@@ -1,7 +1,5 @@
 """Pictures of graphs: asked what they show, not compared with pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +16,9 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.dual import FaceKind
 from hybridnav.viz import plot_dual, plot_figure1, plot_topology, save_figure, style
 from hybridnav.viz.boundaries import Boundaries, boundary_line
-from hybridnav.viz.fields import Field, Loops
+from hybridnav.viz.fields import Field, Loops, distance_to_rim, smoothed
 from hybridnav.viz.topology import Arc
-from tests.strategies import drawn, examples, occupancy_grid, scenes
+from tests.strategies import drawn, examples, level_of, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[2] / "maps"
 SOME = settings(max_examples=examples(25), deadline=None)
@@ -43,13 +41,6 @@ def two_doors():
     cells[5:7, [4, 14]] = 1.0
     grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(1.0), name="two doors")
     return DualGraphPyramid.build(grid, merge_distance_m=30.0)[-1]
-
-
-def level_of(scene, index):
-    pyramid = DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, seed=scene.seed
-    )
-    return pyramid[min(index, len(pyramid) - 1)]
 
 
 def found(ax, gid):
@@ -338,3 +329,16 @@ def test_a_level_too_large_for_a_graph_is_refused(plot):
     base = DualGraphPyramid.build(grid, merge_distance_m=4.0)[0]
     with pytest.raises(hn.InvalidValueError, match="up to 20000 vertices, level 0 has 22500"):
         plot(base)
+
+
+@pytest.mark.parametrize("clearance", [1.0, 20.0, 40.0])
+def test_a_curve_stays_in_the_window_where_no_cell_is_clear_enough(clearance):
+    rng = np.random.default_rng(0)
+    rows = 6 + np.cumsum(rng.integers(-1, 2, 20)).clip(-4, 4)
+    walk = np.column_stack([rows, np.arange(1, 21)]).astype(np.float64)
+    mask = rng.random((12, 22)) < 0.3
+    mask[rows, np.arange(1, 21)] = mask[rows[:-1], np.arange(2, 21)] = True
+    curve = smoothed(walk, distance_to_rim(mask), clearance)
+    assert (curve >= -0.5).all()
+    assert (curve <= np.array(mask.shape) - 0.5).all()
+    assert curve[[0, -1]].tolist() == walk[[0, -1]].tolist()

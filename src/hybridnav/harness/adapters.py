@@ -87,8 +87,8 @@ class FoundMethod:
     Parameters
     ----------
     method
-        Answers a `Query` with a `Found`; its `prepare`, if it has one, is called here. Its `name`, `n_nodes`, `n_edges`, `memory_bytes`,
-        `version` and `settings` are shown if it has them.
+        Answers a `Query` with a `Found`; its `prepare`, if it has one, is called here. Its `name`,
+        `n_nodes`, `n_edges`, `memory_bytes`, `version` and `settings` are shown if it has them.
     grid
         The map.
     """

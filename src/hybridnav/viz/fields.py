@@ -171,7 +171,9 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
         if step < _STEPS - _LAST_STEPS:  # the last steps smooth the staircase of cells
             at = _between(potential, inner)
             push = _PUSH * at[:, 1:] * np.maximum(clearance - at[:, :1], 0)
-        band = np.concatenate([band[:1], inner + 0.5 * pull + push, band[-1:]])
+        # Where no cell is as clear as that, the push would drive the band out of the window.
+        moved = np.clip(inner + 0.5 * pull + push, -0.5, np.array(distance.shape) - 0.5)
+        band = np.concatenate([band[:1], moved, band[-1:]])
     return rounded(band)
 
 

@@ -1,7 +1,5 @@
 """`check_graph` finds each kind of planted fault, and nothing in a sound graph."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

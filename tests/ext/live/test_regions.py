@@ -1,24 +1,22 @@
 """Regions of a map that changes: every invariant, identities, size limits, the level above."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import invariant, rule, run_state_machine_as_test
+from hypothesis.stateful import invariant, rule
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import random_changes, with_classes
+from benchmarks.common import OFFICE, with_classes
+from benchmarks.subjects.online import random_changes
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRegions
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid.cracks import find_cracks
+from tests.ext.live.identities import check_identities, run_machine
 from tests.ext.live.test_updates import Robot, version_of
 from tests.oracle.checks import check_level, check_step
 from tests.oracle.pyramid import Base
@@ -75,34 +73,10 @@ def check_levels(version):
 
 def check_events(old, update, shift):
     """What an update states about regions is what the cells show."""
-    before, after = old.number_of, update.version.number_of
-    rows, cols = before.shape
-    seen = after[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols]
     had, has = set(old.numbers), set(update.version.numbers)
-    assert set(update.died) == had - has
-    assert set(update.born) == has - had
+    cells = old.number_of, update.version.number_of
+    check_identities(update, (had, has), cells, shift)
     assert not set(update.born) & set(range(old._next))
-    same = {
-        region
-        for region in had & has
-        if np.array_equal(before == region, seen == region)
-        and (after == region).sum() == (seen == region).sum()
-    }
-    assert (had & has) - same <= set(update.changed) <= had & has
-    for region in had:
-        inside = before == region
-        found, counts = np.unique(seen[inside], return_counts=True)
-        heirs = found[2 * counts > inside.sum()].tolist()
-        if region in has:
-            assert heirs == [region]
-        else:
-            assert heirs in ([], [-1], [update.merged.get(region)])
-        parts = [
-            part
-            for part, count in zip(found.tolist(), counts.tolist(), strict=True)
-            if part >= 0 and 2 * count > (after == part).sum()
-        ]
-        assert update.split.get(region, ()) == (tuple(parts) if len(parts) > 1 else ())
 
 
 class Follower(Robot):
@@ -144,19 +118,12 @@ class Follower(Robot):
 
 
 def test_regions_follow_a_map():
-    run_state_machine_as_test(
-        Follower,
-        settings=settings(
-            max_examples=examples(25), stateful_step_count=10, deadline=None, derandomize=True
-        ),
-    )
+    run_machine(Follower, examples(25), 10, derandomize=True)
 
 
 @pytest.mark.full
 def test_regions_follow_a_map_for_5_000_steps():
-    run_state_machine_as_test(
-        Follower, settings=settings(max_examples=200, stateful_step_count=25, deadline=None)
-    )
+    run_machine(Follower, 200, 25)
 
 
 @pytest.mark.full

@@ -1,7 +1,5 @@
 """Replays: flips by their definition, the last version, scans of a log."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -1,30 +1,29 @@
 """Rooms and doors of a map that changes: what a build covers, lasting numbers, names, doors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import Phase, settings
+from hypothesis import Phase
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
     initialize,
     invariant,
     rule,
-    run_state_machine_as_test,
 )
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import random_changes
+from benchmarks.common import OFFICE
+from benchmarks.subjects.online import random_changes
+from benchmarks.subjects.online_identities import agreement
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlineRooms
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.topology.rooms.cutting import Ground
 from hybridnav.topology.rooms.find import outside_of, reaching
+from tests.ext.live.identities import parts_of, run_machine
 from tests.strategies import examples
 
 NOTHING: Any = None
@@ -121,12 +120,7 @@ def check_update(before, update, shift):
         heirs = found[(2 * counts > (old == room).sum()) & (found >= 0)].tolist()
         assert heirs in ([room], []) if room in has else True
         assert update.merged.get(room) == (heirs[0] if heirs and room not in has else None)
-        parts = [
-            part
-            for part, count in zip(found.tolist(), counts.tolist(), strict=True)
-            if part >= 0 and 2 * count > (new == part).sum()
-        ]
-        assert update.split.get(room, ()) == (tuple(parts) if len(parts) > 1 else ())
+        assert update.split.get(room, ()) == parts_of(found, counts, new)
     kept = {n: name for n, name in before.names.items() if n in has}
     assert after.names == kept
     assert update.lost_names == {n: name for n, name in before.names.items() if n not in has}
@@ -215,23 +209,12 @@ class Building(RuleBasedStateMachine):
 
 
 def test_rooms_follow_a_building():
-    run_state_machine_as_test(
-        Building,
-        settings=settings(
-            max_examples=examples(12),
-            stateful_step_count=8,
-            deadline=None,
-            derandomize=True,
-            phases=[Phase.generate],
-        ),
-    )
+    run_machine(Building, examples(12), 8, derandomize=True, phases=[Phase.generate])
 
 
 @pytest.mark.full
 def test_rooms_follow_a_building_for_2000_steps():
-    run_state_machine_as_test(
-        Building, settings=settings(max_examples=100, stateful_step_count=20, deadline=None)
-    )
+    run_machine(Building, 100, 20)
 
 
 def two_rooms():
@@ -405,18 +388,6 @@ def test_rooms_of_an_office_stay_close_to_those_of_a_build():
         grid = OccupancyGrid(PROBABILITY[classes], office.frame, robot_radius_m=0)
         version = version.update(grid).version
     assert agreement(version) > 0.9
-
-
-def agreement(version):
-    """The mean, over free cells, of the IoU of their room with that of a build."""
-    fresh = hn.find_rooms(version.grid).label_of
-    both = (version.number_of >= 0) & (fresh >= 0) & (version.grid.measured == 1)
-    keys, counts = np.unique(
-        np.stack([version.number_of[both], fresh[both]]), axis=1, return_counts=True
-    )
-    ours, theirs = np.bincount(version.number_of[both]), np.bincount(fresh[both])
-    iou = counts / (ours[keys[0]] + theirs[keys[1]] - counts)
-    return float((iou * counts).sum() / counts.sum())
 
 
 @pytest.mark.parametrize(

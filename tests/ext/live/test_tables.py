@@ -1,17 +1,20 @@
-"""Tiles against plain arrays, and what updates make of them."""
-
-from __future__ import annotations
+"""Tables of places, tiles and layers of costs that follow a map; updates that are interrupted."""
 
 import copy
 import pickle
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.ext.live import OnlinePyramid
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live import OnlinePyramid, carry_costs
+from hybridnav.ext.live.state import PLACE, PlaceTable
 from hybridnav.ext.live.tiles import CELL, SIDE, Box, Tiles
-from tests.strategies import occupancy_grid
+from tests.interrupts import Struck, lines_of, timer
+from tests.strategies import examples, occupancy_grid
 
 LOW = (-70, -130)
 SHAPE = (5 * SIDE + 9, 6 * SIDE + 3)
@@ -108,3 +111,138 @@ def test_a_copy_of_a_version_follows_the_map_too(again):
     assert np.array_equal(update.version.number_of, expected.version.number_of)
     arrays = update.version.state.tiles.arrays().values()
     assert not any(array.flags.writeable for tile in arrays for array in tile)
+
+
+def grid_of(classes, south=0, west=0):
+    probability = np.array([1.0, 0.0, 0.5], np.float32)[classes]
+    frame = hn.Frame(0.5, (-0.5 * west, -0.5 * south))
+    return hn.OccupancyGrid(probability, frame, robot_radius_m=0)
+
+
+@st.composite
+def changes(draw):
+    """A map, the map later, grown on all sides, and where the first lies in it."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rows, cols = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    south, north, west, east = draw(st.tuples(*[st.integers(0, 3)] * 4))
+    before = rng.choice(3, (rows, cols), p=[0.15, 0.75, 0.1])
+    after = rng.choice(3, (rows + south + north, cols + west + east), p=[0.15, 0.75, 0.1])
+    inside = np.s_[south : south + rows, west : west + cols]
+    after[inside] = np.where(rng.random((rows, cols)) < 0.9, before, after[inside])
+    return grid_of(before), grid_of(after, south, west), inside, rng
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(changes())
+def test_factors_and_closed_cells_stay_on_their_cells(case):
+    before, after, inside, rng = case
+    layer = hn.CostLayer(rng.integers(1, 9, before.shape), rng.random(before.shape) < 0.3)
+    carried = carry_costs(layer, before, after)
+    factors, closed = np.ones(after.shape), np.zeros(after.shape, bool)
+    factors[inside], closed[inside] = layer.factors, False if layer.closed is None else layer.closed
+    assert np.array_equal(carried.layer.factors, factors)
+    found = np.zeros(after.shape, bool) if carried.layer.closed is None else carried.layer.closed
+    assert np.array_equal(found, closed)
+    assert not carried.outdated.any()
+    assert carried.layer.source == layer.source
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(changes(), st.sampled_from([0.0, 0.7, 1.5]))
+def test_clearance_is_that_of_the_newer_map_and_outdated_where_it_was_joined(case, radius_m):
+    before, after, inside, rng = case
+    clear = {"inflation_radius_m": radius_m, "multiplier": 3.0}
+    alone = hn.CostLayer.clearance(before, **clear)
+    fresh = hn.CostLayer.clearance(after, **clear)
+    carried = carry_costs(alone, before, after)
+    assert np.array_equal(carried.layer.factors, fresh.factors)
+    assert not carried.outdated.any()
+    own = rng.integers(1, 5, before.shape)
+    padded = np.ones(after.shape)
+    padded[inside] = own
+    joined = carry_costs(alone | hn.CostLayer(own), before, after)
+    expected = (fresh | hn.CostLayer(padded)).factors
+    known = ~joined.outdated
+    assert np.array_equal(joined.layer.factors[known], expected[known])
+
+
+def test_costs_of_another_map_are_refused_in_one_line():
+    before, after = grid_of(np.ones((3, 3), int)), grid_of(np.ones((2, 3), int))
+    layer = hn.CostLayer(np.ones((3, 3), np.float32))
+    for wrong, grids in (
+        (hn.CostLayer(np.ones((2, 2), np.float32)), (before, before)),
+        (layer, (before, after)),
+    ):
+        with pytest.raises(InvalidValueError, match="cells") as error:
+            carry_costs(wrong, *grids)
+        assert "\n" not in str(error.value)
+
+
+def test_the_table_forgets_places_that_are_no_more():
+    table, first = PlaceTable(), 0
+    row = np.zeros(10, PLACE)
+    row["area"] = 1
+    for _ in range(300):
+        table = table.next_version()
+        table.drop(table.numbers())
+        numbers = table.append(first, row)
+        first += 10
+        table.close()
+    assert table.numbers() == numbers.tolist()
+    assert len(table.columns()[0]) < 600
+
+
+def state_of(version):
+    """Return all that a version consists of."""
+    state = version._state
+    tiles = {
+        key: [values.tobytes() for values in tile] for key, tile in state.tiles.arrays().items()
+    }
+    numbers = state.places.numbers()
+    rows = state.places.read(numbers)
+    columns = {name: rows[name].tolist() for name in rows.dtype.names}
+    return tiles, numbers, columns, state.vertex_ends.tobytes()
+
+
+@pytest.fixture
+def change():
+    """Return a version, and a grid on which places die, split and merge."""
+    rng = np.random.default_rng(4)
+    classes = np.where(rng.random((40, 90)) < 0.05, 0, 1).astype(np.uint8)
+    grid = occupancy_grid(classes)
+    changed = classes.copy()
+    changed[10:14, 20:70] = 0
+    changed[30:38, 5:60] = 1
+    version = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=8.0))
+    return version, occupancy_grid(changed)
+
+
+def test_an_interrupt_before_any_line_leaves_the_old_version(change):
+    version, grid = change
+    expected = state_of(version.update(grid).version)
+    before = state_of(version)
+    n_lines = lines_of(lambda: version.update(grid))
+    rng = np.random.default_rng(0)
+    for line in rng.integers(1, n_lines + 1, 40).tolist():
+        with pytest.raises(Struck):
+            lines_of(lambda: version.update(grid), strike_at=line)
+        assert state_of(version) == before
+    assert state_of(version.update(grid).version) == expected
+
+
+def test_an_interrupt_by_a_timer_leaves_the_old_version_or_returns_the_new_one(change):
+    version, grid = change
+    expected = state_of(version.update(grid).version)
+    before = state_of(version)
+    struck = 0
+    for delay_s in np.linspace(1e-4, 2e-2, 40).tolist():
+        try:
+            with timer(delay_s):
+                after = version.update(grid).version
+        except Struck:
+            struck += 1
+        else:
+            assert state_of(after) == expected
+        assert state_of(version) == before
+    assert struck > 0
+    assert state_of(version.update(grid).version) == expected

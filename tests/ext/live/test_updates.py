@@ -1,36 +1,31 @@
 """Versions of a pyramid after changes of the map: every invariant, identities, growth."""
 
-from __future__ import annotations
-
 import copy
 import itertools
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
     initialize,
     invariant,
     rule,
-    run_state_machine_as_test,
 )
 
 import hybridnav as hn
-from benchmarks.chain import OFFICE
-from benchmarks.online import area_of, random_changes, with_classes
+from benchmarks.common import OFFICE, with_classes
+from benchmarks.subjects.online import area_of, random_changes
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, cellwise
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid.cracks import find_cracks
+from tests.ext.live.identities import check_identities, run_machine
 from tests.oracle.checks import check_base, check_cap, check_level, check_step, passes
 from tests.oracle.pyramid import Base
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 MOST_CELLS = 900
 
@@ -72,29 +67,8 @@ def check_events(before, update, shift=(0, 0)):
     classes[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols] = before.grid.classes
     differs = update.version.grid.classes != classes
     assert np.array_equal(update.cells, np.argwhere(differs))
-    seen = new[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols]
     had, has = set(before.place_numbers.tolist()), set(update.version.place_numbers.tolist())
-    assert set(update.died) == had - has
-    assert set(update.born) == has - had
-    same = {place for place in had & has if np.array_equal(old == place, seen == place)}
-    same -= {place for place in same if (new == place).sum() != (seen == place).sum()}
-    assert (had & has) - same <= set(update.changed) <= had & has
-    for place in had:
-        inside = old == place
-        found, counts = np.unique(seen[inside], return_counts=True)
-        heirs = found[2 * counts > inside.sum()]
-        if place in has:
-            assert heirs.tolist() == [place]
-        elif place in update.merged:
-            assert heirs.tolist() == [update.merged[place]]
-        else:
-            assert heirs.tolist() in ([], [-1])
-        parts = [
-            part
-            for part, count in zip(found.tolist(), counts.tolist(), strict=True)
-            if part >= 0 and 2 * count > (new == part).sum()
-        ]
-        assert update.split.get(place, ()) == (tuple(parts) if len(parts) > 1 else ())
+    check_identities(update, (had, has), (old, new), shift)
 
 
 def unread(version):
@@ -185,29 +159,17 @@ class Robot(RuleBasedStateMachine):
 
 
 def test_versions_follow_a_map():
-    run_state_machine_as_test(
-        Robot,
-        settings=settings(
-            max_examples=examples(20), stateful_step_count=8, deadline=None, derandomize=True
-        ),
-    )
+    run_machine(Robot, examples(20), 8, derandomize=True)
 
 
 def test_versions_follow_a_map_in_groups_of_changes(monkeypatch):
     monkeypatch.setattr(cellwise, "_SMALL_CELLS", 0)
-    run_state_machine_as_test(
-        Robot,
-        settings=settings(
-            max_examples=examples(20), stateful_step_count=8, deadline=None, derandomize=True
-        ),
-    )
+    run_machine(Robot, examples(20), 8, derandomize=True)
 
 
 @pytest.mark.full
 def test_versions_follow_a_map_for_10_000_steps():
-    run_state_machine_as_test(
-        Robot, settings=settings(max_examples=200, stateful_step_count=50, deadline=None)
-    )
+    run_machine(Robot, 200, 50)
 
 
 @pytest.mark.full

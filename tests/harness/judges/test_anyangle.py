@@ -1,10 +1,9 @@
 """Any-angle paths: known answers, bounds, symmetry, and brute force over all lattice corners."""
 
-from __future__ import annotations
-
 import csv
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -14,23 +13,15 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import ScipyOptimum, VisibilityGraph, segment_faults
-from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.files import load_map
 from tests.oracle.grid import length_of_points
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
 
 Cell = tuple[int, int]
 
 seeds = st.integers(0, 2**32 - 1)
 yaws = st.sampled_from([0.0, 0.7])
-
-
-def framed(classes: Any, yaw_rad: float = 0.0) -> OccupancyGrid:
-    frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
-    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame, robot_radius_m=0)
 
 
 def two_cells(classes: Any, seed: int) -> tuple[Cell, Cell]:

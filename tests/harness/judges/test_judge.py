@@ -1,7 +1,5 @@
 """The judge of paths against shapely, against fractions, and against paths with planted faults."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import subprocess
@@ -17,20 +15,14 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import ScipyOptimum, judge_path, segment_faults
-from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, OccupancyGrid
 from tests.oracle.grid import distances, move_graph
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
 
 Position = tuple[Fraction, Fraction]
 
 seeds = st.integers(0, 2**32 - 1)
 small_maps = class_grids(max_side=7)
-
-
-def framed(classes: Any, *, yaw_rad: float = 0.4) -> OccupancyGrid:
-    """The map with a resolution, an origin and a yaw that no rounding is kind to."""
-    frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
-    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame, robot_radius_m=0)
 
 
 def faults_of(grid: OccupancyGrid, *positions: tuple[float, float]) -> tuple[str, ...]:
@@ -123,7 +115,7 @@ def _joined(free: Any, corner: Position, before: set[Any], after: set[Any]) -> b
 @settings(max_examples=examples(150))
 def test_segments_on_halves_are_judged_as_shapely_does(classes: Any, seed: int) -> None:
     rng, free = np.random.default_rng(seed), classes == CellClass.FREE
-    grid = framed(classes)
+    grid = framed(classes, 0.4)
     for _ in range(8):
         start, end = rng.integers(0, 2 * np.array(classes.shape) + 1, size=(2, 2)) / 2
         assume((start != end).any())
@@ -193,7 +185,7 @@ PINCHED = drawn(".#.", "#..", "...")
 def test_polylines_touch_blocked_cells_and_never_squeeze_between_two(
     positions: Any, fault: str | None, yaw_rad: float
 ) -> None:
-    faults = faults_of(framed(PINCHED, yaw_rad=yaw_rad), *positions)
+    faults = faults_of(framed(PINCHED, yaw_rad), *positions)
     assert len(faults) == (0 if fault is None else 1)
     assert fault is None or fault in faults[0]
 
@@ -257,7 +249,7 @@ def test_unexplored_cells_are_free_only_when_allowed() -> None:
 
 
 def test_a_long_path_has_the_length_that_its_moves_have() -> None:
-    grid = framed(np.full((700, 700), CellClass.FREE, np.uint8))
+    grid = framed(np.full((700, 700), CellClass.FREE, np.uint8), 0.4)
     steps = np.array([(1, 1), (0, 1), (1, 0)]).repeat((301, 200, 100), axis=0)
     cells = np.concatenate([[(0, 0)], np.random.default_rng(0).permutation(steps).cumsum(axis=0)])
     verdict = judge_path(grid, cells, start=(0, 0), goal=tuple(cells[-1]))
@@ -291,7 +283,7 @@ def test_optima_are_those_of_an_edge_list(classes: Any, seed: int, allow: bool) 
     assume(enterable.any())
     rng = np.random.default_rng(seed)
     row, col = rng.choice(np.argwhere(enterable)).tolist()
-    grid = framed(classes)
+    grid = framed(classes, 0.4)
     expected = distances(move_graph(enterable), enterable.shape, (row, col)) * 0.05
     found = ScipyOptimum(grid, allow_unexplored=allow).lengths_from((row, col))
     np.testing.assert_allclose(found, np.where(enterable, expected, np.inf), rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Damaged and hostile files: one clear line, and no more memory than the file can be worth."""
+"""Damaged, hostile and huge files: one clear line, no other map, bounded memory."""
 
 import io
 import struct
@@ -9,10 +9,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
+import hybridnav as hn
 from hybridnav._base.yaml_file import read_yaml
+from hybridnav.cli.app import run
 from hybridnav.errors import MapError, MapNotFoundError, PresetError, PresetNotFoundError
+from hybridnav.harness.scenes import MapSpec, read_map
 from hybridnav.maps.files import load_map
+from hybridnav.maps.files.image import read_raster
+from tests.strategies import examples
 
 KEYS = "resolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
@@ -243,3 +249,225 @@ def test_a_file_that_may_not_be_read(tmp_path, monkeypatch):
 def test_a_map_of_one_cell_loads(load):
     grid = load(b"P5\n1 1\n255\n\xff")
     np.testing.assert_array_equal(grid.probability, [[0]])
+
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+ADAM7 = (
+    (0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2), (1, 0, 2, 1)
+)  # fmt: skip
+"""First row and column of each pass of an interlaced PNG, and the steps."""
+
+
+def _any_size(cols, rows):
+    """Accept every size."""
+
+
+def _pixels(mode):
+    rng = np.random.default_rng(5)
+    if mode == "I;16":
+        return Image.fromarray(rng.integers(0, 2**16, (7, 9), dtype=np.uint16))
+    channels = {"LA": 2, "RGB": 3, "RGBA": 4}.get(mode)
+    shape = (7, 9) if channels is None else (7, 9, channels)
+    noise = Image.fromarray(rng.integers(0, 256, shape, dtype=np.uint8))
+    return noise.quantize(16) if mode == "P" else noise.convert(mode)
+
+
+def _png_of(mode):
+    stream, info = io.BytesIO(), PngInfo()
+    info.add_text("Software", "a scanner")
+    options = {"transparency": 7} if mode in ("L", "P") else {}
+    _pixels(mode).save(stream, "PNG", pnginfo=info, **options)
+    return stream.getvalue()
+
+
+def _png_chunk(name, content):
+    checksum = struct.pack(">I", zlib.crc32(name + content))
+    return struct.pack(">I", len(content)) + name + content + checksum
+
+
+def _file(shape, data, *, interlaced=0):
+    header = struct.pack(">IIBBBBB", shape[1], shape[0], 8, 0, 0, 0, interlaced)
+    return (
+        SIGNATURE
+        + _png_chunk(b"IHDR", header)
+        + _png_chunk(b"IDAT", data)
+        + _png_chunk(b"IEND", b"")
+    )
+
+
+def _rows(levels):
+    """The rows as a PNG stores them, without a filter."""
+    return b"".join(b"\0" + row.tobytes() for row in levels)
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Read a PNG of these bytes; None when it is refused, in one line that names the file."""
+    path = tmp_path / "m.png"
+
+    def read(content):
+        path.write_bytes(content)
+        try:
+            return read_raster(path, what="image", check_size=_any_size)
+        except MapError as error:
+            text = str(error)
+        assert text.isprintable()
+        assert str(path) in text
+        return None
+
+    return read
+
+
+def _same(first, second):
+    opaque = [np.ones(r.level.shape) if r.opaque is None else r.opaque for r in (first, second)]
+    return first.white == second.white and all(
+        np.array_equal(*pair) for pair in ((first.level, second.level), opaque)
+    )
+
+
+MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I;16")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_no_flipped_bit_is_read_as_another_image(read, mode):
+    content = _png_of(mode)
+    whole = read(content)
+    for bit in range(0, 8 * len(content), 11):  # eleven and eight share no factor: every bit's turn
+        flipped = bytearray(content)
+        flipped[bit // 8] ^= 1 << bit % 8
+        found = read(bytes(flipped))
+        assert found is None or _same(found, whole), f"bit {bit} of {8 * len(content)}"
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_no_cut_is_read(read, mode):
+    content = _png_of(mode)
+    assert all(read(content[:size]) is None for size in range(0, len(content), 3))
+    assert _same(read(content + b"what follows the end"), read(content))
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=examples(60))
+@given(data=st.data())
+def test_an_interlaced_image_is_whole_at_any_size(read, data):
+    shape = data.draw(st.tuples(st.integers(1, 20), st.integers(1, 20)))
+    levels = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
+    passes = [levels[row::down, col::right] for row, col, down, right in ADAM7]
+    stored = b"".join(_rows(part) for part in passes if part.size)
+    found = read(_file(shape, zlib.compress(stored), interlaced=1))
+    np.testing.assert_array_equal(found.level, levels)
+    assert read(_file(shape, zlib.compress(stored[:-1]), interlaced=1)) is None
+
+
+def test_pixel_data_larger_than_what_is_inflated_at_a_time(read):
+    levels = np.full((1, 2**20 - 1), 254, np.uint8)  # with its filter one piece, to the byte
+    for rows in (1, 3):
+        tall = np.repeat(levels, rows, axis=0)
+        found = read(_file(tall.shape, zlib.compress(_rows(tall))))
+        np.testing.assert_array_equal(found.level, tall)
+
+
+LEVELS = np.arange(12, dtype=np.uint8).reshape(3, 4)
+STREAM = zlib.compress(_rows(LEVELS))
+WHOLE = _file((3, 4), STREAM)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (_file((3, 4), STREAM[:-4] + b"\0\0\0\0"), "incorrect data check"),
+        (_file((3, 4), STREAM[:-4]), "truncated"),
+        (_file((4, 4), STREAM), "truncated"),
+        (_file((2, 4), STREAM), "more pixel data than the image has pixels"),
+        (WHOLE[:-12], "IEND"),
+        (WHOLE.replace(b"IDAT", b"ID\0T"), "damaged"),
+        (SIGNATURE + _png_chunk(b"tEXt", b"a\0b") + WHOLE[8:], "does not begin with its header"),
+        (WHOLE[:-1] + b"\0", "chunk IEND does not match its checksum"),
+    ],
+    ids=["sum", "no sum", "short", "long", "no end", "name", "order", "chunk"],
+)
+def test_the_message_says_what_is_damaged(tmp_path, content, words):
+    path = tmp_path / "m.png"
+    path.write_bytes(content)
+    with pytest.raises(MapError, match=words):
+        read_raster(path, what="image", check_size=_any_size)
+
+
+LIMIT = "more than the limit of 20,000,000; reading them takes about 1.2 GB of memory, planning "
+
+
+@pytest.fixture
+def maps(tmp_path):
+    """A ROS map and a MovingAI map of 30 x 20 cells, all free."""
+    Image.fromarray(np.full((20, 30), 254, np.uint8)).save(tmp_path / "m.png")
+    (tmp_path / "a.yaml").write_text(f"image: m.png\n{KEYS}")
+    rows = "type octile\nheight 20\nwidth 30\nmap\n" + ("." * 30 + "\n") * 20
+    (tmp_path / "a.map").write_text(rows)
+    return tmp_path / "a.yaml", tmp_path / "a.map"
+
+
+def _huge(folder):
+    """A PNG of 25 million white cells, a few kilobytes, cut after its header and a map of it."""
+    stream = io.BytesIO()
+    Image.new("L", (5000, 5000), 255).save(stream, "PNG")
+    (folder / "huge.png").write_bytes(stream.getvalue())
+    path = folder / "huge.yaml"
+    path.write_text(f"image: huge.png\n{KEYS}")
+    return path
+
+
+def test_a_huge_map_is_refused_with_its_cells_its_memory_and_the_option(tmp_path, monkeypatch):
+    path = _huge(tmp_path)
+    monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("pixels were read"))
+    with pytest.raises(hn.MapError, match="5000 x 5000 = 25,000,000 cells, ") as refused:
+        hn.load_map(path)
+    told = str(refused.value)
+    assert LIMIT + "up to 7.5 GB" in told
+    assert "--max-cells 25000000, in Python max_cells" in told
+    assert "huge.png" in told
+    assert told.isprintable()
+
+
+def test_a_huge_movingai_map_is_refused_by_its_header(tmp_path):
+    path = tmp_path / "huge.map"
+    path.write_text("type octile\nheight 5000\nwidth 5000\nmap\n")
+    with pytest.raises(hn.MapError, match="5000 x 5000 = 25,000,000 cells, " + LIMIT):
+        hn.load_map(path)
+
+
+def test_the_limit_is_inclusive_and_may_be_raised_and_lowered(maps):
+    for path in maps:
+        assert hn.load_map(path, max_cells=600).shape == (20, 30)
+        with pytest.raises(hn.MapError, match="30 x 20 = 600 cells, more than the limit of 599;"):
+            hn.load_map(path, max_cells=599)
+        with pytest.raises(hn.InvalidValueError, match="max_cells must be a positive number"):
+            hn.load_map(path, max_cells=0)
+        read_map.cache_clear()
+        with pytest.raises(hn.MapError, match="limit of 599"):
+            read_map(MapSpec(str(path), 0.0, max_cells=599))
+
+
+@pytest.mark.parametrize("command", ["plan", "tour", "show", "rooms", "evaluate"])
+def test_every_command_takes_the_limit(maps, tmp_path, capsys, command):
+    more = {
+        "plan": ["--start", "0.5,0.5", "--goal", "1,0.5"],
+        "tour": ["--from", "0.5,0.5", "--to", "room-1"],
+        "evaluate": ["-o", str(tmp_path / "out")],
+    }.get(command, [])
+    name = "plan" if command == "tour" else command
+    for path in maps:
+        assert run([name, str(path), *more, "--max-cells", "599"]) == 3
+        told = capsys.readouterr()
+        assert told.out == ""
+        assert told.err.count("\n") == 1
+        assert "600 cells, more than the limit of 599" in told.err
+    assert run([name, str(maps[0]), *more, "--max-cells", "0"]) == 2
+    assert "--max-cells" in capsys.readouterr().err
+
+
+def test_a_label_image_of_another_size_is_refused_by_its_header(maps, tmp_path, monkeypatch):
+    grid = hn.load_map(maps[0])
+    _huge(tmp_path)
+    (tmp_path / "rooms.yaml").write_text("locations: [hall]\ndata: huge.png\n")
+    monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("pixels were read"))
+    with pytest.raises(hn.RoomsError, match="image of 5000 x 5000 pixels, the map has"):
+        hn.load_rooms(tmp_path / "rooms.yaml", grid)

@@ -1,11 +1,16 @@
-"""MovingAI maps and scenarios."""
+"""MovingAI maps and scenarios, read and written."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.maps import CellClass, Frame
 from hybridnav.maps.files import Scenario, load_map, read_scenarios
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 HEADER = "type octile\nheight 3\nwidth 4\nmap\n"
 BODY = ".GS.\n@OTW\n..@.\n"
@@ -165,3 +170,39 @@ def test_all_reference_maps_load_and_their_scenarios_stand_on_free_cells(data):
         low, high = np.sort(abs(endpoints[:, 0] - endpoints[:, 1]), axis=1).T
         optimum = np.array([scenario.optimum_cells for scenario in scenarios])
         assert (optimum > high + (2**0.5 - 1) * low - 0.006).all(), path.name
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("maps")
+
+
+@given(class_grids())
+@settings(max_examples=examples(60))
+def test_free_cells_survive_and_all_others_are_occupied(folder, classes):
+    hn.write_movingai_map(occupancy_grid(classes), folder / "again.map")
+    again = hn.load_map(folder / "again.map", robot_radius_m=0)
+    free = classes == hn.CellClass.FREE
+    assert np.array_equal(again.measured == hn.CellClass.FREE, free)
+    assert np.array_equal(again.measured == hn.CellClass.OCCUPIED, ~free)
+
+
+def test_a_file_that_was_read_is_written_with_equal_bytes(folder):
+    text = "type octile\nheight 2\nwidth 3\nmap\n.@.\n@..\n"
+    (folder / "one.map").write_text(text)
+    grid = hn.load_map(folder / "one.map", robot_radius_m=5.0)
+    hn.write_movingai_map(grid, folder / "two.map")
+    assert (folder / "two.map").read_bytes() == text.encode()
+
+
+def test_the_first_line_of_the_map_is_its_highest_row(folder):
+    hn.write_movingai_map(occupancy_grid(drawn(".#?", "...")), folder / "rows.map")
+    assert (folder / "rows.map").read_text().splitlines()[4:] == [".@@", "..."]
+
+
+def test_what_cannot_be_written_is_refused(folder):
+    grid = occupancy_grid(drawn("."))
+    with pytest.raises(hn.MapError, match=r"must be named \.map"):
+        hn.write_movingai_map(grid, folder / "map.txt")
+    with pytest.raises(hn.MapError, match="cannot write"):
+        hn.write_movingai_map(grid, folder / "none" / "one.map")

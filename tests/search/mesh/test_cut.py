@@ -1,8 +1,10 @@
-"""A mesh that is cut anew where cells changed is as good as one built of the changed map."""
-
-from __future__ import annotations
+"""A mesh cut anew, and paths round closed cells, are as good as those of a mesh of the new map."""
 
 import itertools
+import math
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,21 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import hybridnav as hn
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.maps import CellClass
-from hybridnav.search.mesh import ConvexMesh, MeshSearch, build_mesh, renew_mesh
+from hybridnav.search.mesh import (
+    ConvexMesh,
+    DetourSearch,
+    MeshPath,
+    MeshSearch,
+    build_mesh,
+    renew_mesh,
+    shortest_paths,
+)
+from hybridnav.search.mesh import cut as detours
+from hybridnav.search.mesh import search as searches
+from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
     KINDS,
@@ -24,15 +38,18 @@ from tests.oracle.mesh import (
 )
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
+seeds = st.integers(0, 2**32 - 1)
+
 
 @st.composite
-def cuts(draw: st.DrawFn) -> tuple[Any, Any]:
-    """Free cells and some flat cells to close: single ones, and windows."""
+def closures(draw: st.DrawFn, least: int = 1) -> tuple[Any, Any]:
+    """Free cells and some flat cells to close: single ones, and a window with a least side."""
     free = draw(class_grids(max_side=14)) == CellClass.FREE
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    shut = rng.random(free.shape) < rng.choice([0.02, 0.1])
+    rng = np.random.default_rng(draw(seeds))
+    shut = rng.random(free.shape) < rng.choice([0.0, 0.02, 0.1])
     row, col = (rng.integers(side) for side in free.shape)
-    shut[row : row + rng.integers(5), col : col + rng.integers(5)] = True
+    height, width = rng.integers(least, 6, 2)
+    shut[row : row + height, col : col + width] = True
     return free, np.flatnonzero(shut)
 
 
@@ -55,7 +72,7 @@ def assert_shortest(searches: list[MeshSearch], free: Any, seed: int) -> None:
 
 
 @settings(max_examples=examples(60), deadline=None)
-@given(cuts(), st.integers(0, 2**32 - 1))
+@given(closures(least=0), st.integers(0, 2**32 - 1))
 def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     free, closed = cut
     left = free.copy()
@@ -169,3 +186,244 @@ def test_corners_at_which_walls_run_straight_on_are_left_out(kind: str) -> None:
     assert_as_fresh(mesh, free)
     found = search_of(mesh, kind).path(((3, 2), (5, 2)), ((3.5, 2.5), (5.5, 2.5)))
     assert found.length_cells == found.lower_bound_cells == pytest.approx(1 + np.sqrt(2))
+
+
+def without(free: Any, closed: Any) -> Any:
+    """Free cells that are not closed."""
+    left = free.copy()
+    left.ravel()[closed] = False
+    return left
+
+
+def queries(free: Any, seed: int) -> Iterator[tuple[Any, Any]]:
+    """Cells and positions of both endpoints, centres and degenerate ones."""
+    for (first, start), (last, goal) in itertools.pairwise(some_positions(free, seed)):
+        yield (first, last), (start, goal)
+
+
+@settings(max_examples=examples(120), deadline=None)
+@given(closures(), seeds, st.booleans())
+def test_a_detour_is_the_shortest_path_of_a_mesh_without(
+    case: tuple[Any, Any],
+    seed: int,
+    is_prepared: bool,  # noqa: FBT001
+) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
+    if is_prepared:
+        search.prepare()
+    round_it = DetourSearch(search.mesh, free, closed)
+    for query in queries(left, seed):
+        optimum = anew.path(*query).length_cells
+        found, opened = round_it.path(*query), search.path(*query)
+        assert found.length_cells == pytest.approx(optimum, abs=1e-9)
+        assert found.lower_bound_cells == found.length_cells
+        assert (found.positions is None) == math.isinf(optimum)
+        if found.positions is not None:
+            legs = np.diff(found.positions, axis=0)
+            assert np.hypot(*legs.T).sum() == pytest.approx(optimum, abs=1e-9)
+            assert not round_it.is_met_by(found) or (found.positions % 1 == 0).all(axis=1).any()
+        if not round_it.is_met_by(opened):
+            assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(closures(), seeds)
+def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
+    case: tuple[Any, Any], seed: int
+) -> None:
+    free, closed = case
+    before = free ^ (np.random.default_rng(seed).random(free.shape) < 0.1)
+    left = without(free, closed)
+    assume(left.any())
+    mesh = renew_mesh(build_mesh(before), free, np.flatnonzero(before != free))
+    search, anew = MeshSearch(mesh), MeshSearch(build_mesh(left))
+    round_it = DetourSearch(mesh, free, closed)
+    for query in queries(left, seed):
+        optimum = anew.path(*query).length_cells
+        opened = search.path(*query)
+        assert round_it.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
+        if not round_it.is_met_by(opened):
+            assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
+
+
+@settings(max_examples=examples(40), deadline=None)
+@given(closures(), seeds)
+def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search = MeshSearch(build_mesh(free))
+    round_it = DetourSearch(search.mesh, free, closed)
+    cells, positions = zip(*queries(left, seed), strict=True)
+    pairs = np.array(cells), np.array(positions)
+    many = shortest_paths(
+        search, (pairs[0][:, 0], pairs[0][:, 1]), (pairs[1][:, 0], pairs[1][:, 1])
+    )
+    met = [round_it.is_met_by(search.path(*query)) for query in queries(left, seed)]
+    assert round_it.are_met_by(many).tolist() == met
+
+
+@pytest.mark.parametrize("is_prepared", [False, True])
+def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
+    *, is_prepared: bool
+) -> None:
+    free = np.ones((6, 9), np.bool_)
+    free[2, 4] = False
+    search = MeshSearch(build_mesh(free))
+    if is_prepared:
+        search.prepare()
+    query = ((2, 0), (2, 8)), ((2.5, 0.5), (2.5, 8.5))
+    opened = search.path(*query)
+    assert opened.positions is not None
+    # Round the one blocked cell goes the path above or below: what lies on the other side is free.
+    above = bool(opened.positions[1, 0] == 3)
+    for cell, is_met in (((1 if above else 3, 4), False), ((3 if above else 1, 4), True)):
+        round_it = DetourSearch(search.mesh, free, np.array([cell[0] * 9 + cell[1]]))
+        assert round_it.is_met_by(opened) is is_met
+        assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
+
+
+@pytest.mark.parametrize("is_prepared", [False, True])
+def test_two_cells_that_meet_at_a_corner_let_nothing_through(*, is_prepared: bool) -> None:
+    free = np.ones((4, 4), np.bool_)
+    search = MeshSearch(build_mesh(free))
+    if is_prepared:
+        search.prepare()
+    query = ((0, 0), (3, 3)), ((0.5, 0.5), (3.5, 3.5))
+    apart = DetourSearch(search.mesh, free, np.array([1 * 4 + 2, 2 * 4 + 1]))
+    opened = search.path(*query)
+    assert apart.is_met_by(opened)
+    assert apart.path(*query).length_cells > opened.length_cells
+    one = DetourSearch(search.mesh, free, np.array([1 * 4 + 2]))
+    assert not one.is_met_by(opened)
+
+
+def steps(
+    round_it: DetourSearch, query: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> Iterator[MeshPath]:
+    """The answers of a search that is stopped after one step, after two, and so on."""
+    monkeypatch.setattr(searches, "SLICE", 1)
+    for count in itertools.count(1):
+        clock = itertools.count()
+        for module in (detours, searches):
+            monkeypatch.setattr(module, "perf_counter", lambda now=clock: next(now))
+        yield round_it.path(*query, budget_s=count)
+        if next(clock) <= count:
+            return
+
+
+@settings(max_examples=examples(25), deadline=None)
+@given(closures(), seeds)
+def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
+    case: tuple[Any, Any], seed: int
+) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
+    search.prepare()
+    round_it = DetourSearch(search.mesh, free, closed)
+    rng = np.random.default_rng(seed)
+    (a, b), (c, d) = rng.choice(np.argwhere(left), 2).tolist()
+    query = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
+    optimum = anew.path(*query).length_cells
+    with pytest.MonkeyPatch.context() as patch:
+        found = list(steps(round_it, query, patch))
+    bounds = [path.lower_bound_cells for path in found]
+    assert bounds == sorted(bounds)
+    assert bounds[-1] == found[-1].length_cells == pytest.approx(optimum, abs=1e-9)
+    for path in found:
+        assert path.lower_bound_cells <= optimum * (1 + 1e-12) <= path.length_cells * (1 + 2e-12)
+    # What was stopped leaves nothing behind, for neither search.
+    assert round_it.path(*query).length_cells == found[-1].length_cells
+    assert search.path(*query).length_cells == pytest.approx(
+        MeshSearch(search.mesh).path(*query).length_cells, abs=1e-9
+    )
+
+
+@settings(max_examples=examples(25), deadline=None)
+@given(closures(), seeds, st.sampled_from([0.01, 0.3]))
+def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
+    case: tuple[Any, Any], seed: int, epsilon: float
+) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
+    round_it = DetourSearch(search.mesh, free, closed)
+    for query in queries(left, seed):
+        optimum = anew.path(*query).length_cells
+        found = round_it.path(*query, epsilon=epsilon)
+        assert math.isinf(found.length_cells) == math.isinf(optimum)
+        if math.isfinite(optimum):
+            assert found.lower_bound_cells <= optimum + 1e-9
+            assert optimum - 1e-9 <= found.length_cells <= (1 + epsilon) * optimum + 1e-9
+
+
+HALLS = drawn(
+    "##########################",
+    "#......#........#........#",
+    "#......#........#........#",
+    "#...........#........#...#",
+    "#......#........#........#",
+    "####.######.#########.####",
+    "#........................#",
+    "#........................#",
+    "####.######.#########.####",
+    "#......#........#........#",
+    "#...#...............#....#",
+    "#......#........#........#",
+    "##########################",
+)
+
+
+def halls() -> tuple[hn.HybridPlanner, list[Any], list[Any]]:
+    """A prepared planner, pairs of points, and what may be closed."""
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(occupancy_grid(HALLS), merge_distance_m=4.0)
+    )
+    planner = hn.HybridPlanner(topology)
+    planner.prepare()
+    cells = np.argwhere(HALLS == CellClass.FREE)
+    rng = np.random.default_rng(4)
+    points = topology.grid.frame.points_of(rng.choice(cells, 24))
+    shut = [planner.closed({"cells": cells[at : at + 6]}) for at in range(0, 100, 9)]
+    return planner, list(itertools.pairwise(points)), shut
+
+
+def test_threads_that_close_different_things_disturb_nobody() -> None:
+    planner, pairs, shut = halls()
+    asked = [(pair, closed) for closed in (*shut, None) for pair in pairs] * 3
+
+    def cost(query: Any) -> float:
+        pair, closed = query
+        return planner.plan(*pair, blocked=closed).cost
+
+    alone = [cost(query) for query in asked]
+    other, _, _ = halls()
+    planner = other
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(cost, asked)) == alone
+
+
+def test_an_interrupt_leaves_nothing_closed_and_nothing_changed() -> None:
+    planner, pairs, shut = halls()
+    pair = max(pairs, key=lambda of: planner.plan(*of).cost)
+    opened = planner.plan(*pair).cost
+    closed = next(one for one in shut if opened < planner.plan(*pair, blocked=one).cost)
+    wanted = planner.plan(*pair, blocked=closed).cost
+    for at in range(1, 400, 7):
+        again, _, _ = halls()
+        asked = partial(again.plan, *pair, blocked=closed)
+        try:
+            lines = lines_of(asked, strike_at=at)
+        except Struck:
+            lines = at
+        assert again.plan(*pair).cost == opened
+        assert asked().cost == wanted
+        if lines < at:
+            break
+    assert at > 100

@@ -1,7 +1,5 @@
 """The convex mesh covers free space exactly, and paths on it are shortest."""
 
-from __future__ import annotations
-
 import copy
 import csv
 import itertools

@@ -1,7 +1,5 @@
 """A judge of paths on an overlay: scipy's Dijkstra on the integer costs of all legal moves."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra

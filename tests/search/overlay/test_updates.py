@@ -190,23 +190,22 @@ def test_tables_guide_searches_only_while_they_are_lower_bounds(before, after):
         judge.check(search.path(goal, start), goal, start)
 
 
+SMALLER: Any = np.zeros((5, 6), dtype=np.bool_)
+BOXES: list[Any] = [(0, 7, 0, 3), (2, 1, 0, 3), (0, 1, 2), (0.0, 1, 0, 1), (-1, 1, 0, 1), 3, "all"]
+
+
 @pytest.mark.parametrize(
-    "box", [(0, 7, 0, 3), (2, 1, 0, 3), (0, 1, 2), (0.0, 1, 0, 1), (-1, 1, 0, 1), 3, "all"]
+    ("given", "match"),
+    [
+        *(({"changed": box}, "give first row, last row") for box in BOXES),
+        *(({name: SMALLER}, "give one bool for each") for name in ("closed", "enterable")),
+    ],
 )
-def test_boxes_outside_the_map_are_refused(box):
+def test_boxes_outside_the_map_and_cells_of_another_shape_are_refused(given, match):
     free = np.ones((6, 6), dtype=np.bool_)
     overlay = build_overlay(free, nested(free, [3]))
-    with pytest.raises(InvalidValueError, match="give first row, last row"):
-        overlay.update(np.ones((6, 6)), changed=box)
-
-
-@pytest.mark.parametrize("name", ["closed", "enterable"])
-def test_cells_of_another_shape_are_refused(name):
-    free = np.ones((6, 6), dtype=np.bool_)
-    overlay = build_overlay(free, nested(free, [3]))
-    cells: dict[str, Any] = {name: np.zeros((5, 6), dtype=np.bool_)}
-    with pytest.raises(InvalidValueError, match="give one bool for each"):
-        overlay.update(np.ones((6, 6)), **cells)
+    with pytest.raises(InvalidValueError, match=match):
+        overlay.update(np.ones((6, 6)), **given)
 
 
 @pytest.mark.parametrize("sizes", [(4,), (4, 8), (4, 12, 24), (60,)])

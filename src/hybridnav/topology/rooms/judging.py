@@ -55,7 +55,7 @@ class Forest:
     @classmethod
     @cache
     def shipped(cls) -> Forest:
-        """Read the forest of the package; `benchmarks/train_rooms.py` makes it."""
+        """Read the forest of the package; `python -m benchmarks train_rooms` makes it."""
         with (resources.files("hybridnav.topology.rooms") / TABLE).open("rb") as file:
             table = np.load(file)
             return cls(

@@ -1,7 +1,5 @@
 """Writers of graph files, independent of hybridnav: by the libraries' own writers, or by hand."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from typing import Any

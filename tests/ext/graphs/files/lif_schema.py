@@ -4,8 +4,6 @@ Written from the guideline of March 2024 by way of ConstantinUp/LIF_Schema (json
 and LIF.md of Intralogistics-2X-LIF/Layout-Interchange-Format.
 """
 
-from __future__ import annotations
-
 import json
 import re
 

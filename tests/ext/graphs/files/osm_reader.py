@@ -6,8 +6,6 @@ Written after `Parsing_Osm2AreaGraph` and the rules of the draft of the indoor o
 hybridnav.
 """
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field

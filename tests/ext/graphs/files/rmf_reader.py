@@ -4,8 +4,6 @@ Written after `parse_graph` of open-rmf/rmf_ros2 (rmf_fleet_adapter/src/rmf_flee
 its errors, and shares no code with hybridnav.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, field

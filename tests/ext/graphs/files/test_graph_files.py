@@ -1,7 +1,5 @@
 """Graphs that others have made: what is read is what was written, in each format."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any
@@ -70,57 +68,37 @@ def test_nav2(folder, plain):
     assert graph.costs.tolist() == [k / 7 for k in range(len(ids), len(ids) + graph.n_edges)]
 
 
-@given(plain_graphs())
-@settings(max_examples=examples(40))
-def test_strands_yaml(folder, plain):
-    writers.write_strands(folder / "a.tplg", plain)
-    graph = hn.load_graph(folder / "a.tplg")
-    assert (graph.format, graph.name, graph.findings) == ("strands", "drawn", ())
-    assert means(graph) == expected(plain)
-    assert all(facts["properties"] == plain.facts for facts in graph.node_facts.values())
-    assert all(facts["goal"] == plain.facts for facts in graph.edge_facts.values())
+_ANY_NAMES = st.one_of(_TEXTS, st.integers())
+_XML_NAMES = st.text("abc<>&'\" ]", min_size=1, max_size=8)
+FORMATS = {
+    "a.tplg": (writers.write_strands, "strands", "drawn", _WORDS),
+    "a.tmap2": (writers.write_tmap2, "tmap2", "drawn", _WORDS),  # with anchors and aliases
+    "a.tmap": (writers.write_text, "strands-text", "a", _WORDS),
+    "a.graphml": (writers.write_graphml, "graphml", "drawn", _XML_NAMES),
+    "a.json": (writers.write_node_link, "node-link", "drawn", _ANY_NAMES),
+}
 
 
-@given(plain_graphs())
-@settings(max_examples=examples(40))
-def test_tmap2_with_anchors_and_aliases(folder, plain):
-    writers.write_tmap2(folder / "a.tmap2", plain)
-    graph = hn.load_graph(folder / "a.tmap2")
-    assert (graph.format, graph.name, graph.findings) == ("tmap2", "drawn", ())
-    assert means(graph) == expected(plain)
-    assert all(facts["properties"] == plain.facts for facts in graph.node_facts.values())
-
-
-@given(plain_graphs())
+@pytest.mark.parametrize("file", FORMATS)
+@given(st.data())
 @settings(max_examples=examples(60))
-def test_older_text(folder, plain):
-    writers.write_text(folder / "a.tmap", plain)
-    graph = hn.load_graph(folder / "a.tmap")
-    assert (graph.format, graph.name, graph.findings) == ("strands-text", "a", ())
+def test_what_is_written_is_read(folder, file, data):
+    write, form, name, names = FORMATS[file]
+    plain = data.draw(plain_graphs(names))
+    write(folder / file, plain)
+    graph = hn.load_graph(folder / file)
+    assert (graph.format, graph.name, graph.findings) == (form, name, ())
     assert means(graph) == expected(plain)
-    assert all(facts["pose"]["qw"] == 1.0 for facts in graph.node_facts.values())
-    assert all(facts == {"action": "move_base"} for facts in graph.edge_facts.values())
+    nodes, edges = graph.node_facts.values(), graph.edge_facts.values()
+    if form in {"strands", "tmap2"}:
+        assert all(facts["properties"] == plain.facts for facts in nodes)
+        assert all(facts["goal"] == plain.facts for facts in edges)
+    elif form == "strands-text":
+        assert all(facts["pose"]["qw"] == 1.0 for facts in nodes)
+        assert all(facts == {"action": "move_base"} for facts in edges)
 
 
-@given(plain_graphs(st.text("abc<>&'\" ]", min_size=1, max_size=8)))
-@settings(max_examples=examples(60))
-def test_graphml(folder, plain):
-    writers.write_graphml(folder / "a.graphml", plain)
-    graph = hn.load_graph(folder / "a.graphml")
-    assert (graph.format, graph.name, graph.findings) == ("graphml", "drawn", ())
-    assert means(graph) == expected(plain)
-
-
-@given(plain_graphs(st.one_of(_TEXTS, st.integers())))
-@settings(max_examples=examples(60))
-def test_node_link(folder, plain):
-    writers.write_node_link(folder / "a.json", plain)
-    graph = hn.load_graph(folder / "a.json")
-    assert (graph.format, graph.name, graph.findings) == ("node-link", "drawn", ())
-    assert means(graph) == expected(plain)
-
-
-@given(plain_graphs(st.one_of(_TEXTS, st.integers())))
+@given(plain_graphs(_ANY_NAMES))
 @settings(max_examples=examples(60))
 def test_networkx_there_and_back(plain):
     graph = hn.WaypointGraph.from_networkx(plain.directed)

@@ -1,7 +1,5 @@
 """Damaged and hostile files of graphs: one clear line, or a graph, in bounded time and memory."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

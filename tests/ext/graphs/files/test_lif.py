@@ -1,7 +1,5 @@
 """Buildings in VDMA's Layout Interchange Format: valid by a schema, and read back."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections import Counter

@@ -1,10 +1,8 @@
 """Route graphs for Nav2, read again by the rules of its loader."""
 
-from __future__ import annotations
-
 import json
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
@@ -18,9 +16,6 @@ from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.nav2_reader import read_nav2
 from tests.strategies import class_grids, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Buildings as OpenStreetMap's XML: read by the rules of area graphs, and read back."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

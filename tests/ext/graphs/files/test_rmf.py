@@ -1,13 +1,16 @@
-"""Navigation graphs for Open-RMF, read again by the rules of its fleet adapter, and read back."""
+"""Files of Open-RMF: navigation graphs by the rules of its fleet adapter, maps of its editor."""
 
-from __future__ import annotations
-
+import cmath
 import math
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import shapely
+import yaml
 from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.fleet import BuildingGraph, LinkEnd, align_floors, join_links
@@ -164,3 +167,241 @@ def test_two_lifts_at_one_point_are_refused(house, tmp_path):
     both = replace(house, links=(*house.links, twin))
     with pytest.raises(hn.InvalidValueError, match="the lifts 'east' and 'west' end at one node"):
         hn.export_rmf(both, tmp_path / "a.yaml")
+
+
+COORDINATES = st.integers(0, 4000).map(lambda value: value / 100)
+POINTS = st.lists(st.tuples(COORDINATES, COORDINATES), min_size=2, max_size=7, unique=True)
+MARKS = {"a": 1 + 2j, "b": 30 + 5j, "c": 12 + 31j}
+"""Fiducials in metres, in the frame of the reference level."""
+
+
+@pytest.fixture(scope="module")
+def drawing(tmp_path_factory):
+    return tmp_path_factory.mktemp("editor") / "house.building.yaml"
+
+
+class Level:
+    """A level drawn over an image that lies turned, scaled and moved; y of pixels points down."""
+
+    def __init__(self, points, pose):
+        self.points = points
+        self.scale, self.yaw, self.at = pose
+        self.lanes, self.doors = [], []
+
+    def pixel(self, metres):
+        """Pixel of a point in metres."""
+        at = (metres - self.at) * cmath.exp(-1j * self.yaw) / self.scale
+        return [at.real, -at.imag]
+
+    def content(self, elevation):
+        """The level as the drawing has it."""
+        points = [complex(*point) for point in self.points]
+        ends = [end for door in self.doors for end in door]
+        measured = [0j, 5 + 0j]
+        vertices = [
+            [*self.pixel(at), 0, "", {}]
+            for at in [*points, *(complex(*end) for end in ends), *measured]
+        ]
+        for number in range(len(points)):
+            vertices[number][3] = f"{elevation:g}-{number}"
+        first = len(points)
+        return {
+            "elevation": elevation,
+            "drawing": {"filename": "a.png"},
+            "vertices": vertices,
+            "fiducials": [[*self.pixel(at), name] for name, at in MARKS.items()],
+            "measurements": [[len(vertices) - 2, len(vertices) - 1, {"distance": [3, 5.0]}]],
+            "doors": [
+                [first + 2 * k, first + 2 * k + 1, {"name": [1, f"{elevation:g}d{k}"]}]
+                for k in range(len(self.doors))
+            ],
+            "lanes": [
+                [
+                    tail,
+                    head,
+                    {"graph_idx": [2, graph], "bidirectional": [4, both], "speed_limit": [3, 0]},
+                ]
+                for tail, head, graph, both in self.lanes
+            ],
+        }
+
+
+@st.composite
+def drawn(draw):
+    poses = [(draw(st.floats(0.01, 0.2)), 0.0, 0j)]
+    poses += [
+        (
+            draw(st.floats(0.01, 0.2)),
+            draw(st.floats(-3, 3)),
+            complex(*draw(st.tuples(COORDINATES, COORDINATES))),
+        )
+        for _ in range(draw(st.integers(0, 2)))
+    ]
+    levels = []
+    for pose in poses:
+        level = Level(draw(POINTS), pose)
+        nodes = st.integers(0, len(level.points) - 1)
+        lane = st.tuples(nodes, nodes, st.sampled_from([0, 0, 3]), st.booleans())
+        level.lanes = [(0, 1, 0, True), *draw(st.lists(lane, max_size=6))]
+        level.doors = draw(
+            st.lists(st.tuples(*[st.tuples(COORDINATES, COORDINATES)] * 2), max_size=2)
+        )
+        levels.append(level)
+    return levels
+
+
+@given(drawn(), st.randoms())
+@settings(max_examples=examples(120))
+def test_pixels_become_the_metres_that_they_were_drawn_from(drawing, levels, order):
+    contents = {f"L{k}": level.content(4.0 * k) for k, level in enumerate(levels)}
+    names = list(contents)
+    order.shuffle(names)
+    data = {
+        "name": "house",
+        "coordinate_system": "reference_image",
+        "reference_level_name": "L0",
+        "levels": {name: contents[name] for name in names},
+    }
+    drawing.write_text(yaml.safe_dump(data))
+    building = hn.load_building_graph(drawing)
+    assert [floor.name for floor in building.floors] == [f"L{k}" for k in range(len(levels))]
+    for number, (floor, level) in enumerate(zip(building.floors, levels, strict=True)):
+        lanes = [lane for lane in level.lanes if lane[2] == 0]
+        used = {end for lane in lanes for end in lane[:2]}
+        assert set(floor.graph.names) == {f"{4 * number}-{end}" for end in used}
+        at = {name: node for node, name in enumerate(floor.graph.names)}
+        for end in used:
+            point = floor.graph.points[at[f"{4 * number}-{end}"]]
+            assert point == pytest.approx(level.points[end], abs=1e-6)
+        ways = [lane[:2] for lane in lanes] + [lane[1::-1] for lane in lanes if lane[3]]
+        assert Counter(map(tuple, floor.graph.edges.tolist())) == Counter(
+            (at[f"{4 * number}-{tail}"], at[f"{4 * number}-{head}"]) for tail, head in ways
+        )
+        lines = {
+            f"{4 * number}d{k}": shapely.LineString(door) for k, door in enumerate(level.doors)
+        }
+        assert {door.name for door in floor.doors} == set(lines)
+        for edge, ends in enumerate(floor.graph.points[floor.graph.edges]):
+            named = floor.graph.edge_facts.get(edge, {}).get("door_name")
+            crossed = {
+                name for name, line in lines.items() if line.crosses(shapely.LineString(ends))
+            }
+            assert bool(crossed) <= (named is not None)
+            assert named is None or lines[named].distance(shapely.LineString(ends)) < 1e-6
+
+
+LANE = {"graph_idx": [2, 0], "orientation": [1, "forward"], "bidirectional": [4, True]}
+CORNER = [0, 0, 0, ""]
+UNMEASURED = [[0, 9, {}]]
+
+
+def write(path, **changes):
+    data = {
+        "building_name": "small",
+        "levels": {
+            name: {
+                "elevation": height,
+                "vertices": [
+                    [100, 100, 0, "", {}],
+                    [300, 100, 0, f"desk{name}", {"is_charger": [4, True]}],
+                    [200, 300, 0, "", {}],
+                ],
+                "measurements": [[0, 1, {"distance": [3, 10.0]}]],
+                "lanes": [[1, 2, LANE]],
+            }
+            for name, height in (("up", 3.0), ("down", 0))
+        },
+        "lifts": {
+            "hoist": {
+                "x": 210, "y": 300, "yaw": 0.3, "width": 2.0, "depth": 1.4,
+                "reference_floor_name": "down",
+                "level_doors": {"up": ["d"], "down": ["d"]},
+            }
+        },
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(data | changes))
+    return path
+
+
+def test_a_lift_ends_at_the_vertices_in_its_cabin(tmp_path):
+    building = hn.load_building_graph(write(tmp_path / "a.building.yaml"))
+    assert building.name == "small"
+    assert [(floor.name, floor.elevation_m) for floor in building.floors] == [
+        ("down", 0.0),
+        ("up", 3.0),
+    ]
+    (lift,) = building.links
+    assert (lift.name, lift.max_radius_m) == ("hoist", 0.7)
+    assert lift.ends == (LinkEnd("down", (10.0, -15.0)), LinkEnd("up", (10.0, -15.0)))
+    graph = building.floor("up").graph
+    assert graph.points.tolist() == [[15.0, -5.0], [10.0, -15.0]]
+    assert graph.node_facts[0] == {"is_charger": True, "name": "deskup"}
+    assert [facts["orientation_constraint"] for facts in graph.edge_facts.values()] == [
+        "forward",
+        "backward",
+    ]
+
+
+@pytest.mark.parametrize("yaw", np.linspace(0, math.pi, 7))
+def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
+    rng = np.random.default_rng(3)
+    for x, y in rng.uniform(150, 270, (12, 2)):
+        sides = {"width": 3.0, "depth": 1.4, "yaw": float(yaw)}
+        facts = {"x": float(x), "y": float(y) + 80, "level_doors": {"up": [], "down": []}} | sides
+        building = hn.load_building_graph(write(tmp_path / "a.yaml", lifts={"hoist": facts}))
+        box = shapely.affinity.rotate(shapely.box(-1.55, -0.75, 1.55, 0.75), yaw, use_radians=True)
+        cabin = shapely.affinity.translate(box, x * 0.05, -(y + 80) * 0.05)
+        assert bool(building.links) == cabin.covers(shapely.Point(10.0, -15.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"coordinate_system": "wgs84"}, "coordinate_system 'wgs84' is not read"),
+        ({"reference_level_name": "roof"}, "the reference level 'roof' is not there"),
+        ({"lifts": {"a": {"x": 1, "y": 1, "yaw": 0, "width": 0, "depth": 1}}}, "width and depth"),
+        ({"lifts": {"a": 7}}, "expected the lift as a mapping"),
+        ({"levels": {"a": {"vertices": [CORNER], "lanes": [[0, 0, LANE]]}}},
+         "its scale is not known"),
+        ({"levels": {"a": {"vertices": [CORNER], "measurements": UNMEASURED, "lanes": []}}},
+         "no lane of graph 0; graphs with lanes: none"),
+        ({"levels": {"a": {"vertices": [CORNER], "measurements": UNMEASURED,
+                           "lanes": [[0, 0, LANE]]}}}, "expected two points and distance"),
+        ({"levels": {"a": {"vertices": [CORNER], "lanes": [[0, "b", LANE]]}},
+          "coordinate_system": "cartesian_meters", "lifts": {}}, "with two numbers"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line(tmp_path, change, words):
+    with pytest.raises(hn.MapError, match=words) as caught:
+        hn.load_building_graph(write(tmp_path / "a.yaml", **change))
+    assert "\n" not in str(caught.value)
+
+
+def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr("hybridnav.ext.graphs.files.rmf_editor._MOST_CROSSINGS", 1)
+    vertices = [[0, 0, 0, ""], [9, 0, 0, ""], [4, -5, 0, ""], [4, 5, 0, ""]]
+    level = {"vertices": vertices, "lanes": [[0, 1, {}]], "doors": [[2, 3, {"name": [1, "d"]}]]}
+    changes = {"coordinate_system": "cartesian_meters", "lifts": {}, "levels": {"a": level}}
+    graph = hn.load_graph(write(tmp_path / "a.yaml", **changes))
+    assert graph.edge_facts[0]["door_name"] == "d"
+    level["doors"].append([2, 3, {"name": [1, "e"]}])
+    with pytest.raises(hn.MapError, match="2 doors and 1 lanes, at most 1 pairs"):
+        hn.load_graph(write(tmp_path / "a.yaml", **changes))
+
+
+def test_a_level_without_lanes_needs_no_scale(tmp_path):
+    path = write(tmp_path / "a.yaml")
+    data = yaml.safe_load(path.read_text())
+    data["levels"]["roof"] = {"vertices": [[0, 0, 0, ""]], "lanes": [], "elevation": 9}
+    path.write_text(yaml.safe_dump(data))
+    assert [floor.name for floor in hn.load_building_graph(path).floors] == ["down", "up"]
+    data["lifts"]["hoist"]["reference_floor_name"] = "roof"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(hn.MapError, match="lift hoist, level roof: its scale is not known"):
+        hn.load_building_graph(path)
+
+
+def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
+    path = write(tmp_path / "a.yaml")
+    with pytest.raises(hn.MapError, match="no lane of graph 2; graphs with lanes: 0"):
+        hn.load_building_graph(path, graph_index=2)

@@ -1,16 +1,12 @@
 """Bags written with rosbags alone, for tests of their readers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 KINDS = ("ros1", "mcap", "sqlite3")
 TFS, SCAN, ODOM, GRID = (

@@ -1,7 +1,5 @@
 """A drive through a room, recorded in a bag: where the laser is, by complex numbers."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any

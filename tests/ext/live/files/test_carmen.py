@@ -1,12 +1,11 @@
 """Logs of CARMEN: lines written by hand, and files damaged in every way."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import tracemalloc
 import zlib
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.ext.live.mapping import Mapper
+from hybridnav.ext.live.mapping import LaserScan, Mapper
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav.ext.live.mapping import LaserScan
 
 
 def flaser(ranges: list[Any], pose: tuple[Any, Any, Any] = (1.0, 2.0, 0.5), time: Any = 7.5) -> str:

@@ -1,10 +1,9 @@
-"""Grids from scans: every cell against the definition, growth, hostile values."""
-
-from __future__ import annotations
+"""Grids from scans: every cell against the definition, growth, order, hostile values."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,15 +15,13 @@ from hybridnav.ext.live.mapping import (
     LaserModel,
     LaserScan,
     Mapper,
+    ScanSequence,
     SonarModel,
     SonarScan,
     sonar_ring,
 )
 from tests.oracle.beams import kinds_of_cells
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 HIT, PASSED = math.log(0.95 / 0.05), math.log(0.19 / 0.81)
 LIMIT = math.log(0.98 / 0.02)
@@ -486,3 +483,40 @@ def test_a_map_of_an_area_is_cut_out_of_the_whole_one():
         mapper.to_grid(area=(90.0, 90.0, 91.0, 91.0))
     with pytest.raises(hn.InvalidValueError, match=r"expected \(x_min, y_min, x_max, y_max\)"):
         mapper.to_grid(area=(2.0, 1.0, 1.0, 2.0))
+
+
+Short = tuple[float, float, int]
+
+
+def faults(*scans: Short) -> list[str | None]:
+    """The faults of scans `(x, time, beams)` in turn."""
+    sequence = ScanSequence()
+    return [
+        sequence.fault_of(
+            LaserScan(np.ones(n), (x, 0.0, 0.0), start_rad=0.0, step_rad=0.1, time_s=time_s)
+        )
+        for x, time_s, n in scans
+    ]
+
+
+JUMP, BACK, OTHER = "pose jumps", "time runs back", "other number of beams"
+
+
+@pytest.mark.parametrize(
+    ("scans", "expected"),
+    [
+        ([(0, 0, 5), (4, 0, 5), (8, 0, 5)], [None, None, None]),
+        ([(0, 0, 5), (99, 1, 5), (1, 2, 5)], [None, JUMP, None]),
+        ([(0, 0, 5), (99, 60, 5)], [None, None]),  # a long pause
+        ([(0, 5, 5), (0, 4, 5), (0, 6, 5)], [None, BACK, None]),
+        ([(0, 900, 5), (0, 1, 5), (0, 2, 5), (0, 3, 5)], [None, BACK, None, None]),  # a new clock
+        ([(0, 0, 5), (0, 1, 4), (0, 2, 5)], [None, OTHER, None]),
+        ([(0, 0, 4), (0, 1, 5), (0, 2, 5), (0, 3, 4)], [None, OTHER, None, OTHER]),
+        ([(0, math.nan, 5), (9, math.nan, 5), (1, 3, 5)], [None, JUMP, None]),
+        ([(0, 0, 5), (99, 1, 5), (-99, 2, 5), (0, 3, 5)], [None, JUMP, JUMP, None]),
+    ],
+)
+def test_a_fault_costs_one_scan_and_a_new_beginning_holds(
+    scans: list[Short], expected: list[str | None]
+) -> None:
+    assert faults(*scans) == expected

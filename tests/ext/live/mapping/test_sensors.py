@@ -1,7 +1,5 @@
 """Simulated sensors: readings against every cell of the map, and maps made of them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -9,11 +9,11 @@ import shapely
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 import hybridnav as hn
 from hybridnav.maps import RoomLabels
 from hybridnav.topology.rooms.files.outlines import Outlines
+from tests.drawn_rooms import write_ros
 from tests.strategies import drawn, examples, occupancy_grid
 
 FLOOR = drawn(
@@ -292,13 +292,8 @@ def test_a_real_floor_is_a_small_file_and_read_exactly(data, tmp_path, floor_nam
 def map_file(floor, tmp_path):
     """The floor as a ROS map, with its rooms beside it."""
     grid, rooms = floor
-    Image.fromarray(np.where(FLOOR[::-1] == 0, 0, 254).astype(np.uint8)).save(tmp_path / "f.pgm")
-    (tmp_path / "f.yaml").write_text(
-        f"image: f.pgm\nresolution: {SIDE}\norigin: [0, 0, 0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-    )
     hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
-    return tmp_path / "f.yaml"
+    return write_ros(tmp_path, "f", np.where(FLOOR == 0, 0, 254), SIDE)
 
 
 def test_the_command_names_the_room_of_a_point(cli, map_file):

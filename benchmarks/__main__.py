@@ -1,0 +1,61 @@
+"""Run a subject: `python -m benchmarks NAME [options]`; without a name, list all of them."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.common import NEEDED_DATA, Refused
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SUBJECTS = {
+    file.stem: file
+    for file in sorted((Path(__file__).parent / "subjects").glob("*.py"))
+    if not file.stem.startswith("_")
+}
+
+
+def about(file: Path) -> str:
+    """Return the first line of a subject's docstring, without importing what it needs."""
+    return str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))).splitlines()[0]
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the subject that the first word names, with the options behind it."""
+    name, *rest = (sys.argv[1:] if words is None else words) or ["--help"]
+    if name not in SUBJECTS:
+        is_asked = name in {"-h", "--help"}
+        out = sys.stdout if is_asked else sys.stderr
+        out.write(f"{__doc__}\n\n" if is_asked else f"no subject is called {name}; there are\n")
+        out.writelines(f"  {key:18}{about(file)}\n" for key, file in SUBJECTS.items())
+        return 0 if is_asked else 2
+    subject = import_module(f"benchmarks.subjects.{name}")
+    parser = argparse.ArgumentParser(
+        prog=f"python -m benchmarks {name}",
+        description=subject.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    for names, settings in subject.OPTIONS:
+        parser.add_argument(*names, **settings)
+    folder = os.environ.get("HYBRIDNAV_DATA")
+    parser.set_defaults(data=Path(folder) if folder else None)
+    given = parser.parse_args(rest)
+    if given.data is None and any(one is NEEDED_DATA for one in subject.OPTIONS):
+        sys.stderr.write(f"{name} needs the reference data: --data FOLDER or HYBRIDNAV_DATA\n")
+        return 2
+    try:
+        return int(subject.main(given) or 0)
+    except Refused as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,115 @@
+"""What several subjects share: options, maps, times, tables."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+import time
+import warnings
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from scipy import ndimage
+
+import hybridnav as hn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav._base.typing import LongArray
+
+T = TypeVar("T")
+Option = tuple[tuple[str, ...], dict[str, Any]]
+
+ROOT = Path(__file__).parents[1]
+OFFICE = ROOT / "maps" / "office" / "office.yaml"
+FAR_APART = (1.0, 13.2), (40.6, 19.4)
+"""Ends of a long path through the office."""
+RADIUS_M = 0.25
+
+
+class Refused(Exception):  # noqa: N818 - the command line is at fault, not the code
+    """What was asked for cannot be run; the text says why."""
+
+
+def option(*names: str, **settings: Any) -> Option:
+    """Return what `ArgumentParser.add_argument` takes, for the list `OPTIONS` of a subject."""
+    return names, settings
+
+
+DATA = option("--data", type=Path, metavar="FOLDER", help="reference data, else HYBRIDNAV_DATA")
+NEEDED_DATA = option(*DATA[0], **DATA[1])
+"""The same for a subject that cannot do without."""
+SEED = option("--seed", type=int, default=0)
+
+
+def maps_of(data: Path, globs: Sequence[str] = ()) -> list[str]:
+    """Return the maps in the data folder that a glob matches, all without one, ROS maps first."""
+    lines = (data / "maps.tsv").read_text(encoding="utf-8").splitlines()[1:]
+    ros = [path for path, kind in (line.split("\t") for line in lines) if kind == "map"]
+    movingai = sorted((data / "movingai").rglob("*.map"))
+    every = ros + [path.relative_to(data).as_posix() for path in movingai]
+    return [name for name in every if not globs or matches(name, globs)]
+
+
+def matches(name: str, globs: Sequence[str]) -> bool:
+    """Tell whether one of the globs matches a name."""
+    return any(fnmatch.fnmatch(name, glob) for glob in globs)
+
+
+def read(path: Path, radius_m: float = RADIUS_M) -> hn.OccupancyGrid:
+    """Return the grid of a map file: ROS maps inflated, MovingAI maps for a point robot."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", hn.MapWarning)
+        return hn.load_map(path, robot_radius_m=0.0 if path.suffix == ".map" else radius_m)
+
+
+def prepared(
+    grid: hn.OccupancyGrid, preset: str = "shortest", *, rooms: bool = False
+) -> hn.HybridPlanner:
+    """Return a planner of a grid with all that it plans on, and with rooms if these are wanted."""
+    labels = hn.find_rooms(grid) if rooms else None
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    planner = hn.HybridPlanner(topology, preset=preset)
+    planner.prepare()
+    return planner
+
+
+def timed(call: Callable[[], T], runs: int = 1) -> tuple[T, float]:
+    """Return what a call returns, and the least seconds that it took."""
+    best = np.inf
+    for _ in range(runs):
+        began = time.perf_counter()
+        found = call()
+        best = min(best, time.perf_counter() - began)
+    return found, best
+
+
+def largest_part(free: Any) -> LongArray:
+    """Return the cells of the largest connected part, int64 (n, 2)."""
+    labels, _ = ndimage.label(free)
+    cells: LongArray = np.argwhere(labels == np.bincount(labels.ravel())[1:].argmax() + 1)
+    return cells
+
+
+def with_classes(grid: hn.OccupancyGrid, classes: Any) -> hn.OccupancyGrid:
+    """Return a grid with other classes, without the work of making one."""
+    values = {field.name: getattr(grid, field.name) for field in fields(grid)}
+    return hn.OccupancyGrid.restored(**{**values, "classes": classes})
+
+
+def print_head(*columns: str) -> None:
+    """Print the head of a table in Markdown."""
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
+
+
+def print_row(*cells: object) -> None:
+    """Print a row of a table in Markdown."""
+    print(f"| {' | '.join(map(str, cells))} |", flush=True)
+
+
+def print_load() -> None:
+    """Print how busy the machine is: a busy one stretches every time."""
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", flush=True)

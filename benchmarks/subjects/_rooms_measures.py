@@ -1,0 +1,146 @@
+"""All methods on all buildings with people's rooms, by measures that were published."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import hybridnav as hn
+from benchmarks.common import print_head, print_row
+from benchmarks.subjects._rooms_buildings import SITES, Building
+from benchmarks.subjects.train_rooms import Training
+from hybridnav.harness.judges import compare_rooms
+from hybridnav.maps.names import Segmentation
+from hybridnav.topology.rooms.find import judged_rooms
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hybridnav._base.typing import FloatArray, IntArray
+
+NEAR_M = 1.0
+"""How far a found door may lie from a true one."""
+UNSEEN = "judged, unseen"
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What one method reaches on one building."""
+
+    mcc: float
+    mcc_per_zone: float
+    iou: float
+    recall_50: float
+    recall_70: float
+    door_recall: float
+    door_precision: float
+    n_rooms: float
+    n_true: float
+    seconds: float
+
+    @classmethod
+    def of(cls, building: Building, label_of: IntArray, seconds: float) -> Measures:
+        """Measure rooms, int32 (rows, cols), against people's."""
+        true, found = building.true[building.compared], label_of[building.compared]
+        agreed = compare_rooms(true, found)
+        doors, drawn = building.doors(label_of), building.true_doors
+        right = [r for r in (_is_right(building, point) for point in doors) if r is not None]
+        return cls(
+            agreed.mcc,
+            agreed.mcc_per_zone,
+            float(agreed.iou.mean()),
+            agreed.recall_at(0.5),
+            agreed.recall_at(0.7),
+            float(np.mean([_near(doors, point) for point in drawn])) if len(drawn) else np.nan,
+            float(np.mean(right)) if right else np.nan,
+            float(agreed.n_found),
+            float(len(agreed.true_labels)),
+            seconds,
+        )
+
+
+def _near(points: FloatArray, point: FloatArray) -> bool:
+    return bool(np.hypot(*(points - point).T).min(initial=np.inf) <= NEAR_M)
+
+
+def _is_right(building: Building, point: FloatArray) -> bool | None:
+    """Whether a found door lies near a true one, or two true rooms; None where none is known."""
+    if _near(building.true_doors, point):
+        return True
+    grid = building.grid
+    row, col = grid.frame.cell_of(*point.tolist())
+    reach = round(NEAR_M / grid.resolution_m)
+    window = np.s_[max(row - reach, 0) : row + reach + 1, max(col - reach, 0) : col + reach + 1]
+    rooms = building.true[window][building.compared[window]]
+    return None if len(rooms) == 0 else len(np.unique(rooms)) > 1
+
+
+def measures_table(data: Path, out: Path) -> None:
+    """Print what every method reaches on every building, and draw its rooms into a folder.
+
+    The judge never saw the building's site.
+    """
+    buildings = [Building.read(data, name) for name in SITES]
+    training = Training(buildings)
+    print("## Rooms by published measures\n")
+    columns = "building", "method", "MCC", "MCC per zone", "IoU", "rooms at IoU 0.5", "at 0.7"
+    print_head(*columns, "doors found", "found doors right", "rooms / true", "s")
+    rows: dict[tuple[str, str], Measures] = {}
+    for building in buildings:
+        drawn = {"people": building.true}
+        if building.rose2 is not None:
+            rows[building.name, "ROSE2"] = Measures.of(building, building.rose2, np.nan)
+            drawn["ROSE2"] = building.rose2
+        for method in get_args(Segmentation):
+            shown = UNSEEN if method == "judged" else method
+            forest = training.without(building.site) if method == "judged" else None
+            began = time.process_time()
+            if forest is None:
+                drawn[shown] = hn.find_rooms(building.grid, method=method).label_of
+            else:
+                drawn[shown] = judged_rooms(building.grid, forest, 1.0)
+            seconds = time.process_time() - began
+            rows[building.name, shown] = Measures.of(building, drawn[shown], seconds)
+        _draw(building, drawn, out)
+        for (name, shown), found in rows.items():
+            if name == building.name:
+                _print(name, shown, found)
+    columns = (*(m for m in get_args(Segmentation) if m != "judged"), UNSEEN)
+    for shown in columns:
+        _print("mean of all", shown, _mean([rows[b.name, shown] for b in buildings]))
+    given = [building for building in buildings if building.rose2 is not None]
+    for shown in ("ROSE2", *columns):
+        _print("mean of ROSE2's maps", shown, _mean([rows[b.name, shown] for b in given]))
+
+
+def _draw(building: Building, drawn: dict[str, IntArray], out: Path) -> None:
+    """Draw the rooms of each method below each other, in colours of no meaning."""
+    figure = Figure(figsize=(10.0, 10.0 * len(drawn) * np.divide(*building.grid.shape)))
+    colours = np.random.default_rng(0).uniform(0.3, 1.0, (4096, 3))
+    grey = np.where(building.free, 1.0, 0.7)
+    grey[building.grid.measured == hn.CellClass.OCCUPIED] = 0.0
+    for axes, (shown, label_of) in zip(figure.subplots(len(drawn)), drawn.items(), strict=True):
+        picture = np.repeat(grey[:, :, None], 3, axis=2)
+        inside = (label_of >= 0) & building.free
+        picture[inside] = colours[label_of[inside] % len(colours)]
+        axes.imshow(picture, origin="lower")
+        axes.set_title(f"{building.name}, {shown}")
+        axes.set_axis_off()
+    figure.savefig(out / f"{building.name}.png", dpi=120, bbox_inches="tight")
+
+
+def _mean(found: list[Measures]) -> Measures:
+    names = [field.name for field in fields(Measures)]
+    return Measures(*(float(np.mean([getattr(m, n) for m in found])) for n in names))
+
+
+def _print(name: str, shown: str, found: Measures) -> None:
+    figures = [found.mcc, found.mcc_per_zone, found.iou, found.recall_50, found.recall_70]
+    figures += [found.door_recall, found.door_precision]
+    written = [f"{figure:.3f}" for figure in figures]
+    seconds = "" if np.isnan(found.seconds) else f"{found.seconds:.1f}"
+    print_row(name, shown, *written, f"{found.n_rooms:.0f} / {found.n_true:.0f}", seconds)

@@ -1,0 +1,266 @@
+"""The page of the study, written from its figures and nothing else."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from benchmarks.subjects._study_maps import KINDS
+from benchmarks.subjects._study_quotes import quoted
+from benchmarks.subjects._study_tables import TITLES, best_of, tables_of
+from hybridnav.harness.columns import DEFINITION
+from hybridnav.harness.tables import markdown_of, text_of, to_markdown
+
+if TYPE_CHECKING:
+    from benchmarks.subjects._study_data import Data
+    from benchmarks.subjects._study_tables import StudyTable
+
+PUBLISHED: list[dict[str, str | float]] = [
+    {
+        "source": "Thrun 1998, as commonly quoted",
+        "map": "27,280 cells, an office floor",
+        "topological layer": "67 regions",
+        "loss": "1.82 % mean over 23.9 million pairs",
+        "plans without loss": "83.4 %",
+        "planning": "4,900 times fewer backups",
+    },
+    {
+        "source": "the source paper",
+        "map": "an office, U_d = 4 m",
+        "topological layer": "places spaced at equal intervals of 4 m",
+        "loss": "none stated",
+        "plans without loss": "none stated",
+        "planning": "none stated",
+    },
+    {
+        "source": "Botea and others 2004, HPA*",
+        "map": "120 maps of a game",
+        "topological layer": "clusters of 10 x 10 cells",
+        "loss": "about 1 % after smoothing",
+        "plans without loss": "none stated",
+        "planning": "up to 10 times faster than A*",
+    },
+]
+
+CHARTS: dict[str, tuple[tuple[str, str], ...]] = {
+    "lengths": (
+        (
+            "study-loss.svg",
+            "Share of pairs whose loss over the octile optimum is above x, paths of cells",
+        ),
+        ("study-speed.svg", "Mean loss over the any-angle optimum and median time of a query"),
+    ),
+    "costs": (
+        (
+            "study-costs.svg",
+            "Mean loss over the least cost of paths of cells and median time of a query",
+        ),
+    ),
+    "ompl": (
+        ("study-ompl-loss.svg", "Share of pairs whose loss over the any-angle optimum is above x"),
+    ),
+}
+"""Files and descriptions of the charts of each part."""
+
+
+def page(data: Data) -> str:
+    """Return the page `docs/study.md`."""
+    tables = tables_of(data)
+    text = f"""# The study: consistency, loss, efficiency
+
+Thrun's three questions, asked of every method on {_maps_in_words(data)}.
+`make study` asks them anew and writes this page, its charts, a PDF, an HTML report and an archive
+of all records; this is {_how_much(data)}. Every number below comes from
+`docs/data/study.json`, which a script fills from the records. [The harness](harness.md) describes
+the checks and the columns.
+
+{in_short(data)}
+## Circumstances
+
+{_listed(circumstances(data))}
+{rules(data)}
+
+{DEFINITION}
+
+"""
+    for name in data["parts"]:
+        text += f"## {TITLES[name]}\n\n{about(data, name)}\n\n"
+        own = [table for table in tables if table.part == name]
+        text += "".join(map(_section, own))
+        text += "".join(f"![{what}](images/{file})\n\n" for file, what in CHARTS[name])
+    text += "".join(_section(table, "##") for table in tables if not table.part)
+    return f"{text}## Beside published figures\n\n{to_markdown(PUBLISHED)}"
+
+
+def _section(table: StudyTable, level: str = "###") -> str:
+    heading = table.title
+    if table.part:
+        heading = f"{TITLES[table.part]}: {table.title[0].lower()}{table.title[1:]}"
+    note = f"{table.note}\n\n" if table.note else ""
+    body = markdown_of(table.columns, [[text_of(cell) for cell in row] for row in table.rows])
+    return f"{level} {heading}\n\n{note}{body}\n"
+
+
+def _listed(facts: list[tuple[str, str]]) -> str:
+    return "".join(f"* {name}: {value}\n" for name, value in facts)
+
+
+def _maps_in_words(data: Data) -> str:
+    """Return how many maps of each kind there are."""
+    kinds = [row["kind"] for row in data["maps"]]
+    parts = [
+        f"{kinds.count(kind)} {what.partition(' ')[2]}s" if kinds.count(kind) != 1 else what
+        for kind, what in KINDS.items()
+        if kind in kinds
+    ]
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)
+
+
+def _how_much(data: Data) -> str:
+    """Return in words how much of the study was asked."""
+    plan = data["plan"]
+    of = {"quarter": "a quarter of it", "whole": "the whole of it"}.get(
+        plan["name"], "a part of it"
+    )
+    return f"{of}, {plan['pairs']} pairs a map"
+
+
+def about(data: Data, name: str) -> str:
+    """Return what a reader of a part must know."""
+    part = data["parts"][name]
+    counted = (
+        f"{part['pairs']:,} pairs of joined cells; {part['checks']:,} answers checked, "
+        f"{part['contradictions']:,} contradictions. Losses and times are those of the "
+        f"{part['pairs in common']:,} pairs that all methods of the tables solved."
+    )
+    return f"{_ABOUT[name]} {counted}" + "".join(f" {found}." for found in _contradictions(part))
+
+
+def _contradictions(part: Data) -> list[str]:
+    found = part["first contradictions"]
+    return [f"The first: {found[0].rstrip('.')}"] if found else []
+
+
+_ABOUT = {
+    "lengths": "Shortest paths, by length.",
+    "costs": "Cheapest paths: each cell costs more the nearer it is to an obstacle, as Nav2's "
+    "inflation has it (0.70 m, 3.0). `shortest` and `octile` know nothing of costs.",
+    "ompl": "Presets with OMPL, 1 s a query, on fewer pairs of the same maps. Times are those of "
+    "single queries and include what it takes to send a query to OMPL's process.",
+}
+
+
+def rules(data: Data) -> str:
+    """Return the rules by which methods are compared, in words."""
+    plan = data["plan"]
+    return (
+        "A method is compared over the pairs in common if it solved 99 % of all pairs or more; the "
+        "others have a table of their own. A method that takes more than "
+        f"{plan['limit_s']:g} s on a map, preparation and all answers, is not asked further "
+        "there, and listed with what it took."
+    )
+
+
+def circumstances(data: Data) -> list[tuple[str, str]]:
+    """Return the circumstances of the study: what was asked, where, and when."""
+    plan, machine = data["plan"], data["machine"]
+    pairs = (
+        f"{plan['pairs']} a map ({plan['ompl_pairs']} for OMPL): on ROS and SLAM maps sampled and "
+        "as many in each of five classes of distance, robot radius 0.25 m, merge distance 4 m; on "
+        "MovingAI maps spread evenly over the scenario files, a point robot, merge distance 40 m"
+    )
+    lengths = next(iter(data["parts"].values()))
+    facts = [
+        ("pairs", pairs),
+        ("times", _times(data)),
+        ("machine", f"{machine.get('processor', 'unknown')}; {machine.get('machine', 'unknown')}"),
+    ]
+    if plan["without"]:
+        names = ", ".join(plan["without"])
+        facts.append(("left out", f"{names}: the whole study (make study STUDY=whole) has them"))
+    if lengths["dates"]:
+        dates = [f"{date[:16].replace('T', ' ')} UTC" for date in lengths["dates"]]
+        facts.append(("measured", " to ".join(dict.fromkeys(dates))))
+    if lengths["loads"]:
+        start, end, most = lengths["loads"]
+        # The first reading remembers the answers before the pass, if they took more processes.
+        what = ", of what came before" if start > most else ""
+        text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
+        facts.append(("load in the timing pass", f"{text} 1 was the study's"))
+    checked = [
+        f"{TITLES[name]} {part['checked any-angle']}"
+        for name, part in data["parts"].items()
+        if part.get("checked any-angle")  # figures of older runs do not state it
+    ]
+    if checked:
+        text = f"{', '.join(checked)} optima, by a search of the visibility graph"
+        facts.append(("checked any-angle", text))
+    facts += [
+        ("warning", f"{TITLES[name]}: {one.rstrip('.')}")
+        for name, part in data["parts"].items()
+        for one in part["warnings"]
+    ]
+    versions = [f"{key} {machine[key]}" for key in _VERSIONS if key in machine]
+    facts.append(("versions", ", ".join(versions)))
+    if "planners of others" in machine:
+        facts.append(("planners of others", machine["planners of others"]))
+    minutes = sum(data["seconds"].values()) / 60
+    facts.append(("time of the study", f"{minutes:.0f} minutes"))
+    return facts
+
+
+_VERSIONS = ("hybridnav", "python", "numpy", "scipy", "numba", "ompl")
+
+
+def _times(data: Data) -> str:
+    repeat = data["plan"]["repeat"]
+    return (
+        f"medians of {repeat} queries of each pair, all methods in one process in an order "
+        "shuffled for each pair, kernels warm"
+    )
+
+
+def in_short(data: Data) -> str:
+    """Return the findings, as a list in Markdown; figures that are not there leave their line
+    out."""
+    rows = data["parts"].get("lengths", {}).get("methods", [])
+    figures = quoted(data)
+    lines = [f"* Contradictions: {figures['contradictions']} in {figures['checks']} answers.\n"]
+    for template in _FINDINGS:
+        try:
+            lines.append(template.format_map(figures))
+        except KeyError:
+            continue
+    fastest = best_of(rows, "query ms, median")
+    if fastest:
+        lines.append(
+            f"* Fastest query by length, median in ms: {fastest}; shortest preparation in s: "
+            f"{best_of(rows, 'preparation s')}; least memory in MB: {best_of(rows, 'memory MB')}.\n"
+        )
+    return "".join(lines)
+
+
+_FINDINGS = tuple(
+    f"* {line}\n"
+    for line in (
+        (
+            "The source paper's rule (`paper`) is {paper_octile} % longer than the octile optimum "
+            "in the mean and {paper_any} % longer than the any-angle optimum; the octile optimum "
+            "itself is {grid_any} % longer."
+        ),
+        (
+            "Speed-up over A\\*, median of the ratios, and ratio of the mean times: `octile` "
+            "{octile_speed} and {octile_means}, `shortest` {shortest_speed} and {shortest_means}, "
+            "HPA\\* {hpa_speed} and {hpa_means}."
+        ),
+        (
+            "By cost, over the least cost of paths of cells: `robot`, which is not bound to cells, "
+            "is at {robot_cost} % in the mean, `shortest`, which knows no costs, at "
+            "{shortest_cost} %."
+        ),
+        (
+            "OMPL in the corridor solved {ompl_solved} of {ompl_asked} queries itself, "
+            "{ompl_least} to {ompl_most} % longer than the any-angle optimum in the mean."
+        ),
+    )
+)
+"""Sentences whose figures are those of `quoted`."""

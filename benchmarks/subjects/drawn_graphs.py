@@ -1,0 +1,128 @@
+"""The table of graphs that people have drawn: what is wrong with them, and how long routes are.
+
+Seven graphs of Nav2 and STRANDS on their maps, and beside each two that hybridnav builds from the
+map: with 300 nodes to aim at, and with as many as the routes need. Pairs are random free cells
+with a path between them. `at a wall` are routes over an edge that the robot cannot follow, in the
+graph as it is; `solved` and the losses, over the shortest any-angle path, are those without such
+edges, and the losses are those of the pairs that all three graphs solve (`common`). Every route is
+judged anew; a wrong one ends the command.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import hybridnav as hn
+from benchmarks.common import NEEDED_DATA, option, read
+from hybridnav.ext.graphs.method import GraphMethod
+from hybridnav.harness import AnyAngleOptimum
+from hybridnav.harness.judges import judge_line
+from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.tables import to_markdown
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.tables import Row
+
+_GRAPHS = {
+    "nav2/graphs/nav2_bringup/depot_graph.geojson": "nav2/maps/depot.yaml",
+    "nav2/graphs/nav2_bringup/turtlebot3_graph.geojson": "nav2/maps/tb3_sandbox.yaml",
+    "nav2/graphs/nav2_route/aws_graph.geojson": "aws_small_warehouse/005/map.yaml",
+    "strands/g4s/g4s_sim.tplg": "strands/g4s/g4s_sim_cropped.yaml",
+    "strands/g4s/g4s_y2.tmap": "strands/g4s/g4s_y2.yaml",
+    "strands/tsc_y3/tsc_y3_final.tplg": "strands/tsc_y3/tsc20160523.yaml",
+    "strands/tsc_y4/tsc_y4_final.tplg.tpl": "strands/tsc_y4/tsc_1701.yaml",
+}
+_AIMS: dict[str, int | None] = {"built, 300": 300, "built": None}
+
+
+def rows_of(graph: hn.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]) -> list[Row]:
+    """Return the rows of a drawn graph, and of those that are built."""
+    graphs = {graph.format: graph}
+    for name, nodes in _AIMS.items():
+        built = hn.build_route_graph(topology, nodes=nodes)
+        graphs[name] = hn.WaypointGraph.from_networkx(built.to_networkx(), name=name)
+    grid = topology.grid
+    losses = [
+        _losses(GraphMethod(grid, one, clear_edges_only=True), grid, pairs)
+        for one in graphs.values()
+    ]
+    common = np.isfinite(losses).all(axis=0)
+    rows = []
+    for (name, one), own in zip(graphs.items(), losses, strict=True):
+        row: Row = {"map": grid.name, "graph": name}
+        row |= _checked(one, topology, pairs)
+        row["solved %"] = 100 * float(np.isfinite(own).mean())
+        row["common %"] = 100 * float(common.mean())
+        row["loss mean %"] = 100 * float(own[common].mean())
+        row["loss p95 %"] = 100 * float(np.percentile(own[common], 95))
+        row["loss max %"] = 100 * float(own[common].max())
+        rows.append(row)
+    return rows
+
+
+def _checked(graph: hn.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]) -> Row:
+    """Return figures on a graph as it is."""
+    grid = topology.grid
+    check = hn.check_graph(topology, graph)
+    at_wall, method = 0, GraphMethod(grid, graph)
+    for pair in pairs:
+        line = method.solve(pair.start, pair.goal).any_angle
+        if line is not None:
+            verdict = judge_line(grid, line.points, start=pair.start, goal=pair.goal)
+            at_wall += bool(verdict.faults)
+    return {
+        "nodes": graph.n_nodes,
+        "edges": graph.n_edges,
+        "clear edges %": 100 * float(check.is_clear.mean()),
+        "points in sight %": 100 * check.in_sight,
+        "doors": "{} of {}".format(*check.doors),
+        "at a wall %": 100 * at_wall / len(pairs),
+    }
+
+
+def _losses(method: GraphMethod, grid: hn.OccupancyGrid, pairs: list[Pair]) -> FloatArray:
+    """Return the loss of each pair, NaN where the method has no route."""
+    optimum = AnyAngleOptimum(grid)
+    losses = np.full(len(pairs), np.nan)
+    for k, pair in enumerate(pairs):
+        line = method.solve(pair.start, pair.goal).any_angle
+        if line is None:
+            continue
+        verdict = judge_line(grid, line.points, start=pair.start, goal=pair.goal)
+        if verdict.faults:
+            sys.exit(f"wrong: {method.name} on {grid.name}: {verdict.faults[0]}")
+        losses[k] = verdict.length_m / optimum.length_m(pair.start, pair.goal) - 1
+    return losses
+
+
+OPTIONS = [
+    NEEDED_DATA,
+    option("--pairs", type=int, default=500),
+    option("--radius", type=float, default=0.25),
+]
+
+
+def main(given: Namespace) -> None:
+    """Print the table."""
+    rows: list[Row] = []
+    for file, map_file in _GRAPHS.items():
+        graph = hn.load_graph(given.data / file)
+        grid = read(given.data / map_file, given.radius)
+        rooms = hn.find_rooms(grid)
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+        optimum = AnyAngleOptimum(grid)
+        pairs = [
+            pair
+            for pair in sample_pairs(grid, given.pairs, seed=0)
+            if np.isfinite(optimum.length_m(pair.start, pair.goal)) and pair.start != pair.goal
+        ]
+        rows += rows_of(graph, topology, pairs)
+        sys.stderr.write(f"{rows[-1]}\n")
+    sys.stdout.write(to_markdown(rows))

@@ -1,0 +1,110 @@
+"""Planners that follow a changed map: an update and the next answer, against building anew.
+
+A square of 60 x 60 cells is blocked and freed again in turn. `update` is `planner.update` with the
+grid and the area of the change, `answer` the next query across it; `fresh` is the structure of the
+preset built of the changed map. All ratios are taken in one process.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import hybridnav as hn
+from benchmarks.common import option, print_head, print_row, with_classes
+from hybridnav.search.mesh import build_mesh
+from hybridnav.search.octile import build_jump_graph, contract_graph
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from numpy.typing import NDArray
+
+    Classes = NDArray[np.uint8]
+
+SIDES = (500, 1000, 2000, 4000)
+CHANGE = 60
+TURNS = 20
+RESOLUTION_M = 0.05
+
+
+class Row(NamedTuple):
+    """Milliseconds of a preset on one map."""
+
+    update: list[float]
+    answer: list[float]
+    fresh: float
+
+
+def rooms_of(side: int) -> Classes:
+    """Return rooms of 6 m with doors, `side` x `side` cells, and noise as of a laser scan."""
+    tile = np.ones((250, 250), np.uint8)
+    tile[::125] = tile[:, ::125] = 0
+    tile[50:60, ::125] = tile[::125, 50:60] = tile[180:190, ::125] = tile[::125, 180:190] = 1
+    classes = np.tile(tile, (side // 250, side // 250))
+    classes[np.random.default_rng(0).random(classes.shape) < 0.001] = 0
+    return classes
+
+
+def fresh_ms(preset: str, classes: Classes) -> float:
+    """Return the time to build the structure of a preset."""
+    free = classes == 1
+    began = time.perf_counter()
+    if preset == "shortest":
+        build_mesh(free)
+    else:
+        contract_graph(build_jump_graph(free))
+    return (time.perf_counter() - began) * 1e3
+
+
+def run(preset: str, grid: hn.OccupancyGrid, topology: hn.TopologicalMap) -> Row:
+    """Block and free a square in turn, with a query from the one side of it to the other."""
+    planner = hn.HybridPlanner(topology, preset=preset)
+    low = grid.shape[0] // 2 + 20
+    part = slice(low, low + CHANGE), slice(low, low + CHANGE)
+    area = low * RESOLUTION_M, low * RESOLUTION_M, *[(low + CHANGE) * RESOLUTION_M] * 2
+    # Ends in other rooms, on both sides of the square.
+    free = np.argwhere(grid.classes == 1)
+    ends = [
+        grid.frame.points_of(free[np.abs(free - low - CHANGE // 2 - shift).sum(axis=1).argmin()])
+        for shift in (-150, 150)
+    ]
+    planner.plan(*ends)
+    update, answer = [], []
+    blocked = grid.classes.copy()
+    blocked[part] = 0
+    maps = [with_classes(grid, blocked), grid]
+    for turn in range(TURNS + 4):
+        began = time.perf_counter()
+        planner.update(grid=maps[turn % 2], changed=area)
+        then = time.perf_counter()
+        planner.plan(*ends)
+        update.append((then - began) * 1e3)
+        answer.append((time.perf_counter() - then) * 1e3)
+    return Row(update[4:], answer[4:], fresh_ms(preset, blocked))
+
+
+OPTIONS = [
+    option("--sides", type=int, nargs="+", default=SIDES),
+]
+
+
+def main(given: Namespace) -> None:
+    """Print the table."""
+    print_head(
+        "preset", "cells", "update, ms", "answer, ms", "both, p95", "fresh, ms", "fresh / both"
+    )
+    for side in given.sides:
+        classes = rooms_of(side)
+        probability = np.where(classes == 0, np.float32(1), np.float32(0))
+        grid = hn.OccupancyGrid(probability, hn.Frame(RESOLUTION_M), robot_radius_m=0)
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+        for preset in ("shortest", "octile"):
+            found = run(preset, grid, topology)
+            both = np.add(found.update, found.answer)
+            update, answer, middle = map(np.median, (found.update, found.answer, both))
+            of_both = f"{update:.1f}", f"{answer:.1f}", f"{np.percentile(both, 95):.1f}"
+            fresh = f"{found.fresh:.0f}", f"{found.fresh / middle:.0f}"
+            print_row(preset, f"{side * side:,}", *of_both, *fresh)

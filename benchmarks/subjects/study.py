@@ -1,0 +1,146 @@
+"""The study: Thrun's three criteria for every method on 28 public maps, by one command.
+
+`make study` runs the quarter, `make study STUDY=whole` the whole. Twelve ROS maps and four raw maps
+of SLAM (robot radius 0.25 m, merge distance 4 m, sampled pairs), and twelve MovingAI maps (cells of
+1 m, a point robot, merge distance 40 m, pairs of their scenario files, whose optima are an oracle).
+A run that was stopped goes on where it was. DIR, else out/study or out/study-whole, gets
+
+* a folder of records for each part: lengths, costs, OMPL;
+* `report.html`, which draws the worst cases on their maps, so it belongs in no repository;
+* `study.pdf`, a few pages without maps;
+* `study-records.zip` with all records and figures, and its SHA-256 beside it.
+
+The checkout gets `docs/data/study.json` with the figures of all tables, and from these
+`docs/study.md`, the charts in `docs/images`, and every quoted figure in the README, the
+documentation and the paper. With --map, --part, --pairs or --repeat the pages stay in DIR/docs, and
+no quote changes: it is not the study.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.common import DATA, ROOT, Refused, option
+from benchmarks.subjects._study_archive import write_archive
+from benchmarks.subjects._study_data import collect
+from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects._study_page import page
+from benchmarks.subjects._study_pdf import charts_of, write_charts, write_pdf
+from benchmarks.subjects._study_quotes import QUOTES, quoted, update
+from benchmarks.subjects._study_report import write_report
+from benchmarks.subjects._study_run import PLANS, RUN_FILE, parts_of, run
+from hybridnav._base.files import replace_file
+from hybridnav.errors import HybridNavError
+from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Mapping
+
+    from benchmarks.subjects._study_data import Data
+
+PART = "part"
+"""Name of a plan that asks less than the study does."""
+FIGURES = Path("data", "study.json")
+"""Where the folder of pages keeps the figures of all tables."""
+
+
+def write_all(folder: Path, root: Path, kinds: Mapping[str, str], docs: Path) -> Data:
+    """Write all outputs of the records in a folder, and return the figures.
+
+    Parameters
+    ----------
+    folder
+        The study's folder; gets the report, the PDF and the archive.
+    root
+        Maps are named by their paths from here.
+    kinds
+        The kind of each map by that name.
+    docs
+        Folder of the page, its charts and its figures.
+    """
+    data = collect(folder, root, kinds)
+    charts = charts_of(folder, root)
+    for made in (docs / FIGURES, docs / "images"):
+        (made.parent if made.suffix else made).mkdir(parents=True, exist_ok=True)
+    text = figures_text(data)
+    replace_file(docs / FIGURES, text.encode())
+    replace_file(folder / FIGURES.name, text.encode())
+    write_pages(docs)
+    write_charts(charts, docs / "images")
+    write_pdf(data, charts, folder / "study.pdf")
+    write_report(data, folder, root, folder / "report.html")
+    records = [folder / name / file for name in data["parts"] for file in (RECORDS_FILE, RUNS_FILE)]
+    files = [*records, folder / RUN_FILE, folder / FIGURES.name]
+    digest = write_archive(folder / "study-records.zip", folder, files)
+    sys.stderr.write(f"{folder / 'study-records.zip'}: SHA-256 {digest}\n")
+    return data
+
+
+def figures_text(data: Data) -> str:
+    """Return the figures as the text of their file."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_pages(docs: Path) -> None:
+    """Write the page from the file of figures beside it."""
+    data = json.loads((docs / FIGURES).read_text(encoding="utf-8"))
+    replace_file(docs / "study.md", page(data).encode())
+
+
+OPTIONS = [
+    option("--study", choices=tuple(PLANS), default="quarter"),
+    DATA,
+    option("-o", "--out", type=Path, help="else out/study, or out/study-whole"),
+    option("--workers", type=int, default=os.cpu_count() or 1),
+    option("--scheduler", metavar="ADDRESS", help="of a dask.distributed cluster"),
+    option("--pairs", type=int, help="of each map; else the study's"),
+    option("--repeat", type=int, help="queries of each pair; else the study's"),
+    option("--map", action="append", default=[], metavar="GLOB"),
+    option("--part", choices=("lengths", "costs", "ompl")),
+    option("--pages-only", action="store_true", help="from docs/data/study.json"),
+]
+
+
+def main(given: Namespace) -> int:
+    """Run the study, and write its outputs."""
+    given.out = given.out or Path("out", "study" if given.study == "quarter" else "study-whole")
+    if given.pages_only:
+        write_pages(ROOT / "docs")
+        _quote()
+        return 0
+    if given.data is None:
+        raise Refused("the study needs the folder of maps: --data FOLDER or HYBRIDNAV_DATA")
+    began = time.monotonic()
+    own = {"pairs": given.pairs, "ompl_pairs": given.pairs, "repeat": given.repeat}
+    plan = replace(PLANS[given.study], **{key: n for key, n in own.items() if n is not None})
+    is_whole = plan == PLANS[given.study] and not given.map and not given.part
+    plan = plan if is_whole else replace(plan, name=PART)
+    data = given.data.resolve()
+    try:
+        maps = maps_of(data, given.map)
+        parts = [part for part in parts_of(plan) if given.part in {None, part.name}]
+        run(maps, given.out, plan, parts, workers=given.workers, scheduler=given.scheduler)
+        kinds = {one.path.relative_to(data).with_suffix("").as_posix(): one.kind for one in maps}
+        docs = ROOT / "docs" if is_whole else given.out / "docs"
+        write_all(given.out, data, kinds, docs)
+        if is_whole:
+            _quote()
+    except HybridNavError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    minutes = (time.monotonic() - began) / 60
+    sys.stderr.write(f"{minutes:.1f} minutes: {given.out} and {docs / 'study.md'}\n")
+    return 0
+
+
+def _quote() -> None:
+    """Write the figures into all files that quote them."""
+    data = json.loads((ROOT / "docs" / FIGURES).read_text(encoding="utf-8"))
+    update(ROOT, QUOTES, quoted(data))

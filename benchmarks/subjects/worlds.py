@@ -1,0 +1,20 @@
+"""Write the maps of the project into a folder, as they are in `maps`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.common import option
+from benchmarks.worlds import figure1_world, office_world, write_world
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+OPTIONS = [option("folder", type=Path)]
+
+
+def main(given: Namespace) -> None:
+    """Write the maps."""
+    for world in (office_world(), figure1_world()):
+        write_world(world, given.folder / world.name, world.name)

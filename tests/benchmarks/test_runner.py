@@ -1,0 +1,53 @@
+"""The runner of the benchmarks: it knows all subjects, and each command that a page gives works."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import SUBJECTS, main
+
+ROOT = Path(__file__).parents[2]
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("maps/*.md")]
+PAGES += [*ROOT.glob("src/**/*.py"), ROOT / "Makefile"]
+
+
+def test_without_a_name_all_subjects_are_listed(capsys):
+    assert main([]) == 0
+    lines = capsys.readouterr().out.splitlines()[2:]
+    assert [line.split()[0] for line in lines] == list(SUBJECTS)
+    assert all(len(line.split(maxsplit=1)[1]) > 20 for line in lines)
+
+
+def test_an_unknown_subject_is_refused(capsys):
+    assert main(["mesh"]) == 2
+    assert "no subject is called mesh" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_every_subject_tells_its_options(name, capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main([name, "--help"])
+    assert f"usage: python -m benchmarks {name}" in capsys.readouterr().out
+
+
+def test_pages_name_subjects_that_there_are():
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    named = set(re.findall(r"-m\s+benchmarks[ .]([a-z_0-9]+)", text))
+    assert len(named) > 20
+    assert named <= set(SUBJECTS)
+    assert not re.findall(r"-m\s+benchmarks\.[a-z]", text)
+
+
+def test_a_subject_that_needs_the_data_says_so(monkeypatch, capsys):
+    monkeypatch.delenv("HYBRIDNAV_DATA", raising=False)
+    assert main(["rooms"]) == 2
+    assert capsys.readouterr().err.count("HYBRIDNAV_DATA") == 1
+
+
+@pytest.mark.full
+def test_every_wait_is_measured(capsys):
+    assert main(["start", "--cells", "10000", "--runs", "1"]) == 0
+    lines = capsys.readouterr().out.strip().splitlines()[2:]
+    assert len(lines) == 9
+    assert all(cells.split("|")[2].strip()[0].isdigit() for cells in lines)

@@ -1,0 +1,281 @@
+"""`hybridnav` with buildings of several floors: `plan`, `build`, `check`, `evaluate`, `export`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hybridnav as hn
+from tests.houses import FIGURE, write_house
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """Two floors of one little map, with a lift and stairs."""
+    return write_house(tmp_path)
+
+
+QUERY = "--start", "1:1.5,0.6", "--goal", "2:0.5,0.5", "--robot-radius", "0"
+
+
+def test_a_route_over_floors_is_printed(cli: Any, file: Path) -> None:
+    ran = cli("plan", file, *QUERY)
+    assert ran.code == 0
+    told = ran.out.splitlines()
+    building = hn.load_building(file, robot_radius_m=0)
+    plan = building.plan(("1", (1.5, 0.6)), ("2", (0.5, 0.5)))
+    assert told[0] == "query      house.yaml, 1:1.5,0.6 to 2:0.5,0.5, robot radius 0 m"
+    assert told[1] == "status     solved"
+    assert told[2] == f"length     {plan.length_m:.2f} m (any-angle)"
+    assert told[3] == "rides      ladder from floor 1 to floor 2, 0 s, charged 1.00 m"
+    assert told[4] == f"cost       {plan.cost:.2f} m, {plan.travel_s:.0f} s"
+    assert told[5] == f"bound      {plan.cost:.2f} m, the route is optimal"
+    answer = json.loads(cli("plan", file, *QUERY, "--json").out)
+    assert answer["cost"] == plan.cost
+    assert answer["floors"] == ["1", "2"]
+    assert answer["rides"][0]["link"] == "ladder"
+
+
+def test_links_and_doors_are_closed(cli: Any, file: Path) -> None:
+    by_lift = json.loads(cli("plan", file, *QUERY, "--no-stairs", "--json").out)
+    assert [ride["link"] for ride in by_lift["rides"]] == ["lift"]
+    closed = json.loads(cli("plan", file, *QUERY, "--blocked", "link:ladder", "--json").out)
+    assert closed["cost"] == by_lift["cost"]
+    assert closed["blocked"] == ["link:ladder"]
+    none = cli("plan", file, *QUERY, "--blocked", "link:ladder", "--blocked", "link:lift")
+    assert none.code == 1
+    assert "status     no path" in none.out
+    door = cli("plan", file, *QUERY, "--blocked", "2:door:1")
+    assert (door.code, "no door has the number 1" in door.err) == (2, True)
+    room = cli("plan", file, *QUERY, "--blocked", "2:room:room-1")
+    assert (room.code, "status     goal blocked" in room.out) == (1, True)
+    both = cli("plan", file, *QUERY, "--alternatives", "3", "--max-stretch", "9").out
+    assert "route 1    cost" in both
+    assert both.count(", by ") == 2
+    assert "routes     2 of 3: no other sequence of links is at most 9 times as dear" in both
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--start", "1:1,1"), "missing option '--goal' or '--to'"),
+        (("--start", "1,1", "--goal", "2:1,1"), "a point of a building needs its floor, as 1:1,1"),
+        (("--start", "4:1,1", "--goal", "2:1,1"), "no floor is called '4': there are 1, 2"),
+        (("--start", "1:1,nan", "--goal", "2:1,1"), "expected FLOOR:X,Y, finite numbers"),
+        (("--start", "1:1,1,1", "--goal", "2:1,1"), "expected FLOOR:X,Y, finite numbers"),
+        (("--from", "attic", "--goal", "2:1,1"), "no room or point of the building is called"),
+        ((*QUERY, "--compare"), "--compare is for one map, and this is a building: leave it out"),
+        ((*QUERY, "--blocked", "door:1"), "no floor is called 'door'"),
+        ((*QUERY, "--blocked", "areas"), "--blocked must be link:NAME, or FLOOR:"),
+        ((*QUERY, "--blocked", "link:hoist"), "no link is called 'hoist'"),
+        ((*QUERY, "--max-stretch", "3"), "--max-stretch is for alternatives"),
+        ((*QUERY, "--language", "fr"), "language must be one of"),
+    ],
+)
+def test_wrong_usage_is_one_line(
+    cli: Any, file: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    ran = cli("plan", file, *arguments)
+    assert ran.code == 2
+    assert message in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_options_of_buildings_mean_nothing_on_one_map(cli: Any) -> None:
+    query = "plan", FIGURE, "--goal", "2.0,2.5", "--robot-radius", "0"
+    ran = cli(*query, "--start", "0.5,0.5", "--no-stairs")
+    assert (ran.code, "--no-stairs is for a building" in ran.err) == (2, True)
+    ran = cli(*query, "--start", "1:0.5,0.5")
+    assert (ran.code, "expected X,Y in metres" in ran.err) == (2, True)
+
+
+def test_an_unreadable_building_is_no_usage(cli: Any, file: Path) -> None:
+    file.write_text(file.read_text(encoding="utf-8").replace("kind: lift", "kind: rope"))
+    ran = cli("plan", file, *QUERY)
+    assert ran.code == 3
+    assert "line 5: link lift: kind must be lift, stairs, ramp, got 'rope'" in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_a_model_is_built_and_plans_alike(cli: Any, file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "house.hnm"
+    ran = cli("build", file, "-o", out, "--robot-radius", "0")
+    assert ran.code == 0
+    assert "floors     2: 1, 2" in ran.out
+    assert "links      2: lift, ladder" in ran.out
+    one = json.loads(cli("plan", file, *QUERY, "--json").out)
+    other = json.loads(cli("plan", out, *QUERY[:4], "--json").out)
+    assert one["cost"] == other["cost"]
+    assert cli("build", file, "-o", out, "--seed", "3").code == 2
+    assert cli("build", file, "-o", out, "--preset", "octile", "--preset", "paper").code == 2
+
+
+def test_the_floors_are_drawn(cli: Any, file: Path, tmp_path: Path) -> None:
+    for number, more in enumerate(
+        ((), ("--alternatives", "2", "--max-stretch", "9"), ("--blocked", "link:lift"))
+    ):
+        picture = tmp_path / f"{number}.svg"
+        assert cli("plan", file, *QUERY, *more, "--plot", picture).code == 0
+        drawn = picture.read_text(encoding="utf-8")
+        assert 'id="link-ladder"' in drawn
+        assert 'id="route-1"' in drawn
+        assert ('id="route-2"' in drawn) == (number == 1)
+
+
+POINT = ("--robot-radius", "0")
+
+
+@pytest.fixture
+def two_floors(tmp_path):
+    """Two floors of one map, whose lift stops at other points of each."""
+    return write_house(tmp_path, links=("lift",))
+
+
+@pytest.fixture
+def graph(cli, two_floors, tmp_path):
+    """Its graph, whose floors have one frame: the lift stops at one point of it."""
+    path = tmp_path / "graph.yaml"
+    given = ("--format", "rmf", "--spacing", "1", *POINT, "-o", path)
+    assert cli("export", two_floors, *given).code == 0
+    return path
+
+
+def test_a_sound_graph_in_a_frame_of_its_own(cli, two_floors, graph, tmp_path):
+    page = tmp_path / "page.html"
+    done = cli("check", two_floors, graph, *POINT, "--align", "--pairs", "40", "-o", page)
+    assert (done.code, done.err) == (0, "")
+    assert "graph      house, 2 of 2 floors, 1 of 1 links\n" in done.out
+    assert "two floors 20 pairs: 20 solved\n" in done.out
+    assert "found      nothing\n" in done.out
+    assert "hint" not in done.out
+    text = page.read_text()
+    assert text.count("data:image/png;base64,") == 2
+    assert "Floor 2: nothing is wrong" in text
+    assert "http" not in text
+    figures = cli("check", two_floors, graph, *POINT, "--align", "--pairs", "8", "--json").answer
+    assert figures["links"] == {"lift": "lift"}
+    assert figures["routes"]["all"]["answers"] == {"solved": 8}
+    drawn = {floor.name: floor.graph.n_nodes for floor in hn.load_building_graph(graph).floors}
+    assert {name: one["nodes"] for name, one in figures["floors"].items()} == drawn
+    assert figures["findings"] == {}
+
+
+def test_a_graph_in_another_frame_is_not_taken_for_sound(cli, two_floors, graph):
+    done = cli("check", two_floors, graph, *POINT, "--pairs", "40")
+    assert done.code == 1
+    assert "1 ends of links that are not where the building has them (stop-elsewhere)" in done.out
+    assert "lift lift at floor 2: 2.24 m from that of the building" in done.out
+    assert "routes     " in done.out
+    assert "hint       links stop up to 2.24 m from those of the building: --align, if" in done.out
+    figures = cli("check", two_floors, graph, *POINT, "--pairs", "0", "--json").answer
+    assert figures["findings"]["stop-elsewhere"]["count"] == 1
+    assert (figures["routes"], figures["contradictions"]) == (None, [])
+
+
+def test_floors_are_matched_and_findings_left_out(cli, two_floors, graph):
+    graph.write_text(graph.read_text().replace('"2"', '"L2"').replace("'2'", "'L2'"))
+    done = cli("check", two_floors, graph, *POINT, "--pairs", "0")
+    assert done.code == 1
+    assert "warning    1 floors of the building that the graph does not have" in done.out
+    assert "           floor L2\n" in done.out
+    kinds = ("floor-missing", "floor-unknown", "stop-missing")
+    done = cli(
+        "check", two_floors, graph, *POINT, "--pairs", "0", *(f"--ignore={kind}" for kind in kinds)
+    )
+    assert (done.code, "found      nothing\n" in done.out) == (0, True)
+    done = cli("check", two_floors, graph, *POINT, "--align", "--match", "L2=2", "--pairs", "10")
+    assert (done.code, "found      nothing\n" in done.out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("--match", "L2"), "--match must be NAME=FLOOR, got 'L2'"),
+        (("--match", "2=7"), "no floor is called '7': there are 1, 2"),
+        (("--match", "3=2"), "no floor is called '3': there are 1, 2"),
+        (("--match", "2=1", "--match", "2=2"), "has floor '2' of the graph twice"),
+        (("--along-lines",), "--along-lines is for one map, and this is a building"),
+        (("--floor", "1"), "--floor is for one map, and this is a building"),
+        (("--ignore", "walls"), "--ignore must be one of no-coordinates, "),
+        (("--preset", "octile"), "load it with preset shortest"),
+    ],
+)
+def test_wrong_usage_of_check_is_one_line(cli, two_floors, graph, given, words):
+    assert cli("check", two_floors, graph, *POINT, *given).refuses(2, words)
+
+
+def test_a_damaged_graph_is_one_line(cli, two_floors, tmp_path):
+    path = tmp_path / "damaged.yaml"
+    path.write_text("levels: {L1: {vertices: [")
+    assert cli("check", two_floors, path, *POINT).refuses(3, "graph ")
+    features = tmp_path / "graph.geojson"
+    features.write_text('{"type": "FeatureCollection", "features": []}')
+    assert cli("check", two_floors, features, *POINT).refuses(3, "graph ")
+    path.write_text("levels: {L1: {vertices: [[0, 0, {}]], lanes: []}}")
+    assert cli("check", two_floors, path, *POINT).refuses(
+        2, "has the floors L1 and the building has 1"
+    )
+
+
+def test_options_of_check_for_buildings_mean_nothing_on_one_map(cli, graph):
+    for given in (("--align",), ("--match", "1=2"), ("--pairs", "9"), ("--no-stairs",)):
+        done = cli("check", FIGURE, graph, "--floor", "1", *given)
+        assert done.refuses(2, f"{given[0]} is for a building, and this is one map: leave it out")
+    done = cli("check", FIGURE, graph, "--floor", "1", "--ignore", "pieces")
+    assert done.refuses(2, "--ignore must be one of ")
+
+
+def test_evaluate_names_the_command_for_buildings(cli, two_floors, graph, tmp_path):
+    done = cli("evaluate", two_floors, "--graph", graph, "-o", tmp_path / "run")
+    words = "is a building, and methods are measured on maps: give the maps of its floors"
+    assert done.refuses(2, words, "`hybridnav check BUILDING GRAPH`")
+
+
+@pytest.fixture
+def sideways(tmp_path):
+    """Two floors of one map, a lift, and stairs that lead sideways."""
+    return write_house(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("more", "links"),
+    [
+        (("rmf", "-o", "a.yaml"), {"lift"}),
+        (("osm", "-o", "a.osm", "--anchor", "48.15,11.57"), {"lift", "ladder"}),
+        (("lif", "-o", "a.json", "--vehicle", "A.B"), {"lift", "ladder"}),
+    ],
+)
+def test_floors_and_links_are_read_back(cli, sideways, more, links, monkeypatch):
+    monkeypatch.chdir(sideways.parent)
+    given = ("--robot-radius", "0", "--spacing", "1", "--format", *more)
+    done = cli("export", sideways, *given, "--json")
+    assert (done.code, done.err) == (0, "")
+    read = hn.load_building_graph(more[2])
+    counts = {
+        floor.name: {"nodes": floor.graph.n_nodes, "edges": floor.graph.n_edges}
+        for floor in read.floors
+    }
+    assert counts == done.answer["floors"]
+    assert {link.name for link in read.links} == links
+    lift = next(link for link in read.links if link.name == "lift")
+    ends = [end.position_m for end in lift.ends]
+    assert ends[0] == pytest.approx(ends[1], abs=0.02)
+    shown = cli("export", sideways, *given).out
+    assert "links      lift, ladder\n" in shown
+    assert ("Open-RMF knows lifts only" in shown) == ("rmf" in more)
+
+
+def test_what_is_for_one_map_is_refused(cli, sideways, tmp_path):
+    done = cli("export", sideways, "-o", tmp_path / "a.geojson")
+    assert done.refuses(2, "--format nav2 is for one map, and this is a building")
+    done = cli("export", sideways, "-o", tmp_path / "a.yaml", "--format", "rmf", "--floor", "1")
+    assert done.refuses(2, "--floor is for one map, and this is a building")
+    assert not list(tmp_path.glob("a.*"))
+
+
+def test_a_link_that_the_robot_does_not_fit_in_is_left_out(sideways):
+    text = sideways.read_text().replace("kind: lift,", "kind: lift, max_radius_m: 0.05,")
+    sideways.write_text(text)
+    building = hn.load_building(sideways, robot_radius_m=0.1)
+    assert [link.name for link in hn.building_graph(building, nodes=10).links] == ["ladder"]
