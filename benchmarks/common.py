@@ -62,7 +62,7 @@ def matches(name: str, globs: Sequence[str]) -> bool:
 def read(path: Path, radius_m: float = RADIUS_M) -> hn.OccupancyGrid:
     """Return the grid of a map file: ROS maps inflated, MovingAI maps for a point robot."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", hn.MapWarning)
+        warnings.simplefilter("ignore", hn.errors.MapWarning)
         return hn.load_map(path, robot_radius_m=0.0 if path.suffix == ".map" else radius_m)
 
 

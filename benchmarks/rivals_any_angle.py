@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.rivals import Rival, needed_package, refuse_corner_cutting
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.harness.baselines.regions import AnyAngleResult, MethodResult
-from hybridnav.refine.ompl import OmplSettings, Query, Setup, Worker, require_ompl
+from hybridnav.refine.ompl import OmplQuery, OmplSettings, Setup, Worker, require_ompl
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
@@ -201,7 +201,9 @@ class OmplWhole(Rival):
         poses = np.column_stack([centres, np.zeros(2)])
         deadline_s = time.monotonic() + self._budget_s
         nothing = np.empty((0, 2), dtype=np.int64)  # only a corridor is made of cells
-        self._worker.send(Query(poses[0], poses[1], nothing, deadline_s, (("whole map", None),)))
+        self._worker.send(
+            OmplQuery(poses[0], poses[1], nothing, deadline_s, (("whole map", None),))
+        )
         reply = self._worker.reply()
         if reply.outcome != "solved":
             return MethodResult(None, gave_up=reply.outcome)

@@ -106,7 +106,7 @@ def draw_robot(file: Path) -> None:
 
 def draw_building(file: Path) -> None:
     """Draw the route from a room of one floor to a room of another."""
-    building = hn.load_building(BUILDING, robot_radius_m=0.25)
+    building = hn.ext.fleet.load_building(BUILDING, robot_radius_m=0.25)
     save_figure(plot_building(building, building.plan("office 5", "2.04"))[0], file, dpi=130)
 
 

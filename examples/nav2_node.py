@@ -26,7 +26,7 @@ class PlanningNode(Node):
         super().__init__("hybridnav")
         given = {name: self.declare_parameter(name, USUAL[name]).value for name in USUAL}
         self.planner = hn.load(given["model"]).planner(given["preset"])
-        self.graph = hn.build_route_graph(self.planner.topology, nodes=given["nodes"])
+        self.graph = hn.ext.graphs.build_route_graph(self.planner.topology, nodes=given["nodes"])
         self.network, self.base, self.transforms = self.graph.to_networkx(), given["base"], Buffer()
         self.listener = TransformListener(self.transforms, self)
         of = {ComputePathToPose: "compute_path_to_pose", ComputeRoute: "compute_route"}
@@ -39,7 +39,7 @@ class PlanningNode(Node):
         result = (ComputeRoute if is_route else ComputePathToPose).Result()
         try:
             code, fields = (self.route if is_route else self.path)(goal, began.nanoseconds)
-        except (hn.HybridNavError, *FAILURES) as failure:
+        except (hn.errors.HybridNavError, *FAILURES) as failure:
             found = (FAILURES[kind] for kind in FAILURES if isinstance(failure, kind))
             code, fields = next(found, "UNKNOWN"), {"error_msg": str(failure)}
         fields["planning_time"] = (self.get_clock().now() - began).to_msg()

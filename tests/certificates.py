@@ -44,7 +44,7 @@ def planners_of(topology: hn.TopologicalMap, *overrides: str) -> list[hn.HybridP
 
 def planned(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanResult:
     """The plan between the centres of two cells."""
-    return planner.plan(*planner.topology.grid.frame.points_of([start, goal]))
+    return planner.plan(*planner.grid.frame.points_of([start, goal]))
 
 
 ROUNDING = 1e-4
@@ -80,7 +80,7 @@ def assert_proved(
 
 def check_plan(planner: hn.HybridPlanner, start: Any, goal: Any, optimum: float) -> hn.PlanResult:
     """Plan, and hold the answer against the optimum, the legal moves and the preset's promise."""
-    grid, setting = planner.topology.grid, planner.preset.planner
+    grid, setting = planner.grid, planner.preset.planner
     result = planned(planner, start, goal)
     # All presets but the paper's promise the optimum, or what epsilon leaves of it.
     epsilon = None if setting.method == "paper" else getattr(setting, "epsilon", None) or 0

@@ -50,7 +50,7 @@ def test_a_bad_map_prints_a_short_line(tmp_path: Path, key: str, value: str) -> 
     described = MAP | ({key: f'"{value}"'} if value[0] != "[" else {key: value})
     text = "\n".join(f"{name}: {each}" for name, each in described.items())
     path.write_text(value if key == "whole" else text, encoding="utf-8")
-    with pytest.raises(hn.MapError) as error:
+    with pytest.raises(hn.errors.MapError) as error:
         hn.load_map(path)
     told = str(error.value)
     assert len(told) <= len(str(path)) + 200

@@ -96,7 +96,7 @@ def measure(
     """
     queries = sample_pairs(grid, asked["asked"], seed=asked["seed"])
     if not queries:
-        raise hn.InvalidValueError(f"map {grid.name} has no two free cells that are joined")
+        raise hn.errors.InvalidValueError(f"map {grid.name} has no two free cells that are joined")
     is_movingai = path.suffix == ".map"
     distance_m = MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M
     load = os.getloadavg()[0]
@@ -162,7 +162,7 @@ def _prepare(
         try:
             planner = hn.HybridPlanner(topology, preset=preset)
             planner.plan(*endpoints)  # makes what is made on demand
-        except hn.InvalidValueError as error:
+        except hn.errors.InvalidValueError as error:
             row["error"] = str(error)
             continue
         row["preparation s"] = time.perf_counter() - began

@@ -49,16 +49,20 @@ def description(data: Path, names: Sequence[str], maps: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def built(data: Path, folder: Path, names: Sequence[str], maps: Sequence[str]) -> hn.Building:
+def built(
+    data: Path, folder: Path, names: Sequence[str], maps: Sequence[str]
+) -> hn.ext.fleet.Building:
     """A prepared building of GDC's floors."""
     file = folder / "building.yaml"
     file.write_text(description(data, names, maps), encoding="utf-8")
-    building = hn.load_building(file, robot_radius_m=0.25)
+    building = hn.ext.fleet.load_building(file, robot_radius_m=0.25)
     building.prepare()
     return building
 
 
-def reachable(building: hn.Building, floor: str, count: int, seed: int) -> list[FloatArray]:
+def reachable(
+    building: hn.ext.fleet.Building, floor: str, count: int, seed: int
+) -> list[FloatArray]:
     """Free points of a floor from which its first lift can be reached."""
     planner = building.floor(floor).planner
     grid, end = planner.topology.grid, building.links[0].end_on(floor)
@@ -71,7 +75,7 @@ def reachable(building: hn.Building, floor: str, count: int, seed: int) -> list[
     return found
 
 
-def compare_queries(building: hn.Building, count: int) -> None:
+def compare_queries(building: hn.ext.fleet.Building, count: int) -> None:
     """Print what a query over three floors takes beside single ones."""
     names = [floor.name for floor in building.floors]
     low, high = (reachable(building, name, count, seed) for seed, name in enumerate(names[::2]))
@@ -98,7 +102,7 @@ def compare_queries(building: hn.Building, count: int) -> None:
     print(f"aim        below {limit:.0f} us (three single ones and 200 us): {over / limit:.2f}")
 
 
-def compare_loading(building: hn.Building, folder: Path) -> None:
+def compare_loading(building: hn.ext.fleet.Building, folder: Path) -> None:
     """Print how long the model of a building takes to load, and to answer its first query."""
     file = folder / "building.hnm"
     hn.save(building, file)
@@ -108,7 +112,7 @@ def compare_loading(building: hn.Building, folder: Path) -> None:
     seconds, computed, answered = [], [], []
     for _ in range(5):
         began, cpu = time.perf_counter(), time.process_time()
-        loaded = hn.load_building(file)
+        loaded = hn.ext.fleet.load_building(file)
         seconds.append(time.perf_counter() - began)
         computed.append(time.process_time() - cpu)
         plan = loaded.plan((first.name, start), (last.name, goal))
@@ -137,10 +141,10 @@ def main(given: Namespace) -> None:
         ten = built(given.data, folder, names, ["2", "3"] * 5)
         # Planners of floors with one map are one: a building of ten maps has ten.
         floors = [
-            hn.Floor(floor.name, own_planner(floor.planner), floor.elevation_m)
+            hn.ext.fleet.Floor(floor.name, own_planner(floor.planner), floor.elevation_m)
             for floor in ten.floors
         ]
-        ten = hn.Building(floors, ten.links)
+        ten = hn.ext.fleet.Building(floors, ten.links)
         ten.prepare()
         compare_loading(ten, folder)
 

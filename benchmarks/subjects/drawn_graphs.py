@@ -42,12 +42,14 @@ _GRAPHS = {
 _AIMS: dict[str, int | None] = {"built, 300": 300, "built": None}
 
 
-def rows_of(graph: hn.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]) -> list[Row]:
+def rows_of(
+    graph: hn.ext.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
+) -> list[Row]:
     """Return the rows of a drawn graph, and of those that are built."""
     graphs = {graph.format: graph}
     for name, nodes in _AIMS.items():
-        built = hn.build_route_graph(topology, nodes=nodes)
-        graphs[name] = hn.WaypointGraph.from_networkx(built.to_networkx(), name=name)
+        built = hn.ext.graphs.build_route_graph(topology, nodes=nodes)
+        graphs[name] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name=name)
     grid = topology.grid
     losses = [
         _losses(GraphMethod(grid, one, clear_edges_only=True), grid, pairs)
@@ -67,10 +69,12 @@ def rows_of(graph: hn.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pa
     return rows
 
 
-def _checked(graph: hn.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]) -> Row:
+def _checked(
+    graph: hn.ext.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
+) -> Row:
     """Return figures on a graph as it is."""
     grid = topology.grid
-    check = hn.check_graph(topology, graph)
+    check = hn.ext.graphs.check_graph(topology, graph)
     at_wall, method = 0, GraphMethod(grid, graph)
     for pair in pairs:
         line = method.solve(pair.start, pair.goal).any_angle
@@ -113,7 +117,7 @@ def main(given: Namespace) -> None:
     """Print the table."""
     rows: list[Row] = []
     for file, map_file in _GRAPHS.items():
-        graph = hn.load_graph(given.data / file)
+        graph = hn.ext.graphs.load_graph(given.data / file)
         grid = read(given.data / map_file, given.radius)
         rooms = hn.find_rooms(grid)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))

@@ -61,7 +61,7 @@ def map_log(path: Path, given: hn.OccupancyGrid) -> tuple[hn.OccupancyGrid, list
         corner_m=given.frame.origin_m,
         least_probability=0.0,
     )
-    log, adding_s = hn.CarmenLog(path), []
+    log, adding_s = hn.ext.live.CarmenLog(path), []
     began = time.perf_counter()
     for scan in log:
         before = time.perf_counter()

@@ -55,10 +55,10 @@ def measure(file: Path, nodes: int, spacing_m: float, pairs: int) -> tuple[Row, 
     """Build the graph of a map and judge it; return its row and what is wrong with it."""
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(read(file)))
     began = time.perf_counter()
-    graph = hn.build_route_graph(topology, nodes=nodes or None, spacing_m=spacing_m)
+    graph = hn.ext.graphs.build_route_graph(topology, nodes=nodes or None, spacing_m=spacing_m)
     seconds = time.perf_counter() - began
-    every = hn.judge_route_graph(graph, pairs=pairs)
-    apart = hn.judge_route_graph(graph, pairs=pairs, least_m=_APART_M)
+    every = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
+    apart = hn.ext.graphs.judge_route_graph(graph, pairs=pairs, least_m=_APART_M)
     row: Row = {"map": file.stem, "aim": nodes or "none", "nodes": graph.n_nodes}
     row |= {"edges": graph.n_edges, "build s": seconds}
     row["solved %"] = 100 * every.best.solved
@@ -71,7 +71,7 @@ def measure(file: Path, nodes: int, spacing_m: float, pairs: int) -> tuple[Row, 
     return row, _faults(graph)
 
 
-def _faults(graph: hn.RouteGraph) -> list[str]:
+def _faults(graph: hn.ext.graphs.RouteGraph) -> list[str]:
     ends = graph.points[graph.edges]
     wrong = [
         f"edge {k} is not free" for k, end in enumerate(ends) if segment_faults(graph.grid, end)

@@ -102,7 +102,7 @@ def exploration(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, A
 def scans(log: Path, count: int) -> Iterator[tuple[hn.OccupancyGrid, Area | None]]:
     """Yield the map after each laser scan of a log, and the area in which the scan lies."""
     mapper = Mapper(resolution_m=0.05)
-    for scan in islice(hn.CarmenLog(log), count + 1):
+    for scan in islice(hn.ext.live.CarmenLog(log), count + 1):
         area = mapper.add(scan)
         yield mapper.to_grid(robot_radius_m=0), area
 
@@ -113,7 +113,7 @@ def log_pace(log: Path) -> float:
     All of it counts: reading, mapping, the grid of each scan, and the update of the pyramid.
     """
     began = time.perf_counter()
-    lines, mapper = hn.CarmenLog(log), Mapper(resolution_m=0.05)
+    lines, mapper = hn.ext.live.CarmenLog(log), Mapper(resolution_m=0.05)
     version: OnlinePyramid | None = None
     for scan in lines:
         area = mapper.add(scan)

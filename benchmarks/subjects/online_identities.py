@@ -48,7 +48,7 @@ def agreement(rooms: OnlineRooms) -> float:
 def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict[str, Any]:
     """Return the figures of a replay."""
     figures, step = ReplayFigures(), None
-    read = itertools.islice(hn.CarmenLog(log), scans)
+    read = itertools.islice(hn.ext.live.CarmenLog(log), scans)
     mapper = Mapper(resolution_m=RESOLUTION_M)
     grids = grids_of_scans(read, mapper, every=every, robot_radius_m=RADIUS_M)
     for step in replay(grids, rooms_every=rooms_every, most_cells=MOST_CELLS):

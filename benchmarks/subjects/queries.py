@@ -78,7 +78,7 @@ def _known(out: Path | None, presets: Presets, asked: Asked) -> dict[str, list[R
     for rows in found.values():
         same = all(row[key] == value for row in rows for key, value in asked.items())
         if not same or [row["preset"] for row in rows] != list(presets):
-            raise hn.InvalidValueError(
+            raise hn.errors.InvalidValueError(
                 f"{out} holds a run with other presets, pairs or seed: take a new file"
             )
     return found
@@ -105,7 +105,7 @@ def main(given: Namespace) -> int:
     try:
         pairs = {"asked": given.pairs or 200, "seed": given.seed}
         rows = run(files, presets, given.out, pairs)
-    except hn.InvalidValueError as error:
+    except hn.errors.InvalidValueError as error:
         raise Refused(str(error)) from error
     print(page(rows))
     return 1 if n_broken(rows) else 0

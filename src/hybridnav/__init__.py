@@ -1,14 +1,36 @@
 """Robot routes on two maps: an occupancy grid and the topological map grown out of it.
 
-Names load on first use: `import hybridnav` itself imports neither numba nor matplotlib.
+Names load on first use: `import hybridnav` itself imports neither numba nor matplotlib. Errors are
+in `hybridnav.errors`; what stands beside the mission is in `hybridnav.ext`.
 """
 
 import logging
+import warnings
+from importlib import import_module
 
 import lazy_loader
 
 from hybridnav._version import __version__ as __version__
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())
+
+_WING = ("ext.graphs", "ext.fleet", "ext.live")
+
+
+def __getattr__(name: str) -> object:
+    """Return a name of this package; those of earlier versions come with a warning."""
+    try:
+        return _named(name)
+    except AttributeError:
+        if name.startswith("_"):
+            raise
+    homes = ("errors", *_WING) if name[0].isupper() else _WING
+    for home in homes:
+        module = import_module(f"{__name__}.{home}")
+        if name in getattr(module, "__all__", dir(module)):
+            text = f"hybridnav.{name} is now hybridnav.{home}.{name}: write that"
+            warnings.warn(text, FutureWarning, stacklevel=2)
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__} has no attribute {name}")

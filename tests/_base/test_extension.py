@@ -48,5 +48,7 @@ def test_the_wing_is_registered() -> None:
 
 
 def test_what_nothing_registers_is_said_in_one_line() -> None:
-    with pytest.raises(hn.InvalidValueError, match=r"^nothing is registered as svg in hybridnav"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"^nothing is registered as svg in hybridnav"
+    ):
         extension.extension("formats", "svg")

@@ -160,7 +160,7 @@ def test_lengths_near_1_are_made_1(length: float) -> None:
     if abs(length**2 - 1) < 0.0099:
         assert math.hypot(*quaternion_of({"q": q}, "q", "test")) == pytest.approx(1, abs=1e-12)
     elif abs(length**2 - 1) > 0.0101:
-        with pytest.raises(hn.InvalidValueError, match="unit quaternion"):
+        with pytest.raises(hn.errors.InvalidValueError, match="unit quaternion"):
             quaternion_of({"q": q}, "q", "test")
 
 
@@ -210,7 +210,7 @@ HOSTILE = {
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_messages_end_in_one_clear_line(name: str) -> None:
     hostile, words = HOSTILE[name]
-    with pytest.raises(hn.InvalidValueError, match=words) as error:
+    with pytest.raises(hn.errors.InvalidValueError, match=words) as error:
         hn.OccupancyGrid.from_message(hostile)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 300
@@ -219,17 +219,17 @@ def test_hostile_messages_end_in_one_clear_line(name: str) -> None:
 def test_a_message_that_contains_itself_ends_in_one_line() -> None:
     circle: dict[str, Any] = message([0], 1, 1)
     circle["info"]["origin"]["position"] = circle
-    with pytest.raises(hn.InvalidValueError, match=r"no field info\.origin\.position\.x"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"no field info\.origin\.position\.x"):
         hn.OccupancyGrid.from_message(circle)
     numbers: list[Any] = []
     numbers.append(numbers)
-    with pytest.raises(hn.InvalidValueError, match="flat sequence"):
+    with pytest.raises(hn.errors.InvalidValueError, match="flat sequence"):
         hn.OccupancyGrid.from_message(message(numbers, 1, 1))
 
 
 def test_a_size_that_is_too_large_costs_no_memory() -> None:
     tracemalloc.start()
-    with pytest.raises(hn.InvalidValueError, match="expected width"):
+    with pytest.raises(hn.errors.InvalidValueError, match="expected width"):
         hn.OccupancyGrid.from_message(message([0], 10_000, 10_000))
     assert tracemalloc.get_traced_memory()[1] < 1e6
     tracemalloc.stop()
@@ -246,7 +246,7 @@ def test_a_size_that_is_too_large_costs_no_memory() -> None:
     ],
 )
 def test_headers_hold_what_ros_can_hold(frame_id: Any, stamp_ns: Any, words: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=words):
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
         grid_of(np.zeros((1, 1))).to_message(frame_id, stamp_ns=stamp_ns)
 
 
@@ -269,7 +269,7 @@ def test_a_path_is_its_poses_with_a_quaternion_each() -> None:
 
 def test_spacing_of_path_messages_is_checked() -> None:
     path = hn.Path(np.zeros((2, 2), np.int64), np.array([[0.0, 0.0], [9.0, 0.0]]), 9.0)
-    with pytest.raises(hn.InvalidValueError, match="spacing_m"):
+    with pytest.raises(hn.errors.InvalidValueError, match="spacing_m"):
         path.to_message(spacing_m=0.0)
 
 
@@ -333,7 +333,7 @@ def test_whatever_stands_in_a_field_makes_a_grid_or_one_line(
     text = ""
     try:
         hn.OccupancyGrid.from_message(hostile)
-    except hn.InvalidValueError as error:
+    except hn.errors.InvalidValueError as error:
         text = str(error)
     assert "\n" not in text
     assert len(text) < 400

@@ -161,7 +161,9 @@ def test_a_robot_that_slides_turns_evenly_on_its_way() -> None:
 
 @pytest.mark.parametrize("spacing_m", [0.0, -1.0, math.nan, 1e-9])
 def test_a_spacing_that_is_none_is_refused(spacing_m: float) -> None:
-    with pytest.raises(hn.InvalidValueError, match="spacing_m must be above 0 and yield") as error:
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="spacing_m must be above 0 and yield"
+    ) as error:
         path_of([(0, 0), (1, 0)]).poses(spacing_m)
     assert "\n" not in str(error.value)
 

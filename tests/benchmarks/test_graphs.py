@@ -124,10 +124,10 @@ def test_routes_are_those_of_the_exported_file(tmp_path):
     made = RouteGraphMethod(grid, nodes=60)
     scaled = replace(grid, frame=replace(grid.frame, resolution_m=0.1))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(scaled, merge_distance_m=4.0))
-    built = hn.build_route_graph(topology, nodes=60)
+    built = hn.ext.graphs.build_route_graph(topology, nodes=60)
     assert made.n_nodes == built.n_nodes
-    hn.export_nav2(built, tmp_path / "graph.geojson")
-    graph = hn.load_graph(tmp_path / "graph.geojson")
+    hn.ext.graphs.export_nav2(built, tmp_path / "graph.geojson")
+    graph = hn.ext.graphs.load_graph(tmp_path / "graph.geojson")
     by_file = GraphMethod(scaled, graph)
     rng = np.random.default_rng(1)
     free = np.argwhere(grid.classes == hn.CellClass.FREE)

@@ -63,7 +63,9 @@ def test_a_map_is_not_measured_twice(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(queries, "measure", note)
     assert page(list(rows_of(out, "paper").values())) == before
     assert not measured
-    with pytest.raises(hn.InvalidValueError, match=r"queries\.csv holds a run with other presets"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"queries\.csv holds a run with other presets"
+    ):
         rows_of(out, "shortest")
     # The rows of maps that are not asked for this time stay in the file.
     (tmp_path / "other.csv").write_text(out.read_text().replace(MAP, "elsewhere.yaml"))

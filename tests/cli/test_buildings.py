@@ -23,7 +23,7 @@ def test_a_route_over_floors_is_printed(cli: Any, file: Path) -> None:
     ran = cli("plan", file, *QUERY)
     assert ran.code == 0
     told = ran.out.splitlines()
-    building = hn.load_building(file, robot_radius_m=0)
+    building = hn.ext.fleet.load_building(file, robot_radius_m=0)
     plan = building.plan(("1", (1.5, 0.6)), ("2", (0.5, 0.5)))
     assert told[0] == "query      house.yaml, 1:1.5,0.6 to 2:0.5,0.5, robot radius 0 m"
     assert told[1] == "status     solved"
@@ -156,7 +156,9 @@ def test_a_sound_graph_in_a_frame_of_its_own(cli, two_floors, graph, tmp_path):
     figures = cli("check", two_floors, graph, *POINT, "--align", "--pairs", "8", "--json").answer
     assert figures["links"] == {"lift": "lift"}
     assert figures["routes"]["all"]["answers"] == {"solved": 8}
-    drawn = {floor.name: floor.graph.n_nodes for floor in hn.load_building_graph(graph).floors}
+    drawn = {
+        floor.name: floor.graph.n_nodes for floor in hn.ext.fleet.load_building_graph(graph).floors
+    }
     assert {name: one["nodes"] for name, one in figures["floors"].items()} == drawn
     assert figures["findings"] == {}
 
@@ -251,7 +253,7 @@ def test_floors_and_links_are_read_back(cli, sideways, more, links, monkeypatch)
     given = ("--robot-radius", "0", "--spacing", "1", "--format", *more)
     done = cli("export", sideways, *given, "--json")
     assert (done.code, done.err) == (0, "")
-    read = hn.load_building_graph(more[2])
+    read = hn.ext.fleet.load_building_graph(more[2])
     counts = {
         floor.name: {"nodes": floor.graph.n_nodes, "edges": floor.graph.n_edges}
         for floor in read.floors
@@ -277,5 +279,7 @@ def test_what_is_for_one_map_is_refused(cli, sideways, tmp_path):
 def test_a_link_that_the_robot_does_not_fit_in_is_left_out(sideways):
     text = sideways.read_text().replace("kind: lift,", "kind: lift, max_radius_m: 0.05,")
     sideways.write_text(text)
-    building = hn.load_building(sideways, robot_radius_m=0.1)
-    assert [link.name for link in hn.building_graph(building, nodes=10).links] == ["ladder"]
+    building = hn.ext.fleet.load_building(sideways, robot_radius_m=0.1)
+    assert [link.name for link in hn.ext.fleet.building_graph(building, nodes=10).links] == [
+        "ladder"
+    ]

@@ -384,7 +384,7 @@ def test_a_map_that_does_not_fit_into_memory(cli, rooms, monkeypatch):
     assert cli("show", rooms).refuses(3, "out of memory")
 
 
-@pytest.mark.filterwarnings("default::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("default::hybridnav.errors.MapWarning")
 def test_a_warning_is_one_line_beside_the_result(cli, draw):
     path = draw("??...", **SHADED)
     done = cli("plan", path, "--start", "0.5,0.5", "--goal", "4.5,0.5", "--json")

@@ -165,7 +165,7 @@ def test_a_plan_is_written_into_a_bag(cli, tmp_path, monkeypatch):
         bag = tmp_path / name
         done = cli(*query, "--bag", bag, "--json")
         assert (done.code, done.err) == (0, "")
-        assert (hn.load_bag_map(bag).measured == hn.load_map(FIGURE).measured).all()
+        assert (hn.ext.live.load_bag_map(bag).measured == hn.load_map(FIGURE).measured).all()
         with AnyReader([bag]) as reader:
             (plan,) = [each for each in reader.connections if each.topic == "/plan"]
             ((_, _, raw),) = reader.messages([plan])
@@ -194,9 +194,9 @@ def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
         out = tmp_path / name
         done = cli("export", FIGURE, "-o", out, "--format", kind, *SMALL, *more, "--json")
         assert (done.code, done.err) == (0, "")
-        graph = hn.load_graph(out)
+        graph = hn.ext.graphs.load_graph(out)
         assert (graph.n_nodes, graph.n_edges) == (done.answer["nodes"], done.answer["edges"])
-        assert [floor.name for floor in hn.load_building_graph(out).floors] == ["0"]
+        assert [floor.name for floor in hn.ext.fleet.load_building_graph(out).floors] == ["0"]
         done = cli("check", FIGURE, out, *SMALL[:2], "--floor", "0", "--json")
         assert (done.code, done.answer["findings"]) == (0, {})
 
@@ -206,7 +206,7 @@ def test_what_a_format_does_not_hold_is_printed(cli, tmp_path):
     done = cli("export", OFFICE, "-o", out, "--format", "rmf", "--nodes", "50", "--no-doors")
     assert done.code == 0
     assert "left out   doors: as asked\n" in done.out
-    assert hn.load_building_graph(out).floors[0].doors == ()
+    assert hn.ext.fleet.load_building_graph(out).floors[0].doors == ()
 
 
 def test_options_of_fleets_are_refused_elsewhere(cli, tmp_path):

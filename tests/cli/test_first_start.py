@@ -87,9 +87,9 @@ def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
 @pytest.mark.parametrize(
     ("preset", "processors", "start", "jobs"),
     [
-        ("shortest", 2, "cold", ["mesh"]),
-        ("ompl", 2, "cold", ["mesh"]),
-        ("octile", 2, "cold", ["jumps"]),
+        ("shortest", 2, "cold", ["shortest"]),
+        ("ompl", 2, "cold", ["shortest"]),
+        ("octile", 2, "cold", ["octile"]),
         ("robot", 2, "cold", []),
         ("shortest", 1, "cold", []),
         ("shortest", 2, "warm", []),

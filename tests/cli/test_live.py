@@ -203,7 +203,7 @@ def test_a_bag_becomes_a_map_of_its_scans(cli, tmp_path, kind):
 
 def test_the_map_of_a_bag_is_written_as_it_is(cli, tmp_path):
     grid = hn.example_map("figure1")
-    hn.save_bag(tmp_path / "kept.bag", grid=grid)
+    hn.ext.live.save_bag(tmp_path / "kept.bag", grid=grid)
     out = tmp_path / "kept.yaml"
     done = cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map", "--json")
     assert done.answer["cells"]["free"] == (grid.measured == hn.CellClass.FREE).sum()

@@ -56,7 +56,7 @@ def test_python_checks_names_before_what_is_blocked():
         lambda: planner.plan("kitchn", "lab", blocked=nowhere),
         lambda: hn.plan_tour(planner, ["lab", "kitchn"], blocked=nowhere),
     ):
-        with pytest.raises(hn.InvalidValueError, match="'kitchn': did you mean kitchen"):
+        with pytest.raises(hn.errors.InvalidValueError, match="'kitchn': did you mean kitchen"):
             ask()
 
 
@@ -64,13 +64,13 @@ def test_what_is_closed_is_found_once_for_named_ends(monkeypatch):
     grid, labels = flat()
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))
     found = []
-    find = hn.Blocked.cells_of
+    find = hn.Blocked.cells_on
 
-    def counted(blocked, topology):
+    def counted(blocked, *on):
         found.append(blocked)
-        return find(blocked, topology)
+        return find(blocked, *on)
 
-    monkeypatch.setattr(hn.Blocked, "cells_of", counted)
+    monkeypatch.setattr(hn.Blocked, "cells_on", counted)
     blocked = {"rooms": ["lab"]}
     assert planner.plan("kitchen", "lab", blocked=blocked).status == "goal blocked"
     assert len(found) == 1
@@ -162,7 +162,7 @@ def test_masks_are_read_and_joined(cli: Any, tmp_path: Path) -> None:
         (("--costs", "speed"), "--costs speed: expected speed:FILE, got 'speed'"),
         (
             ("--costs", "clearance", "--preset", "shortest"),
-            "planner.costs: unknown key; shortest has ",
+            "planner.costs: no key of method shortest, but of ",
         ),
     ],
 )

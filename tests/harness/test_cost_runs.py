@@ -221,7 +221,7 @@ def test_a_run_resumes_and_refuses_other_costs(
     assert evaluate(settings, tmp_path) == 0
     runs = (tmp_path / "runs.jsonl").read_text()
     for other, words in (((), "without costs"), (("clearance",), "with costs clearance")):
-        with pytest.raises(hn.InvalidValueError, match=words) as refused:
+        with pytest.raises(hn.errors.InvalidValueError, match=words) as refused:
             evaluate(replace(settings, presets=PRESETS, costs=other), tmp_path)
         assert "\n" not in str(refused.value)
     assert (tmp_path / "runs.jsonl").read_text() == runs
@@ -230,7 +230,7 @@ def test_a_run_resumes_and_refuses_other_costs(
     evaluate(plain, tmp_path / "plain")
     path = tmp_path / "plain" / RECORDS_FILE
     path.write_text(path.read_text() + both)
-    with pytest.raises(hn.InvalidValueError, match="records with different costs"):
+    with pytest.raises(hn.errors.InvalidValueError, match="records with different costs"):
         load_study(tmp_path / "plain")
 
 
@@ -241,9 +241,9 @@ def test_runs_with_costs_are_compared_by_costs(folder: Any) -> None:
     assert rows["octile"]["loss of the first %"] == pytest.approx(100 * octile.losses.mean())
     other = folder.parent / "lengths"
     evaluate(RunSettings(maps=(octile.preparation["file"],), pairs=2), other)
-    with pytest.raises(hn.InvalidValueError, match="share no method, map and pair"):
+    with pytest.raises(hn.errors.InvalidValueError, match="share no method, map and pair"):
         compare_runs(folder, other)
-    with pytest.raises(hn.InvalidValueError, match="has no costs to refer to"):
+    with pytest.raises(hn.errors.InvalidValueError, match="has no costs to refer to"):
         load_study(other, metric="weighted")
 
 
@@ -258,7 +258,7 @@ def test_cells_that_costs_close_are_occupied_for_all(settings: RunSettings, tmp_
     assert study.faults == []
     assert study.costs == f"array {layer.digest[:12]}"
     other = layer_of(np.full(grid.shape, 3.0), closed)
-    with pytest.raises(hn.InvalidValueError, match=r"with costs array [0-9a-f]{12}"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"with costs array [0-9a-f]{12}"):
         evaluate(replace(only, costs=other), tmp_path)
     evaluate(replace(only, costs=layer_of(np.full(grid.shape, 2.0), closed)), tmp_path)
     for outcome in study.outcomes:
@@ -281,7 +281,7 @@ def test_cells_that_costs_close_are_occupied_for_all(settings: RunSettings, tmp_
 def test_wrong_costs_are_refused_in_one_line(
     settings: RunSettings, tmp_path: Any, costs: Any, message: str
 ) -> None:
-    with pytest.raises(hn.InvalidValueError, match=message) as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match=message) as refused:
         evaluate(replace(settings, costs=costs), tmp_path / "run")
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "run").exists()
@@ -292,7 +292,9 @@ def test_a_preset_with_costs_of_its_own_takes_those_of_the_run(
 ) -> None:
     own = hn.load_preset("paper", overrides=["planner.costs.clearance={}"])
     only = replace(settings, baselines=(), presets=(own,), pairs=5)
-    with pytest.raises(hn.InvalidValueError, match=r"preset paper plans by costs, and this run"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"preset paper plans by costs, and this run"
+    ):
         evaluate(replace(only, costs=()), tmp_path)
     evaluate(only, tmp_path)
     paper = outcome_of(load_study(tmp_path), "paper")

@@ -257,5 +257,5 @@ def test_a_data_frame_holds_what_the_tables_say(study):
 
 def test_a_data_frame_without_pandas_is_refused_in_one_line(study, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(hn.InvalidValueError, match=r"pip install 'hybridnav\[study\]'"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"pip install 'hybridnav\[study\]'"):
         to_frame(study)

@@ -29,7 +29,7 @@ PREPARE: Any = prepare_overlay
 PLANNERS: Any = hn.HybridPlanner
 BUILD: Any = hn
 CARRY: Any = carry_costs
-GRAPH = hn.build_route_graph(TOPOLOGY)
+GRAPH = hn.ext.graphs.build_route_graph(TOPOLOGY)
 
 CALLS: dict[str, Callable[[], object]] = {
     "grid is": lambda: JUDGES("office"),
@@ -63,7 +63,7 @@ CALLS: dict[str, Callable[[], object]] = {
 
 @pytest.mark.parametrize("words", CALLS)
 def test_a_value_of_a_wrong_type_ends_in_one_line(words: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=words) as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match=words) as refused:
         CALLS[words]()
     text = str(refused.value)
     assert "\n" not in text
@@ -144,7 +144,7 @@ def map_of(grid: hn.OccupancyGrid) -> hn.TopologicalMap:
 
 def test_a_preset_for_another_robot_is_refused_unless_the_radius_was_given() -> None:
     wide = hn.load_preset("paper", overrides=["pyramid.robot_radius_m=0.15"])
-    with pytest.raises(hn.InvalidValueError) as error:
+    with pytest.raises(hn.errors.InvalidValueError) as error:
         hn.HybridPlanner(map_of(arrays()), preset=wide)
     message = str(error.value)
     assert "0.15 m" in message

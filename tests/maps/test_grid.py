@@ -277,7 +277,7 @@ def test_a_mask_and_none_are_areas_too() -> None:
     mask[2, 3] = mask[4, 5] = True
     assert box_of_area(mask, frame, SHAPE) == (2, 5, 3, 6)
     assert cells_of(box_of_area(None, frame, SHAPE)).all()
-    with pytest.raises(hn.InvalidValueError, match="make it for this map"):
+    with pytest.raises(hn.errors.InvalidValueError, match="make it for this map"):
         box_of_area(mask.T, frame, SHAPE)
 
 

@@ -125,7 +125,7 @@ def test_what_is_closed_does_not_inflate_and_a_copy_stays_without_islands():
 
 @pytest.mark.parametrize("area_m2", [-1.0, math.nan, math.inf])
 def test_an_area_that_is_none_is_refused(area_m2):
-    with pytest.raises(hn.InvalidValueError, match="least area of an island"):
+    with pytest.raises(hn.errors.InvalidValueError, match="least area of an island"):
         hn.drop_islands(occupancy_grid(drawn("..")), area_m2)
 
 
@@ -180,7 +180,7 @@ def test_an_area_that_leaves_no_free_cell_is_told_as_that(raw_map, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-@pytest.mark.filterwarnings("default::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("default::hybridnav.errors.MapWarning")
 def test_thresholds_of_the_command_win_over_the_maps(raw_map, capsys):
     thresholds = ["--free-threshold", "0.2", "--occupied-threshold", "0.9"]
     assert run(["show", str(raw_map), *POINT, *thresholds]) == 0
@@ -194,7 +194,7 @@ def test_thresholds_of_the_command_win_over_the_maps(raw_map, capsys):
 def test_smooth_wins_over_the_preset(raw_map, capsys):
     query = ["plan", str(raw_map), "--start", "1.5,6.5", "--goal", "7.5,7.5", *POINT, "--json"]
     assert run([*query, "--smooth", "line-of-sight"]) == 2
-    assert "planner.smooth: unknown key; shortest has " in capsys.readouterr().err
+    assert "planner.smooth: no key of method shortest, but of " in capsys.readouterr().err
     query += ["--preset", "octile"]
     assert run([*query, "--smooth", "line-of-sight"]) == 0
     figures = json.loads(capsys.readouterr().out)

@@ -80,7 +80,7 @@ def test_without_a_path_there_are_no_alternatives():
 
 @pytest.mark.parametrize("count", [0, 21, 2.5, "3", None])
 def test_counts_out_of_range_are_refused(count):
-    with pytest.raises(hn.InvalidValueError, match="from 1 to 20"):
+    with pytest.raises(hn.errors.InvalidValueError, match="from 1 to 20"):
         by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)
 
 
@@ -101,7 +101,9 @@ def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path():
 
 @pytest.mark.parametrize("seconds", [0, -1.0, math.nan, "3"])
 def test_a_time_limit_that_is_no_limit_is_refused(seconds):
-    with pytest.raises(hn.InvalidValueError, match="a number of seconds above 0: leave it out"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="a number of seconds above 0: leave it out"
+    ):
         by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, time_limit_s=seconds)
 
 
@@ -161,7 +163,7 @@ def test_no_time_limit_counts_the_compilation_of_kernels(monkeypatch):
 @pytest.mark.parametrize("most_states", [0, -1, 1 << 27])
 def test_a_search_of_no_or_too_many_states_is_refused(most_states):
     with pytest.raises(
-        hn.InvalidValueError, match=r"expected a whole number from 1 to \d+: leave it out"
+        hn.errors.InvalidValueError, match=r"expected a whole number from 1 to \d+: leave it out"
     ):
         by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, most_states=most_states)
 
@@ -229,7 +231,7 @@ def test_alternatives_are_legal_paths_of_different_classes_the_optimum_first(cla
     if endpoints is None:
         return
     planner = planner_of(classes)
-    grid = planner.topology.grid
+    grid = planner.grid
     points = grid.frame.points_of(endpoints)
     best = planner.plan(*points)
     found = by_homotopy(planner, points[0], points[1], 4, least_hole_m2=0.0)
@@ -316,7 +318,7 @@ CORNERS = drawn(
 def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
     grid = replace(occupancy_grid(CORNERS), corner_cutting=True)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.5))
-    with pytest.raises(hn.InvalidValueError, match="corner cutting"):
+    with pytest.raises(hn.errors.InvalidValueError, match="corner cutting"):
         AlternativeSearch(topology)
     walks = RouteFinder(topology)
     free = np.argwhere(CORNERS == CellClass.FREE)
@@ -347,7 +349,7 @@ def test_walks_know_their_arcs_on_maps_of_one_column():
 def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
     pytest.importorskip("ompl")
     planner = planner_of(TWO_DOORS, "ompl")
-    with pytest.raises(hn.InvalidValueError, match="without OMPL"):
+    with pytest.raises(hn.errors.InvalidValueError, match="without OMPL"):
         by_homotopy(planner, (1.5, 1.5), (12.5, 2.5), 2)
     query: tuple[Any, ...] = (
         "plan",

@@ -104,7 +104,7 @@ class Case:
         topology = empty_map(self.frame, self.shape, self.radius_cells)
         try:
             return mask_of(Blocked(polygons=[self.area]), topology)
-        except hn.InvalidValueError as error:
+        except hn.errors.InvalidValueError as error:
             assert "must meet the map" in str(error)  # noqa: PT017 - many areas lie off the map
             return np.zeros(self.shape, dtype=np.bool_)
 
@@ -244,7 +244,7 @@ def test_holes_stay_open_and_points_make_a_polygon() -> None:
 def test_an_area_outside_the_map_is_refused(box: tuple[float, float, float, float]) -> None:
     topology = empty_map(Frame(), (7, 7), radius_cells=1.0)
     expected = "must meet the map, which spans x 0.00 to 7.00 m, y 0.00 to 7.00 m, got <POLYGON"
-    with pytest.raises(hn.InvalidValueError, match=expected):
+    with pytest.raises(hn.errors.InvalidValueError, match=expected):
         Blocked(polygons=[shapely.box(3, 3, 4, 4), shapely.box(*box)]).cells_of(topology)
 
 
@@ -484,7 +484,7 @@ def test_where_corners_may_be_cut_no_diagonal_slips_past_a_closed_arc() -> None:
 def test_a_self_loop_is_refused() -> None:
     island = map_of(drawn(".....", ".....", "..#..", ".....", "....."), merge_distance_m=50.0)
     (loop,) = np.flatnonzero(island.level.is_self_loop).tolist()
-    with pytest.raises(hn.InvalidValueError, match=f"arc {loop} of level .* is a self-loop"):
+    with pytest.raises(hn.errors.InvalidValueError, match=f"arc {loop} of level .* is a self-loop"):
         Blocked(arcs=[loop]).cells_of(island)
 
 
@@ -501,7 +501,7 @@ def test_a_self_loop_is_refused() -> None:
     ],
 )
 def test_what_the_map_does_not_have_is_refused(blocked: dict[str, Any], message: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=message):
+    with pytest.raises(hn.errors.InvalidValueError, match=message):
         as_blocked(blocked).cells_of(rooms())
 
 
@@ -515,7 +515,9 @@ def test_cells_of_any_integer_type_join_other_closures(dtype: Any) -> None:
 
 
 def test_a_map_without_arcs_says_so() -> None:
-    with pytest.raises(hn.InvalidValueError, match="there is no arc 0 on this map, it has none"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="there is no arc 0 on this map, it has none"
+    ):
         Blocked(arcs=[0]).cells_of(map_of(drawn("...")))
 
 
@@ -561,7 +563,7 @@ def test_a_map_without_arcs_says_so() -> None:
     ],
 )
 def test_what_cannot_be_closed_is_refused_in_one_line(blocked: Any, message: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=message) as caught:
+    with pytest.raises(hn.errors.InvalidValueError, match=message) as caught:
         as_blocked(blocked)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 250

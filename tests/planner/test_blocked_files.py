@@ -122,7 +122,7 @@ def test_hostile_geojson_ends_in_one_line(
 ) -> None:
     path = tmp_path / "works.geojson"
     path.write_bytes(data if isinstance(data, bytes) else json.dumps(data).encode())
-    with pytest.raises(hn.MapError) as caught:
+    with pytest.raises(hn.errors.MapError) as caught:
         hn.load_blocked(path, grid)
     assert str(caught.value).startswith(f"blocked {path}")
     assert words in str(caught.value)
@@ -149,7 +149,7 @@ def test_damaged_geojson_is_read_or_refused(
     path.write_bytes(bytes(content))
     try:
         blocked = hn.load_blocked(path, grid)
-    except hn.MapError as error:
+    except hn.errors.MapError as error:
         told = str(error)
     else:
         told = f"{len(closed_by(blocked, grid))} closed"
@@ -162,7 +162,9 @@ def test_an_endless_outline_is_refused_before_it_is_followed(tmp_path: Any) -> N
     up_and_down = [[10 + i / 100, 10 + 480 * (i % 4 in {1, 2})] for i in range(1000)]
     path = tmp_path / "works.geojson"
     path.write_text(json.dumps(geometry("LineString", up_and_down)))
-    with pytest.raises(hn.MapError, match=r"outlines of 24\d{4} cells on the map, at most 50000"):
+    with pytest.raises(
+        hn.errors.MapError, match=r"outlines of 24\d{4} cells on the map, at most 50000"
+    ):
         hn.load_blocked(path, grid)
     path.write_text(json.dumps(geometry("LineString", up_and_down[:150])))
     assert hn.load_blocked(path, grid).polygons
@@ -173,10 +175,10 @@ def test_an_endless_outline_is_refused_before_it_is_followed(tmp_path: Any) -> N
 
 def test_files_that_are_not_there_or_not_meant(grid: hn.OccupancyGrid, tmp_path: Any) -> None:
     for name in ("none.geojson", "none.png"):
-        with pytest.raises(hn.MapNotFoundError, match="no such file"):
+        with pytest.raises(hn.errors.MapNotFoundError, match="no such file"):
             hn.load_blocked(tmp_path / name, grid)
     (tmp_path / "works.txt").write_text("{}")
-    with pytest.raises(hn.MapError, match="not an image"):
+    with pytest.raises(hn.errors.MapError, match="not an image"):
         hn.load_blocked(tmp_path / "works.txt", grid)
 
 
@@ -203,7 +205,7 @@ def test_dark_pixels_of_a_mask_close_their_cells(tmp_path: Any, name: str) -> No
 def test_transparent_pixels_of_a_mask_close_nothing(grid: hn.OccupancyGrid, tmp_path: Any) -> None:
     image = np.zeros((*grid.shape, 4), dtype=np.uint8)
     Image.fromarray(image).save(tmp_path / "mask.png")
-    with pytest.raises(hn.MapError, match="the mask closes nothing"):
+    with pytest.raises(hn.errors.MapError, match="the mask closes nothing"):
         hn.load_blocked(tmp_path / "mask.png", grid)
     image[2, 4, 3] = 255
     Image.fromarray(image).save(tmp_path / "mask.png")
@@ -212,13 +214,15 @@ def test_transparent_pixels_of_a_mask_close_nothing(grid: hn.OccupancyGrid, tmp_
 
 def test_a_mask_that_does_not_fit_is_refused(grid: hn.OccupancyGrid, tmp_path: Any) -> None:
     Image.fromarray(np.zeros((9, 8), dtype=np.uint8)).save(tmp_path / "mask.png")
-    with pytest.raises(hn.MapError, match="a mask of 8 x 9 pixels, expected 9 x 8, those of"):
+    with pytest.raises(
+        hn.errors.MapError, match="a mask of 8 x 9 pixels, expected 9 x 8, those of"
+    ):
         hn.load_blocked(tmp_path / "mask.png", grid)
     Image.fromarray(grey(grid.shape, at={(1, 1): 205})).save(tmp_path / "mask.png")
-    with pytest.raises(hn.MapError, match=r"closes nothing, .* darkness of at least 0.65"):
+    with pytest.raises(hn.errors.MapError, match=r"closes nothing, .* darkness of at least 0.65"):
         hn.load_blocked(tmp_path / "mask.png", grid)
     (tmp_path / "mask.png").write_bytes((tmp_path / "mask.png").read_bytes()[:50])
-    with pytest.raises(hn.MapError, match=r"mask\.png"):
+    with pytest.raises(hn.errors.MapError, match=r"mask\.png"):
         hn.load_blocked(tmp_path / "mask.png", grid)
 
 

@@ -128,7 +128,7 @@ def test_bounds_hold_on_real_maps(data: Path, name: str) -> None:
     game = name.endswith(".map")
     with warnings.catch_warnings():
         # Some maps call grey free; they are planned on all the same.
-        warnings.simplefilter("ignore", hn.MapWarning)
+        warnings.simplefilter("ignore", hn.errors.MapWarning)
         grid = hn.load_map(data / name, robot_radius_m=0.0 if game else 0.25)
     distance_m = 40.0 if game else 4.0
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))

@@ -204,7 +204,7 @@ def test_ends_in_a_closed_room_are_named(
     planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = planners[preset]
-    inside, outside = planner.topology.grid.frame.points_of([(9, 2), (1, 7)])
+    inside, outside = planner.grid.frame.points_of([(9, 2), (1, 7)])
     closed = {"rooms": ["kitchen"]}
     assert planner.plan(inside, outside, blocked=closed).status is hn.PlanStatus.START_BLOCKED
     assert planner.plan(outside, inside, blocked=closed).status is hn.PlanStatus.GOAL_BLOCKED
@@ -220,7 +220,7 @@ def test_many_answers_are_those_of_one_whatever_is_closed(
     planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
 ) -> None:
     planner = planners[preset]
-    grid = planner.topology.grid
+    grid = planner.grid
     cells = np.random.default_rng(7).integers(-1, np.array(grid.shape) + 1, size=(2, 60, 2))
     starts, goals = grid.frame.points_of(cells)
     door = planner.topology.rooms.doors[0]
@@ -409,7 +409,7 @@ def test_what_names_nothing_is_refused(
     planners: dict[str, hn.HybridPlanner], preset: str, closed: Any, message: str
 ) -> None:
     planner = planners[preset]
-    start, goal = planner.topology.grid.frame.points_of([(9, 2), (9, 12)])
+    start, goal = planner.grid.frame.points_of([(9, 2), (9, 12)])
     asked = (
         lambda: planner.plan(start, goal, blocked=closed),
         lambda: planner.plan("kitchen", "lab", blocked=closed),
@@ -418,7 +418,7 @@ def test_what_names_nothing_is_refused(
         lambda: hn.plan_alternatives(planner, "kitchen", "lab", 2, blocked=closed),
     )
     for ask in asked:
-        with pytest.raises(hn.InvalidValueError, match=message) as caught:
+        with pytest.raises(hn.errors.InvalidValueError, match=message) as caught:
             ask()
         assert "\n" not in str(caught.value)
 
@@ -432,7 +432,9 @@ def test_a_door_of_another_map_is_refused() -> None:
         replace(door, number=2),
         replace(door, rooms=("attic", "kitchen")),
     ):
-        with pytest.raises(hn.InvalidValueError, match=f"door {other.number} is one of another"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match=f"door {other.number} is one of another"
+        ):
             Blocked(doors=[other]).cells_of(topology)
 
 
@@ -472,5 +474,5 @@ def test_what_is_closed_again_is_not_searched_for_again(
 def test_a_map_without_rooms_has_no_doors_to_close() -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(HOUSE)))
     for closed in (Blocked(doors=[1]), Blocked(rooms=["hall"])):
-        with pytest.raises(hn.InvalidValueError, match="has no rooms"):
+        with pytest.raises(hn.errors.InvalidValueError, match="has no rooms"):
             closed.cells_of(topology)

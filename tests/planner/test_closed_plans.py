@@ -77,7 +77,7 @@ def check_blocked(
     assert 0 <= result.lower_bound <= optimum_m * (1 + 1e-9)
     assert optimum_m <= result.cost * (1 + 1e-9)
     assert result.cost == pytest.approx(
-        recounted(result.path.cells) * planner.topology.grid.resolution_m, rel=1e-12
+        recounted(result.path.cells) * planner.grid.resolution_m, rel=1e-12
     )
     if epsilon is not None:
         assert result.gap <= epsilon + 1e-9
@@ -146,7 +146,7 @@ def test_an_any_angle_path_goes_round_a_closed_wall(preset: str) -> None:
     planner = hn.HybridPlanner(
         map_of(grid_of(np.ones((9, 20))), merge_distance_m=0.15), preset=preset
     )
-    grid = planner.topology.grid
+    grid = planner.grid
     wall = [(row, 10) for row in range(8)]
     start, goal = grid.frame.points_of_grid([(1.5, 1.5), (1.5, 18.5)])
     result = planner.plan(start, goal, smooth="line-of-sight", blocked={"cells": wall})
@@ -164,7 +164,7 @@ def test_an_any_angle_path_goes_round_a_closed_wall(preset: str) -> None:
 @presets
 def test_what_is_closed_may_be_said_in_every_form(preset: str) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS), merge_distance_m=0.35), preset=preset)
-    grid = planner.topology.grid
+    grid = planner.grid
     start, goal = grid.frame.points_of([(2, 2), (2, 12)])
     near, far = ((1, 7), (7, 7))
     square = grid.frame.points_of_grid([(1, 7), (1, 8), (2, 8), (2, 7)])
@@ -205,7 +205,7 @@ def test_an_end_that_is_closed_is_named(preset: str) -> None:
         assert result.status is status
         assert result.path is None
         assert result.lower_bound == math.inf
-        with pytest.raises(hn.PlanError, match=str(status)):
+        with pytest.raises(hn.errors.PlanError, match=str(status)):
             result.raise_for_status()
 
 
@@ -214,7 +214,7 @@ def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
     office_planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = office_planners[preset]
-    topology, grid = planner.topology, planner.topology.grid
+    topology, grid = planner.topology, planner.grid
     search, rerouted = GridSearch(grid.enterable()), 0
     for pair in sample_pairs(grid, 12, seed=2):
         endpoints = grid.frame.points_of([pair.start, pair.goal])
@@ -244,9 +244,9 @@ def test_a_closed_arc_is_not_passed(
     office_planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = office_planners[preset]
-    frame = planner.topology.grid.frame
+    frame = planner.grid.frame
     detours = 0
-    for pair in sample_pairs(planner.topology.grid, 8, seed=5, least_distance_m=8.0):
+    for pair in sample_pairs(planner.grid, 8, seed=5, least_distance_m=8.0):
         endpoints = frame.points_of([pair.start, pair.goal])
         before = planner.plan(*endpoints)
         if before.route is None or not before.route.arcs:
@@ -265,7 +265,7 @@ def test_what_is_closed_far_from_the_path_changes_nothing(
     office_planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = office_planners[preset]
-    grid = planner.topology.grid
+    grid = planner.grid
     for pair in sample_pairs(grid, 8, seed=11):
         endpoints = grid.frame.points_of([pair.start, pair.goal])
         before = planner.plan(*endpoints)
@@ -283,7 +283,7 @@ def test_what_is_closed_far_from_the_path_changes_nothing(
 @presets
 def test_a_diagonal_past_a_closed_cell_is_not_taken(preset: str) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(np.ones((3, 3)))), preset=preset)
-    start, goal = planner.topology.grid.frame.points_of([(0, 0), (1, 1)])
+    start, goal = planner.grid.frame.points_of([(0, 0), (1, 1)])
     assert planner.plan(start, goal).cost == pytest.approx(0.05 * math.sqrt(2))
     result = planner.plan(start, goal, blocked={"cells": [(0, 1)]})
     assert result.cost == pytest.approx(0.05 * 2)
@@ -309,8 +309,8 @@ def test_a_diagonal_past_a_closed_cell_is_not_taken(preset: str) -> None:
 )
 def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
-    start, goal = planner.topology.grid.frame.points_of([(2, 2), (2, 12)])
-    with pytest.raises(hn.InvalidValueError) as caught:
+    start, goal = planner.grid.frame.points_of([(2, 2), (2, 12)])
+    with pytest.raises(hn.errors.InvalidValueError) as caught:
         planner.plan(start, goal, blocked=blocked)
     assert str(caught.value).isprintable()
     assert planner.plan(start, goal).solved

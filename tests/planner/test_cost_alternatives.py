@@ -128,7 +128,9 @@ def test_costs_change_which_sequence_of_doors_comes_first() -> None:
 def test_classes_of_paths_by_costs_are_refused_in_one_line(options: Any) -> None:
     topology, layer = dear_door_map()
     planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
-    with pytest.raises(hn.InvalidValueError, match="this planner plans by costs: take by") as told:
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="this planner plans by costs: take by"
+    ) as told:
         hn.plan_alternatives(planner, (8.5, 4.5), (22.5, 4.5), 2, **options)
     assert "\n" not in str(told.value)
 

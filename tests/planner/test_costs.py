@@ -260,10 +260,10 @@ def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) ->
     topology = topology_of(hn.example_map("figure1"))
     layer = layer_of(np.ones(topology.grid.shape))
     message = f"preset {preset} cannot plan by costs: method "
-    with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)) as refused:
         hn.HybridPlanner(topology, preset=preset, costs=layer)
     assert "with grid-astar and" in str(refused.value)
-    with pytest.raises(hn.PresetError, match=r"planner\.costs: unknown key"):
+    with pytest.raises(hn.errors.PresetError, match=r"planner\.costs: no key of method"):
         hn.load_preset(preset, overrides=["planner.costs.clearance={}"])
 
 
@@ -276,7 +276,7 @@ def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) ->
 )
 def test_costs_of_another_map_are_refused(costs: Any, message: str) -> None:
     topology = topology_of(hn.example_map("figure1"))
-    with pytest.raises(hn.InvalidValueError, match=re.escape(message)):
+    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)):
         hn.HybridPlanner(topology, preset="grid-astar", costs=costs)
 
 
@@ -291,7 +291,7 @@ def test_costs_of_another_map_are_refused(costs: Any, message: str) -> None:
     ],
 )
 def test_settings_of_costs_out_of_range_are_refused(override: str, message: str) -> None:
-    with pytest.raises(hn.PresetError, match=re.escape(message)) as refused:
+    with pytest.raises(hn.errors.PresetError, match=re.escape(message)) as refused:
         hn.load_preset("grid-astar", overrides=[override])
     assert "\n" not in str(refused.value)
 

@@ -307,9 +307,9 @@ def test_presets_that_know_lengths_only_refuse_in_one_line(preset: str, cli: Any
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(grid_of(np.zeros((3, 4)), robot_radius_m=0))
     )
-    with pytest.raises(hn.InvalidValueError, match="knows lengths only") as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match="knows lengths only") as refused:
         hn.HybridPlanner(topology, preset=preset, costs=layer)
     assert "\n" not in str(refused.value)
     query = ("plan", "maps/figure1/figure1.yaml", "--start", "0.5,0.5", "--goal", "2,2.5")
     done = cli(*query, "--robot-radius", "0", "--preset", preset, "--costs", "clearance")
-    assert done.refuses(2, "knows lengths only")
+    assert done.refuses(2, "planner.costs: no key of method")

@@ -42,12 +42,12 @@ def test_no_sequence_of_doors_within_the_limits_is_shorter_than_the_second():
         floor = random_floor(rng)
         first, last = two_points(floor, rng)
         planner = planner_of(floor)
-        ends = planner.topology.grid.frame.points_of([first, last])
+        ends = planner.grid.frame.points_of([first, last])
         found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_overlap=0.5, max_stretch=3.0)
         if not found or found[0].path.length_m <= 0:
             continue
         best = math.inf
-        own = line_of(found[0].path).buffer(planner.topology.grid.resolution_m)
+        own = line_of(found[0].path).buffer(planner.grid.resolution_m)
         plain_doors = doors_by_cells(floor, found[0].path)
         darts = floor.darts(first, last)
         for tried, path in enumerate(nx.shortest_simple_paths(darts, "start", "goal", "weight")):
@@ -60,7 +60,7 @@ def test_no_sequence_of_doors_within_the_limits_is_shorter_than_the_second():
                 break
             if len(set(rooms)) < len(rooms) or doors == plain_doors:
                 continue
-            line = shapely.LineString(planner.topology.grid.frame.points_of(np.array(cells)))
+            line = shapely.LineString(planner.grid.frame.points_of(np.array(cells)))
             if line.intersection(own).length <= 0.45 * line.length:
                 best = length
                 break
@@ -79,7 +79,7 @@ def test_the_first_is_the_plain_plan_of_each_preset(preset):
     for _ in range(8):
         floor = random_floor(rng)
         planner = planner_of(floor, preset)
-        ends = planner.topology.grid.frame.points_of(two_points(floor, rng)) + 0.25
+        ends = planner.grid.frame.points_of(two_points(floor, rng)) + 0.25
         plain = planner.plan(*ends)
         found = hn.plan_alternatives(planner, ends[0], ends[1], 3)
         assert bool(found) == plain.solved
@@ -105,7 +105,7 @@ def test_closed_doors_and_rooms_are_closed_for_all_of_them():
     for _ in range(10):
         floor = random_floor(rng)
         planner = planner_of(floor, "shortest")
-        ends = planner.topology.grid.frame.points_of([(1, 1), (14, 14)])
+        ends = planner.grid.frame.points_of([(1, 1), (14, 14)])
         opened = hn.plan_alternatives(planner, ends[0], ends[1], 3)
         if len(opened) < 2 or not opened[1].doors:
             continue
@@ -196,7 +196,7 @@ def test_all_searches_inside_rooms_share_one_time_limit(monkeypatch):
     ],
 )
 def test_options_that_change_nothing_are_refused_in_one_line(ring, options, message):
-    with pytest.raises(hn.InvalidValueError) as told:
+    with pytest.raises(hn.errors.InvalidValueError) as told:
         hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **options)
     assert message in str(told.value)
     assert str(told.value).isprintable()
@@ -207,7 +207,7 @@ def test_options_that_change_nothing_are_refused_in_one_line(ring, options, mess
 )
 @pytest.mark.parametrize("where", [{"by": "homotopy"}, {"inside_rooms": True}])
 def test_limits_of_searches_for_classes_out_of_range_are_refused(ring, options, where):
-    with pytest.raises(hn.InvalidValueError, match=r"most_states|time_limit_s|hole"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"most_states|time_limit_s|hole"):
         hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **where, **options)
 
 
@@ -266,7 +266,7 @@ def test_without_a_path_the_note_has_the_status(ring):
     ],
 )
 def test_options_out_of_range_are_refused(ring, options, message):
-    with pytest.raises(hn.InvalidValueError) as caught:
+    with pytest.raises(hn.errors.InvalidValueError) as caught:
         hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **options)
     assert str(caught.value) == message
 
@@ -276,11 +276,11 @@ def test_ompl_plans_by_other_doors_too():
     rng = np.random.default_rng(5)
     floor = random_floor(rng)
     planner = planner_of(floor, "ompl")
-    ends = planner.topology.grid.frame.points_of([(1, 1), (13, 13)])
+    ends = planner.grid.frame.points_of([(1, 1), (13, 13)])
     found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_stretch=3.0)
     plain = planner.plan(*ends)
     assert found
     assert found[0].result.start == plain.start
     assert found[0].path.length_m == pytest.approx(plain.path.length_m)
-    with pytest.raises(hn.InvalidValueError, match="without OMPL"):
+    with pytest.raises(hn.errors.InvalidValueError, match="without OMPL"):
         hn.plan_alternatives(planner, ends[0], ends[1], 2, inside_rooms=True)

@@ -161,7 +161,7 @@ def test_rooms_survive_both_formats(
     folder = tmp_path_factory.mktemp("rooms")
     counts = [((label_of == i) & (classes == hn.CellClass.FREE)).sum() for i in range(len(few))]
     if 0 in counts:
-        with pytest.raises(hn.RoomsError, match="no free cell"):
+        with pytest.raises(hn.errors.RoomsError, match="no free cell"):
             hn.export_rooms(topology.rooms, folder / "r.csv")
         return
     hn.export_rooms(topology.rooms, folder / "r.csv")
@@ -244,26 +244,26 @@ def test_what_cannot_be_written_is_refused_in_one_line(
     export: Any, thing: Any, tmp_path: Path
 ) -> None:
     for name, kind, words in (
-        ("out.txt", hn.MapError, r"must end in \.csv"),
-        ("none/out.csv", hn.MapError, "cannot write: No such file"),
-        ("folder.csv", hn.MapError, "cannot write: Is a directory"),
+        ("out.txt", hn.errors.MapError, r"must end in \.csv"),
+        ("none/out.csv", hn.errors.MapError, "cannot write: No such file"),
+        ("folder.csv", hn.errors.MapError, "cannot write: Is a directory"),
     ):
         (tmp_path / "folder.csv").mkdir(exist_ok=True)
         with pytest.raises(kind, match=words) as error:
             export(thing, tmp_path / name)
         assert "\n" not in str(error.value)
     for frame in ("", None, 7):
-        with pytest.raises(hn.InvalidValueError, match="name of the map frame"):
+        with pytest.raises(hn.errors.InvalidValueError, match="name of the map frame"):
             export(thing, tmp_path / "out.geojson", frame=frame)
-    with pytest.raises(hn.InvalidValueError, match="expected a"):
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a"):
         export("nothing", tmp_path / "out.csv")
 
 
 def test_rooms_that_are_none_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(hn.InvalidValueError, match="expected a Rooms"):
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a Rooms"):
         hn.export_rooms(TOPOLOGY, tmp_path / "r.csv")  # type: ignore[arg-type]
     rooms = hn.RoomLabels(("a",), np.zeros((2, 4), int))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(GRID, rooms=rooms))
     for tolerance in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(hn.InvalidValueError, match="tolerance_m must be positive"):
+        with pytest.raises(hn.errors.InvalidValueError, match="tolerance_m must be positive"):
             hn.export_rooms(topology.rooms, tmp_path / "r.geojson", tolerance_m=tolerance)

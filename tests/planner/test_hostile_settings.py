@@ -99,7 +99,7 @@ def load(tmp_path):
     ],
 )
 def test_a_value_that_no_map_has_is_refused_in_one_line(load, values, words):
-    with pytest.raises(hn.MapError) as refused:
+    with pytest.raises(hn.errors.MapError) as refused:
         load(**values)
     assert words in str(refused.value)
     assert "a.yaml" in str(refused.value)
@@ -133,14 +133,14 @@ def test_a_number_in_yaml_is_that_number(number):
 def test_no_room_and_no_point_has_the_name_of_a_point(tmp_path, name):
     grid = hn.load_map(FIGURE, robot_radius_m=0)
     label_of = np.zeros(grid.shape, dtype=np.int32)
-    with pytest.raises(hn.InvalidValueError, match="must not read as a point"):
+    with pytest.raises(hn.errors.InvalidValueError, match="must not read as a point"):
         hn.RoomLabels((name,), label_of)
-    with pytest.raises(hn.InvalidValueError, match="must not read as a point"):
+    with pytest.raises(hn.errors.InvalidValueError, match="must not read as a point"):
         hn.RoomLabels(("hall",), label_of, {name: (0.5, 1.5)})
     path = tmp_path / "rooms.yaml"
     ring = [[0, 0], [4, 0], [4, 3], [0, 3]]
     path.write_text(json.dumps({"rooms": [{"name": name, "polygon": ring}]}))
-    with pytest.raises(hn.RoomsError, match="must not read as a point"):
+    with pytest.raises(hn.errors.RoomsError, match="must not read as a point"):
         hn.load_rooms(path, grid)
 
 
@@ -148,7 +148,7 @@ def test_no_room_and_no_point_has_the_name_of_a_point(tmp_path, name):
 def test_a_name_is_a_room_s_or_a_point_s_never_both(text):
     try:
         hn.RoomLabels((text,), np.zeros((1, 1), np.int32))
-    except hn.InvalidValueError:
+    except hn.errors.InvalidValueError:
         return
     assert read_point(text) is None
 

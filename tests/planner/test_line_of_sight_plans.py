@@ -39,7 +39,7 @@ def check_smooth(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanRes
     points = result.path.points
     assert np.array_equal(points[0], start)
     assert np.array_equal(points[-1], goal)
-    assert segment_faults(planner.topology.grid, points) == ()
+    assert segment_faults(planner.grid, points) == ()
     assert result.cost == pytest.approx(length_of_points(points), abs=1e-12)
     over_centres = np.concatenate([[start], plain.path.points[1:-1], [goal]])
     assert result.cost <= length_of_points(over_centres) * (1 + 1e-9) + 1e-12
@@ -74,7 +74,7 @@ def test_any_angle_paths_of_the_office(
     office_planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = office_planners[preset]
-    grid = planner.topology.grid
+    grid = planner.grid
     pairs = points_in(grid, np.random.default_rng(4), 40)
     results = [check_smooth(planner, start, goal) for start, goal in pairs]
     solved = [result.path for result in results if result.path is not None]
@@ -100,7 +100,7 @@ def test_the_presets_own_smooth_and_the_argument_agree(
 @presets
 def test_an_any_angle_path_inside_one_cell_is_the_line_itself(preset: str) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
-    start, goal = planner.topology.grid.frame.points_of_grid([(2.1, 3.2), (2.9, 3.9)])
+    start, goal = planner.grid.frame.points_of_grid([(2.1, 3.2), (2.9, 3.9)])
     result = check_smooth(planner, start, goal)
     assert result.cost == pytest.approx(0.05 * math.hypot(0.8, 0.7))
     assert result.gap == pytest.approx(0, abs=1e-12)
@@ -118,7 +118,7 @@ def test_an_any_angle_path_may_cross_unexplored_cells_where_they_may_be_entered(
     for preset in PRESETS:
         setting = hn.load_preset(preset, overrides=overrides)
         planner = hn.HybridPlanner(map_of(grid_of(classes), merge_distance_m=0.3), preset=setting)
-        start, goal = planner.topology.grid.frame.points_of_grid([(4.5, 2.5), (2.1, 27.5)])
+        start, goal = planner.grid.frame.points_of_grid([(4.5, 2.5), (2.1, 27.5)])
         result = planner.plan(start, goal).raise_for_status()
         assert result.path is not None
         assert len(result.path.points) == 2
@@ -129,6 +129,6 @@ def test_an_any_angle_path_may_cross_unexplored_cells_where_they_may_be_entered(
 @pytest.mark.parametrize("smooth", ["los", "", "LINE-OF-SIGHT", True])
 def test_a_smooth_that_does_not_exist_is_refused(preset: str, smooth: Any) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
-    start, goal = planner.topology.grid.frame.points_of([(2, 2), (2, 12)])
-    with pytest.raises(hn.HybridNavError, match=r"smooth.*line-of-sight"):
+    start, goal = planner.grid.frame.points_of([(2, 2), (2, 12)])
+    with pytest.raises(hn.errors.HybridNavError, match=r"smooth.*line-of-sight"):
         planner.plan(start, goal, smooth=smooth)

@@ -82,9 +82,9 @@ def test_areas_say_in_python_which_they_are(hall: hn.TopologicalMap) -> None:
     both = hn.Blocked(keepout=[box]) | hn.Blocked(polygons=[box])
     assert distance_m(planner.plan(START, GOAL, blocked=both)) >= RADIUS_M - 1e-9
     as_any: Any = box
-    with pytest.raises(hn.InvalidValueError, match="keepout must be a sequence of areas"):
+    with pytest.raises(hn.errors.InvalidValueError, match="keepout must be a sequence of areas"):
         hn.Blocked(keepout=as_any)
-    with pytest.raises(hn.InvalidValueError, match="must meet the map"):
+    with pytest.raises(hn.errors.InvalidValueError, match="must meet the map"):
         planner.plan(START, GOAL, blocked={"keepout": [shapely.box(8, 8, 9, 9)]})
 
 
@@ -155,7 +155,7 @@ def test_the_number_of_a_gap_is_no_door(office: hn.TopologicalMap) -> None:
     planner = hn.HybridPlanner(office)
     for number in (gap.number, 9999):
         with pytest.raises(
-            hn.InvalidValueError, match=f"no door has the number {number}"
+            hn.errors.InvalidValueError, match=f"no door has the number {number}"
         ) as caught:
             planner.plan((1.5, 2.0), (27.0, 14.5), blocked={"doors": [number]})
         assert "\n" not in str(caught.value)

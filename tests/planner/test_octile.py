@@ -140,7 +140,7 @@ def test_threads_may_ask_the_first_query_at_once() -> None:
 
 def assert_equal_on(path: Path, count: int) -> None:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", hn.MapWarning)
+        warnings.simplefilter("ignore", hn.errors.MapWarning)
         grid = hn.load_map(path, robot_radius_m=0.25)
     octile, whole = both(topology_of(grid))
     pairs = sample_pairs(grid, count, seed=0)

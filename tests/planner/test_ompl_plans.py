@@ -65,7 +65,7 @@ def planner_of(office: hn.TopologicalMap) -> Iterator[Any]:
 def test_every_planner_solves_the_office_near_the_optimum(planner_of: Any, name: str) -> None:
     planner = planner_of("ompl", f"planner={name}")
     result = planner.plan(*ENDS)
-    grid = planner.topology.grid
+    grid = planner.grid
     start, goal = (grid.frame.cell_of(*end) for end in ENDS)
     centres = grid.frame.points_of(np.array([start, goal]))
     exact = VisibilityGraph(grid).shortest(start, goal).length_m
@@ -236,9 +236,9 @@ def test_poses_are_refused_where_the_robot_does_not_fit(rooms: hn.TopologicalMap
     goal = (17.0, 9.0, 1.0)
     assert made.plan((0.5, 3.0, 0.0), goal).status is hn.PlanStatus.START_OCCUPIED
     assert made.plan(goal, (0.5, 3.0, 0.0)).status is hn.PlanStatus.GOAL_OCCUPIED
-    with pytest.raises(hn.InvalidValueError, match="start must be three finite numbers"):
+    with pytest.raises(hn.errors.InvalidValueError, match="start must be three finite numbers"):
         made.plan((2.0, 3.0), goal)
-    with pytest.raises(hn.InvalidValueError, match=r"goals .* poses .* shape \(n, 3\)"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"goals .* poses .* shape \(n, 3\)"):
         made.plan_many([goal], [(2.0, 3.0)])
     starts = [(2.0, 3.0, 0.5), (0.5, 3.0, 0.0), (2.0, 3.0, 0.5)]
     batch = made.plan_many(starts, [goal, goal, (3.0, 3.0, 0.0)])
@@ -250,7 +250,9 @@ def test_poses_are_refused_where_the_robot_does_not_fit(rooms: hn.TopologicalMap
 
 def test_a_map_inflated_by_more_than_the_robot_is_refused() -> None:
     grid = hn.OccupancyGrid(np.zeros((40, 40), np.float32), hn.Frame(0.1), robot_radius_m=0.4)
-    with pytest.raises(hn.OmplError, match=r"by 0.4 m, .* of 0.3 m: .* \(--robot-radius 0.3\)"):
+    with pytest.raises(
+        hn.errors.OmplError, match=r"by 0.4 m, .* of 0.3 m: .* \(--robot-radius 0.3\)"
+    ):
         long_robot(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "se2", "budget_s: 1")
 
 
@@ -261,7 +263,7 @@ def test_parameters_that_ompl_does_not_take_are_refused(office: hn.TopologicalMa
     ):
         settings = f"{{planner: {planner}, parameters: {{{parameters}}}}}"
         preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
-        with pytest.raises(hn.OmplError, match=words):
+        with pytest.raises(hn.errors.OmplError, match=words):
             hn.HybridPlanner(office, preset=preset)
 
 
@@ -297,7 +299,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
         "widened corridor",
         "grid path by line of sight",
     ]
-    with pytest.raises(hn.HybridNavError, match="no path was planned"):
+    with pytest.raises(hn.errors.HybridNavError, match="no path was planned"):
         result.raise_for_status()
 
 
@@ -338,7 +340,7 @@ topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
 assert hn.HybridPlanner(topology).plan((1, 1), (6, 6)).solved
 try:
     hn.HybridPlanner(topology, preset="ompl")
-except hn.OmplError as error:
+except hn.errors.OmplError as error:
     print(error)
 """
     done = subprocess.run(

@@ -20,7 +20,7 @@ EPSILONS = (None, 0.01, 0.05)
 
 
 def planned(planner, start, goal):
-    endpoints = planner.topology.grid.frame.points_of(np.array([start, goal]))
+    endpoints = planner.grid.frame.points_of(np.array([start, goal]))
     return planner.plan(endpoints[0], endpoints[1])
 
 

@@ -336,7 +336,7 @@ def test_a_progress_callback_may_change_costs(is_built: bool) -> None:  # noqa: 
 def test_an_area_of_a_change_that_is_none_is_refused_in_one_line(changed: Any) -> None:
     grid = halls()
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar")
-    with pytest.raises(hn.InvalidValueError, match="changed is") as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match="changed is") as refused:
         planner.update(costs=layer_of(np.ones(grid.shape)), changed=changed)
     assert "\n" not in str(refused.value)
     assert planner.costs is None
@@ -346,9 +346,9 @@ def test_an_area_of_a_change_that_is_none_is_refused_in_one_line(changed: Any) -
 def test_a_preset_that_knows_lengths_only_refuses_updates(preset: str) -> None:
     grid = halls()
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)
-    with pytest.raises(hn.InvalidValueError, match="cannot plan by costs"):
+    with pytest.raises(hn.errors.InvalidValueError, match="cannot plan by costs"):
         planner.update(costs=layer_of(np.ones(grid.shape)))
-    with pytest.raises(hn.InvalidValueError, match="are not those of a map of"):
+    with pytest.raises(hn.errors.InvalidValueError, match="are not those of a map of"):
         planner.update(costs=layer_of(np.ones((2, 2))))
 
 

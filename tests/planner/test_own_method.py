@@ -142,7 +142,7 @@ def test_a_changed_map_makes_the_method_anew() -> None:
 def test_a_class_that_is_no_method_is_refused_when_a_planner_is_made(
     topology: hn.TopologicalMap, name: str, message: str
 ) -> None:
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, name)
     assert str(caught.value).startswith(f"planner.method: mine:{name}: {message}")
 
@@ -159,7 +159,7 @@ def test_an_answer_that_is_none_is_refused(
     topology: hn.TopologicalMap, answer: Any, shown: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Faulty, "answer", answer)
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, "Faulty").plan(START, GOAL)
     assert str(caught.value).startswith(f"planner.method: mine:Faulty: find returned {shown}, exp")
 
@@ -167,7 +167,9 @@ def test_an_answer_that_is_none_is_refused(
 def test_costs_do_not_go_with_a_method_that_is_not_known(topology: hn.TopologicalMap) -> None:
     preset = hn.load_preset("paper", overrides=["planner.method=mine:ByCells"])
     layer = hn.CostLayer(np.ones(topology.grid.shape, np.float32))
-    with pytest.raises(hn.InvalidValueError, match="cannot plan by costs: method mine:ByCells"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="cannot plan by costs: method mine:ByCells"
+    ):
         hn.HybridPlanner(topology, preset=preset, costs=layer)
 
 
@@ -179,7 +181,7 @@ def test_a_path_at_any_angle_through_closed_cells_is_refused(
     path = planner.plan(START, GOAL).path
     assert path is not None
     cell = tuple(map(int, path.cells[len(path.cells) // 2]))
-    with pytest.raises(hn.PresetError, match="a path through closed cells"):
+    with pytest.raises(hn.errors.PresetError, match="a path through closed cells"):
         planner.plan(START, GOAL, blocked={"cells": [cell]})
 
 
@@ -196,5 +198,7 @@ def test_a_file_names_a_method_and_its_settings(preset_file: Path) -> None:
     again = preset_file.with_name("again.yaml")
     again.write_text(preset.to_yaml())
     assert hn.load_preset(again).planner == preset.planner
-    with pytest.raises(hn.PresetError, match=r"planner\.method: should be a class of your own"):
+    with pytest.raises(
+        hn.errors.PresetError, match=r"planner\.method: should be a class of your own"
+    ):
         hn.load_preset("paper", overrides=["planner.method='a b:C'"])

@@ -148,7 +148,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_line(
     topology: TopologicalMap, write: Write, code: str, name: str, words: str
 ) -> None:
     write("mine", code)
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, name)
     text = str(caught.value)
     assert text.startswith(f"planner.refine: {name}: ")
@@ -177,7 +177,7 @@ def test_an_answer_that_is_no_path_is_refused_in_one_line(
 ) -> None:
     write("faulty", FAULTS.format(answer=answer))
     planner = planner_of(topology, "faulty:Faulty")
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         planner.plan(START, GOAL)
     assert str(caught.value).startswith(f"planner.refine: faulty:Faulty: refine returned {words}")
     assert str(caught.value).isprintable()
@@ -185,18 +185,22 @@ def test_an_answer_that_is_no_path_is_refused_in_one_line(
 
 def test_a_path_outside_the_corridor_is_refused(topology: TopologicalMap) -> None:
     planner = planner_of(topology, f"{__name__}:Astray")
-    with pytest.raises(hn.PresetError, match="a path that leaves its corridor"):
+    with pytest.raises(hn.errors.PresetError, match="a path that leaves its corridor"):
         planner.plan(START, (0.5, 2.5))
 
 
 @pytest.mark.parametrize("name", ["mine", "mine:", ":C", "my file:C", "a..b:C", "a:C:D", "../a:C"])
 def test_only_names_of_classes_are_settings(name: str) -> None:
-    with pytest.raises(hn.PresetError, match="'grid-astar' or a class of your own, module:Class"):
+    with pytest.raises(
+        hn.errors.PresetError, match="'grid-astar' or a class of your own, module:Class"
+    ):
         hn.load_preset("paper", overrides=[f"planner.refine='{name}'"])
 
 
 def test_a_method_that_has_no_corridor_takes_no_class() -> None:
-    with pytest.raises(hn.PresetError, match=r"planner\.refine: unknown key; shortest has"):
+    with pytest.raises(
+        hn.errors.PresetError, match=r"planner\.refine: no key of method shortest, but of"
+    ):
         hn.load_preset("shortest", overrides=["planner.refine=mine:C"])
 
 

@@ -18,7 +18,7 @@ def test_many_answers_are_the_answers_one_by_one(
     office_planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
 ) -> None:
     planner = office_planners[preset]
-    grid = planner.topology.grid
+    grid = planner.grid
     rng = np.random.default_rng(6)
     pairs = points_in(grid, rng, 25)
     low, high = grid.frame.points_of_grid([(-5, -5), (grid.shape[0] + 5, grid.shape[1] + 5)])
@@ -54,7 +54,7 @@ def test_many_answers_are_the_answers_one_by_one(
 @pytest.mark.parametrize("preset", [*PRESETS, "shortest", "robot"])
 def test_a_path_from_a_point_to_itself_is_that_point_alone(preset: str) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
-    start, goal = planner.topology.grid.frame.points_of([(2, 3), (3, 12)])
+    start, goal = planner.grid.frame.points_of([(2, 3), (3, 12)])
     batch = planner.plan_many([start, start, goal], [start, goal, goal])
     for query, end in ((0, start), (2, goal)):
         assert batch.path(query).tolist() == [end.tolist()]
@@ -69,7 +69,7 @@ def test_many_takes_lists_and_nothing_at_all(
     office_planners: dict[str, hn.HybridPlanner], preset: str
 ) -> None:
     planner = office_planners[preset]
-    (start, goal), *_ = points_in(planner.topology.grid, np.random.default_rng(7), 1)
+    (start, goal), *_ = points_in(planner.grid, np.random.default_rng(7), 1)
     one = planner.plan_many([start.tolist()], [tuple(goal)])
     assert one.cost.tolist() == [planner.plan(start, goal).cost]
     nothing: Any
@@ -100,6 +100,6 @@ def test_many_takes_lists_and_nothing_at_all(
 def test_many_refuses_what_are_no_points(
     office_planners: dict[str, hn.HybridPlanner], starts: Any, goals: Any, message: str
 ) -> None:
-    with pytest.raises(hn.InvalidValueError, match=message) as caught:
+    with pytest.raises(hn.errors.InvalidValueError, match=message) as caught:
         office_planners["octile"].plan_many(starts, goals)
     assert str(caught.value).isprintable()

@@ -91,7 +91,7 @@ def test_an_end_that_cannot_be_planned_from_is_named(
     assert result.route is None
     assert result.cost == result.lower_bound == math.inf
     assert math.isnan(result.gap)
-    with pytest.raises(hn.PlanError, match=status):
+    with pytest.raises(hn.errors.PlanError, match=status):
         result.raise_for_status()
 
 
@@ -155,7 +155,9 @@ def test_what_is_no_point_is_an_error_of_one_line(point: Any) -> None:
         ("goal", lambda: planner.plan((1.0, 1.0), point)),
     ]
     for name, plan in plans:
-        with pytest.raises(hn.InvalidValueError, match=f"^{name} must be two finite") as raised:
+        with pytest.raises(
+            hn.errors.InvalidValueError, match=f"^{name} must be two finite"
+        ) as raised:
             plan()
         assert "\n" not in str(raised.value)
 
@@ -368,7 +370,7 @@ def test_a_preset_is_a_name_a_file_or_an_object(tmp_path: Path) -> None:
         assert result.settings["preset"] == "mine"
         assert result.cost == whole.cost
     assert hn.HybridPlanner(topology).preset.name == "shortest"
-    with pytest.raises(hn.PresetNotFoundError, match="no preset is called 'papers'"):
+    with pytest.raises(hn.errors.PresetNotFoundError, match="no preset is called 'papers'"):
         hn.HybridPlanner(topology, preset="papers")
 
 

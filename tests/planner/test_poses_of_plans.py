@@ -138,7 +138,9 @@ def test_a_yaw_that_is_no_number_is_refused(
     planner = hn.HybridPlanner(two_rooms, preset=preset)
     one, other = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
     for ask in (planner.plan, planner.draft):
-        with pytest.raises(hn.InvalidValueError, match=r"goal must be .* radians, got") as caught:
+        with pytest.raises(
+            hn.errors.InvalidValueError, match=r"goal must be .* radians, got"
+        ) as caught:
             ask(one, (*other, yaw))
         assert "\n" not in str(caught.value)
 

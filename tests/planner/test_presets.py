@@ -29,7 +29,7 @@ def write(tmp_path):
 
 def _problem(source, *overrides):
     """Text of the error that a preset makes: one line."""
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         hn.load_preset(source, overrides=overrides)
     text = str(caught.value)
     assert text.isprintable()
@@ -83,7 +83,7 @@ def test_the_files_state_both_sections_and_only_known_keys(name):
 
 def test_an_unknown_name_lists_the_names_there_are(monkeypatch, write):
     monkeypatch.chdir(write("planner: {}\n", "mine.yaml").parent)
-    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*octile, ompl, .*with \.yaml"):
+    with pytest.raises(hn.errors.PresetNotFoundError, match=r"'mine'.*octile, ompl, .*with \.yaml"):
         hn.load_preset("mine")
     with pytest.raises(FileNotFoundError, match="''"):
         hn.load_preset("")
@@ -99,7 +99,7 @@ def test_what_has_a_suffix_or_a_separator_is_a_path(write, monkeypatch):
     assert not any(map(is_preset_name, ("./paper", "paper.yaml", "a/paper", path)))
     assert is_preset_name("grid-astar")
     for gone in ("paper.yaml", "./paper", "no/such/paper"):
-        with pytest.raises(hn.PresetNotFoundError, match="no such file"):
+        with pytest.raises(hn.errors.PresetNotFoundError, match="no such file"):
             hn.load_preset(gone)
 
 

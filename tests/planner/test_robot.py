@@ -195,11 +195,11 @@ def test_no_share_of_the_path_of_cells_bounds_paths_between_posts() -> None:
 
 def test_lengths_know_no_arcs() -> None:
     planner = hn.HybridPlanner(topology_of(hn.example_map("figure1")), preset="octile")
-    with pytest.raises(hn.InvalidValueError, match="rounds bends of paths by costs"):
+    with pytest.raises(hn.errors.InvalidValueError, match="rounds bends of paths by costs"):
         planner.plan((0.5, 0.5), (2.0, 2.5), smooth="arcs")
-    with pytest.raises(hn.PresetError, match=r"planner\.smooth: should be 'none' or"):
+    with pytest.raises(hn.errors.PresetError, match=r"planner\.smooth: should be 'none' or"):
         hn.load_preset("octile", overrides=["planner.smooth=arcs"])
-    with pytest.raises(hn.PresetError, match="turning_radius_m"):
+    with pytest.raises(hn.errors.PresetError, match="turning_radius_m"):
         hn.load_preset("robot", overrides=["planner.turning_radius_m=0"])
 
 

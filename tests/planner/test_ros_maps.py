@@ -37,7 +37,7 @@ def ros_maps() -> list[str]:
 
 
 @dataclass(frozen=True)
-class Site:
+class KnownMap:
     """A map, the cells that may be entered found by other means, and their components."""
 
     topology: hn.TopologicalMap
@@ -45,11 +45,11 @@ class Site:
     component: Any
 
     @classmethod
-    def of(cls, path: Path) -> Site:
+    def of(cls, path: Path) -> KnownMap:
         """Load a map twice, raw and inflated, and build its topological map."""
         with warnings.catch_warnings():
             # Some maps call grey free; they are planned on all the same.
-            warnings.simplefilter("ignore", hn.MapWarning)
+            warnings.simplefilter("ignore", hn.errors.MapWarning)
             raw = hn.load_map(path, robot_radius_m=0)
             grid = hn.load_map(path, robot_radius_m=RADIUS_M)
         blocked = inflated(raw.classes == CellClass.OCCUPIED, RADIUS_M / raw.resolution_m)
@@ -82,7 +82,7 @@ def test_the_reference_data_lists_43_maps(data: Path) -> None:
 def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(
     data: Path, name: str
 ) -> None:
-    site = Site.of(data / name)
+    site = KnownMap.of(data / name)
     grid = site.topology.grid
     assert np.array_equal(grid.classes == CellClass.FREE, site.enterable)
     hybrid = hn.HybridPlanner(site.topology, preset="paper")
@@ -103,7 +103,7 @@ def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(
             compare(result, whole.plan(start, goal), site, pair)
 
 
-def judge(result: hn.PlanResult, site: Site, pair: Cells) -> None:
+def judge(result: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
     """Assert what a user may take for granted of a solved plan."""
     path, route, topology = result.path, result.route, site.topology
     assert path is not None
@@ -129,7 +129,7 @@ def judge(result: hn.PlanResult, site: Site, pair: Cells) -> None:
     assert result.stats.corridor_cells == topology.level.areas[np.unique(places)].sum()
 
 
-def compare(hybrid: hn.PlanResult, whole: hn.PlanResult, site: Site, pair: Cells) -> None:
+def compare(hybrid: hn.PlanResult, whole: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
     """Assert that the whole grid's answer agrees with the hybrid one and is never longer."""
     assert whole.status is hybrid.status
     if whole.path is None:

@@ -19,24 +19,36 @@ EXACT = "planner.epsilon=0"
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("paper", "planner.epsilon=0.1", "planner.epsilon: unknown key; paper has "),
-        ("grid-astar", "planner.epsilon=0", "planner.epsilon: unknown key; grid-astar has "),
+        ("paper", "planner.epsilon=0.1", "planner.epsilon: no key of method paper, but of "),
+        (
+            "grid-astar",
+            "planner.epsilon=0",
+            "planner.epsilon: no key of method grid-astar, but of ",
+        ),
         (
             "paper",
             "planner.refine=stored-paths",
             "planner.refine: should be 'grid-astar' or a class",
         ),
-        ("octile", "planner.epsilon=0.1", "planner.epsilon: unknown key; octile has "),
-        ("octile", "planner.refine=grid-astar", "planner.refine: unknown key; octile has "),
-        ("octile", "planner.refine=gates", "planner.refine: unknown key; octile has "),
+        ("octile", "planner.epsilon=0.1", "planner.epsilon: no key of method octile, but of "),
+        ("octile", "planner.refine=grid-astar", "planner.refine: no key of method octile, but of "),
+        ("octile", "planner.refine=gates", "planner.refine: no key of method octile, but of "),
         ("octile", "planner.method=fast", "planner.method: should be one of 'shortest', "),
         ("octile", "planner.method=[1]", "planner.method: should be one of 'shortest', "),
         ("octile", "planner.coarse=fast", "coarse is gone: write method, one of shortest, "),
         ("octile", "planner.coarse=[]", "coarse is gone: write method, one of shortest, "),
         ("octile", "planner.smooth=arcs", "planner.smooth: "),
-        ("shortest", "planner.refine=grid-astar", "planner.refine: unknown key; shortest has "),
-        ("shortest", "planner.smooth=line-of-sight", "planner.smooth: unknown key; shortest has "),
-        ("robot", "planner.refine=a:C", "planner.refine: unknown key; cheapest has "),
+        (
+            "shortest",
+            "planner.refine=grid-astar",
+            "planner.refine: no key of method shortest, but of ",
+        ),
+        (
+            "shortest",
+            "planner.smooth=line-of-sight",
+            "planner.smooth: no key of method shortest, but of ",
+        ),
+        ("robot", "planner.refine=a:C", "planner.refine: no key of method cheapest, but of "),
         *itertools.product(["paper", "octile"], ["planner.smooth=los"], ["planner.smooth: "]),
         ("octile", "planner.smooth=true", "planner.smooth: "),
         ("octile", "planner.smooth=", "planner.smooth: "),
@@ -49,7 +61,7 @@ EXACT = "planner.epsilon=0"
 def test_settings_that_do_not_go_together_are_refused(
     preset: str, override: str, message: str
 ) -> None:
-    with pytest.raises(hn.PresetError) as caught:
+    with pytest.raises(hn.errors.PresetError) as caught:
         hn.load_preset(preset, overrides=[override])
     assert message in str(caught.value)
     assert str(caught.value).isprintable()

@@ -133,7 +133,7 @@ def test_a_map_whose_corners_may_be_cut_is_refused() -> None:
     probability = occupancy_grid(drawn(".#", "#.")).probability
     grid = hn.OccupancyGrid(probability, FRAMES[0], robot_radius_m=0, corner_cutting=True)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    with pytest.raises(hn.InvalidValueError, match="preset grid-astar"):
+    with pytest.raises(hn.errors.InvalidValueError, match="preset grid-astar"):
         shortest(topology)
 
 

@@ -303,7 +303,7 @@ def floor(data):
 
 def pairs_of(planner, count):
     """Pairs of points on the largest connected part of a map, drawn with a seed."""
-    grid = planner.topology.grid
+    grid = planner.grid
     labels, _ = ndimage.label(grid.classes == hn.CellClass.FREE)
     cells = np.argwhere(labels == np.bincount(labels[labels > 0]).argmax())
     chosen = np.random.default_rng(19).choice(len(cells), (count, 2))

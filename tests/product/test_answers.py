@@ -28,6 +28,6 @@ def test_files_and_commands_are_what_they_were(part):
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", MAPS)
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 def test_pyramids_rooms_and_plans_of_a_map_are_what_they_were(name):
     assert list(differences(map_answers(MAPS[name], name), EXPECTED)) == []

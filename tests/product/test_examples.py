@@ -21,7 +21,7 @@ _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 _FINDER = doctest.DocTestFinder(recurse=False)
 
 RETURNED = {
-    "harness.baselines.Method",
+    "harness.baselines.Solver",
     "pyramid.CombinatorialMap",
     "harness.Study",
     "ext.classes.ClassPath",
@@ -87,7 +87,7 @@ OTHERS = [
     "RoomLabels.at",
     "TopologicalMap.local_grid",
     "TopologicalMap.transform",
-    "WaypointGraph.from_networkx",
+    "ext.graphs.WaypointGraph.from_networkx",
     "search.octile.JumpSearch.renewed",
     "ext.live.RoomsUpdate.closed_doors",
     "refine.curves.shortest_curve",

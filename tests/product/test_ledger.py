@@ -60,7 +60,8 @@ def is_there(name):
             parts.insert(0, last)
             continue
         for part in parts:
-            if not hasattr(found, part):
+            # The package answers to names of earlier versions too, with a warning.
+            if not (part in dir(found) if found is hn else hasattr(found, part)):
                 return False
             found = getattr(found, part)
         return True

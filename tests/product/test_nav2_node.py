@@ -62,7 +62,7 @@ def node(
 def posed(node: Any, at: Any, yaw: float) -> Any:
     """A stamped pose at a position (row, col) in cells."""
     found: Any = ros_stand_in.message("geometry_msgs/PoseStamped")()
-    x, y = node.planner.topology.grid.frame.points_of_grid(at).tolist()
+    x, y = node.planner.grid.frame.points_of_grid(at).tolist()
     found.pose.position.x, found.pose.position.y = x, y
     found.pose.orientation.z, found.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
     found.header.frame_id = "map"
@@ -97,9 +97,7 @@ def test_a_path_is_that_of_the_planner(actions: Any, node: Any) -> None:
     assert (status, result.error_code, result.error_msg) == ("succeeded", 0, "")
     start, end = place(goal.start.pose.position), place(goal.goal.pose.position)
     poses = result.path.poses
-    planner = hn.HybridPlanner(
-        hn.TopologicalMap(hn.DualGraphPyramid.build(node.planner.topology.grid))
-    )
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(node.planner.grid)))
     expected = planner.plan(start, end).path
     assert expected is not None
     turns = [2 * math.atan2(pose.pose.orientation.z, pose.pose.orientation.w) for pose in poses]
@@ -206,7 +204,7 @@ def test_a_route_is_the_shortest_of_the_exported_graph(
     actions: Any, node: Any, tmp_path: Path
 ) -> None:
     """By a reader of Nav2's file, and networkx on what it read."""
-    hn.export_nav2(node.graph, tmp_path / "graph.geojson")
+    hn.ext.graphs.export_nav2(node.graph, tmp_path / "graph.geojson")
     file = read_nav2(tmp_path / "graph.geojson")
     network: Any = nx.DiGraph()
     for number, (tail, head) in file.edges.items():
@@ -249,7 +247,7 @@ def test_a_route_between_poses_runs_between_nodes_near_them(actions: Any, node: 
     away += [math.dist(last, place(goal.goal.pose.position))]
     assert max(away) < 2.0
     # The start lies left of the wall, and so does its node: the nearest by path, not by air.
-    cols = node.planner.topology.grid.frame.cells_of([first, last])[:, 1]
+    cols = node.planner.grid.frame.cells_of([first, last])[:, 1]
     assert cols[0] < 31 < cols[1]
 
 

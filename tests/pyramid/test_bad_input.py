@@ -58,7 +58,7 @@ def _close_figures():
 @pytest.mark.parametrize("distance", [0, 0.0, -0.0, -1e-9, -4.0, -math.inf, math.nan, np.nan])
 def test_a_merge_distance_is_positive(distance):
     with pytest.raises(
-        hn.InvalidValueError, match=r"merge distance .* got -?[\dn]|got -inf"
+        hn.errors.InvalidValueError, match=r"merge distance .* got -?[\dn]|got -inf"
     ) as error:
         built([".."], merge_distance_m=distance)
     assert "\n" not in str(error.value)
@@ -66,7 +66,7 @@ def test_a_merge_distance_is_positive(distance):
 
 @pytest.mark.parametrize("linkage", ["single", "", "RADIUS", "radius ", None, 0])
 def test_an_unknown_linkage_is_named_with_those_there_are(linkage):
-    with pytest.raises(hn.InvalidValueError, match="survivor, radius, diameter") as error:
+    with pytest.raises(hn.errors.InvalidValueError, match="survivor, radius, diameter") as error:
         built([".."], linkage=linkage)
     assert repr(linkage) in str(error.value)
 
@@ -180,7 +180,7 @@ def test_a_map_without_a_vertex_has_one_level_of_empty_arrays(lines, linkage):
     assert topology.areas_m2.tolist() == topology.place_ids.tolist() == []
     assert topology.unexplored_islands() == []
     for ask in (topology.encloses, topology.enclosed_by, level.receptive_field, level.boundary):
-        with pytest.raises(hn.InvalidValueError, match="got 0"):
+        with pytest.raises(hn.errors.InvalidValueError, match="got 0"):
             ask(0)
 
 
@@ -240,13 +240,15 @@ def test_any_whole_number_is_a_seed(seed, linkage):
 
 @pytest.mark.parametrize("seed", [0.5, math.nan, math.inf, "1", None])
 def test_a_seed_is_a_whole_number(seed):
-    with pytest.raises(hn.InvalidValueError, match="seed"):
+    with pytest.raises(hn.errors.InvalidValueError, match="seed"):
         built([".."], seed=seed)
 
 
 @pytest.mark.parametrize("distance", ["4", None, [4.0], 4 + 0j])
 def test_a_merge_distance_is_a_number(distance):
-    with pytest.raises(hn.InvalidValueError, match="merge distance must be a positive number"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="merge distance must be a positive number"
+    ):
         built([".."], merge_distance_m=distance)
 
 
@@ -262,7 +264,7 @@ def test_regions_take_any_whole_number(most_cells):
     pyramid = built(["......"], merge_distance_m=2.0)
     assert pyramid.with_regions(most_cells).region_cells == 3
     for wrong in (0, -1, 2.0, True, "3", None):
-        with pytest.raises(hn.InvalidValueError, match="expected a whole number >= 1"):
+        with pytest.raises(hn.errors.InvalidValueError, match="expected a whole number >= 1"):
             pyramid.with_regions(wrong)
 
 

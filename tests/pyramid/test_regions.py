@@ -206,7 +206,7 @@ def test_regions_meet_at_the_door() -> None:
 
 def test_a_pyramid_has_regions_only_when_asked_and_shares_the_levels_below() -> None:
     pyramid = hn.DualGraphPyramid.build(occupancy_grid(TWO_ROOMS), merge_distance_m=2.5)
-    with pytest.raises(hn.InvalidValueError, match=r"no regions: use pyramid\.with_regions"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"no regions: use pyramid\.with_regions"):
         _ = pyramid.region_level
     larger = pyramid.with_regions(40)
     assert len(larger) > len(pyramid) == pyramid.place_level + 1
@@ -221,7 +221,9 @@ def test_a_pyramid_has_regions_only_when_asked_and_shares_the_levels_below() -> 
 @pytest.mark.parametrize("most_cells", [0, -3, 2.0, True, None, "12"])
 def test_a_size_that_is_no_number_of_cells_is_refused(most_cells: Any) -> None:
     pyramid = hn.DualGraphPyramid.build(occupancy_grid(TWO_ROOMS))
-    with pytest.raises(hn.InvalidValueError, match=r"regions have at most .*, expected a whole"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"regions have at most .*, expected a whole"
+    ):
         pyramid.with_regions(most_cells)
 
 
@@ -260,7 +262,7 @@ def test_regions_that_are_none_are_refused(change: Any, message: str) -> None:
     places, made = pyramid[-1], pyramid.with_regions(40)
     known = made[made.region_level].field_of[tuple(places.cells.T)]
     most = 40 if "cells" in message else 100
-    with pytest.raises(hn.InvalidValueError, match=message) as error:
+    with pytest.raises(hn.errors.InvalidValueError, match=message) as error:
         pyramid.with_regions(most, region_of=change(known))
     assert "\n" not in str(error.value)
 

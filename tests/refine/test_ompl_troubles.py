@@ -60,10 +60,10 @@ def troubled(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Make queries troubled from now on; without a kind no more."""
 
     def arm(trouble: str | None, *, after_path: bool = False) -> None:
-        made = hn.refine.ompl.Query if trouble is None else partial(
+        made = hn.refine.ompl.OmplQuery if trouble is None else partial(
             TroubledQuery, trouble=trouble, after_path=after_path
         )  # fmt: skip
-        monkeypatch.setattr("hybridnav.planner.methods.ompl.Query", made)
+        monkeypatch.setattr("hybridnav.planner.methods.ompl.OmplQuery", made)
 
     return arm
 
@@ -119,7 +119,7 @@ def test_what_was_found_before_the_trouble_counts(
     assert result.refinement.by_grid is False
     assert result.refinement.steps[-1] in {REASONS[trouble], LATE}
     assert result.path is not None
-    assert segment_faults(planner.topology.grid, result.path.points) == ()
+    assert segment_faults(planner.grid, result.path.points) == ()
     assert result.lower_bound <= result.cost
 
 
@@ -192,13 +192,13 @@ def test_nothing_outlives_a_planner_that_is_killed(tmp_path: Path) -> None:
 import hybridnav as hn
 from functools import partial
 from benchmarks.worlds import office_world
-from hybridnav.planner import ompl_plans
+from hybridnav.planner.methods import ompl
 from tests.refine.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
 preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])
 planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
 print(planner._now.ompl._worker._running.process.pid, flush=True)
-ompl_plans.Query = TroubledQuery
+ompl.OmplQuery = TroubledQuery
 planner.plan(*{ENDS})
 """
     env = os.environ | {"PYTHONPATH": str(ROOT)}

@@ -5,11 +5,11 @@ import signal
 from dataclasses import dataclass
 from typing import Any
 
-from hybridnav.refine.ompl import Query
+from hybridnav.refine.ompl import OmplQuery
 
 
 @dataclass(frozen=True, eq=False)
-class TroubledQuery(Query):
+class TroubledQuery(OmplQuery):
     """Trouble comes when the search begins, or when the first path is to be simplified."""
 
     trouble: str = "hang"

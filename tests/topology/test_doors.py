@@ -134,10 +134,10 @@ def test_a_door_is_found_by_its_number():
     grid, labels = flat()
     rooms = rooms_of(grid, labels)
     assert [rooms.door(n) for n in (1, 2)] == list(rooms.doors)
-    with pytest.raises(hn.InvalidValueError, match="number 39: the doors are 1-2"):
+    with pytest.raises(hn.errors.InvalidValueError, match="number 39: the doors are 1-2"):
         rooms.door(39)
     alone = rooms_of(grid, RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32)))
-    with pytest.raises(hn.InvalidValueError, match="no doors"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no doors"):
         alone.door(1)
 
 
@@ -185,7 +185,9 @@ def test_a_room_that_the_robot_does_not_fit_in_stays_a_room(tmp_path):
     (door,) = rooms.doors
     assert (door.rooms, door.passable) == (("hall", "shaft"), False)
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))
-    with pytest.raises(hn.InvalidValueError, match="room 'shaft' has no free cell for this robot"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="room 'shaft' has no free cell for this robot"
+    ):
         planner.plan("hall", "shaft")
 
 
@@ -256,7 +258,7 @@ def test_numbers_that_are_known_survive_any_file(tmp_path_factory, scene, shift)
     path = tmp_path_factory.mktemp("doors") / "rooms.yaml"
     try:
         hn.save_rooms(path, known, grid)
-    except hn.RoomsError:
+    except hn.errors.RoomsError:
         return  # a room without a cell
     first = rooms_of(grid, hn.load_rooms(path, grid))
     hn.save_rooms(path, first.labels, grid)

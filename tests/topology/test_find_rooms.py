@@ -156,10 +156,10 @@ def test_a_map_without_free_cells_has_no_rooms(method):
 
 def test_unknown_methods_and_areas_are_refused():
     grid = hn.OccupancyGrid(np.zeros((5, 5), np.float32))
-    with pytest.raises(hn.InvalidValueError, match="judged, walls, watershed"):
+    with pytest.raises(hn.errors.InvalidValueError, match="judged, walls, watershed"):
         hn.find_rooms(grid, method="magic")  # type: ignore[arg-type]
     for area_m2 in (0.0, -1.0, math.nan, math.inf, 1e308):
-        with pytest.raises(hn.InvalidValueError, match="positive"):
+        with pytest.raises(hn.errors.InvalidValueError, match="positive"):
             hn.find_rooms(grid, least_area_m2=area_m2)
 
 
@@ -276,7 +276,7 @@ def test_a_hall_that_the_border_cuts_off_stays_a_room():
     [("bwi_gdc/3/3.yaml", True), ("nav2/maps/depot.yaml", False)],
 )
 @pytest.mark.full
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 def test_the_frame_of_a_real_image_is_no_room(data, name, outside):
     rooms = hn.find_rooms(hn.load_map(data / name))
     rim = np.concatenate([rooms.label_of[0], rooms.label_of[-1]])

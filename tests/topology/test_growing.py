@@ -143,9 +143,9 @@ def test_a_resistance_of_another_map_or_with_rooms_is_refused():
         label_of = np.zeros((side, side), dtype=np.int32)
         return Growth(segments_of(np.ones((side, side), dtype=bool), label_of), [Small(4)])
 
-    with pytest.raises(hn.InvalidValueError, match=r"resistance was given .* not of"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"resistance was given .* not of"):
         hn.DualGraphPyramid.build(grid, resistance=growth(2))
-    with pytest.raises(hn.InvalidValueError, match="resistance was given with rooms"):
+    with pytest.raises(hn.errors.InvalidValueError, match="resistance was given with rooms"):
         hn.DualGraphPyramid.build(grid, resistance=growth(3), rooms=rooms)
 
 

@@ -92,9 +92,9 @@ def test_a_local_map_is_a_map_that_plans_are_made_on() -> None:
 def test_there_are_maps_of_places_and_transforms_of_arcs_alone(index: int) -> None:
     grid = hn.OccupancyGrid(np.zeros((3, 3), np.float32), robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    with pytest.raises(hn.InvalidValueError, match="place must be from 0 to 0"):
+    with pytest.raises(hn.errors.InvalidValueError, match="place must be from 0 to 0"):
         topology.local_grid(index)
-    with pytest.raises(hn.InvalidValueError, match="place must be from 0 to 0"):
+    with pytest.raises(hn.errors.InvalidValueError, match="place must be from 0 to 0"):
         topology.local_pose(index)
-    with pytest.raises(hn.InvalidValueError, match="arc must be from 0 to -1"):
+    with pytest.raises(hn.errors.InvalidValueError, match="arc must be from 0 to -1"):
         topology.transform(index)

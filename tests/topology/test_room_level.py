@@ -128,7 +128,7 @@ def test_what_lies_in_no_room_is_a_vertex_without_a_name():
 def test_a_pyramid_without_rooms_says_so_and_ends_at_its_places():
     pyramid = hn.DualGraphPyramid.build(occupancy_grid(TWO_ROOMS))
     assert pyramid.place_level == len(pyramid) - 1
-    with pytest.raises(hn.InvalidValueError, match="no rooms"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no rooms"):
         hn.TopologicalMap(pyramid).rooms  # noqa: B018
 
 
@@ -164,12 +164,12 @@ def test_the_point_of_a_room_is_its_named_one_or_the_clearest():
     ],
 )
 def test_labels_that_cannot_be_are_refused(names, label, says):
-    with pytest.raises(hn.InvalidValueError, match=says):
+    with pytest.raises(hn.errors.InvalidValueError, match=says):
         RoomLabels(names, np.full((2, 2), label))
 
 
 def test_labels_of_another_shape_are_refused():
-    with pytest.raises(hn.InvalidValueError, match=r"\(3, 3\)"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"\(3, 3\)"):
         hn.DualGraphPyramid.build(
             occupancy_grid(TWO_ROOMS), rooms=RoomLabels(("a",), np.zeros((3, 3), dtype=np.int32))
         )
@@ -185,7 +185,7 @@ def test_labels_of_another_shape_are_refused():
 )
 def test_a_misspelt_name_suggests_the_nearest(given_name, says):
     labels = RoomLabels(("kitchen", "lab"), np.zeros((2, 2), dtype=np.int32))
-    with pytest.raises(hn.InvalidValueError, match=says):
+    with pytest.raises(hn.errors.InvalidValueError, match=says):
         labels.index(given_name)
 
 

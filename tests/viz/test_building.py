@@ -31,8 +31,8 @@ def gids(ax: Any) -> list[str]:
 
 def test_each_floor_has_a_panel_and_the_highest_is_on_top() -> None:
     building = office()
-    floors = [hn.Floor(f.name, f.planner, 3.0 * i) for i, f in enumerate(building.floors)]
-    building = hn.Building(floors, building.links)
+    floors = [hn.ext.fleet.Floor(f.name, f.planner, 3.0 * i) for i, f in enumerate(building.floors)]
+    building = hn.ext.fleet.Building(floors, building.links)
     plan = building.plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5)))
     low, high = plot_building(building, plan)
     assert low.get_position().y0 < high.get_position().y0
@@ -75,7 +75,7 @@ def test_axes_of_the_caller_are_drawn_on() -> None:
     figure = Figure()
     given = list(figure.subplots(1, 2))
     assert plot_building(building, axes=given) == tuple(given)
-    with pytest.raises(hn.InvalidValueError, match="2 floors need as many axes, got 1"):
+    with pytest.raises(hn.errors.InvalidValueError, match="2 floors need as many axes, got 1"):
         plot_building(building, axes=given[:1])
 
 
@@ -88,7 +88,7 @@ def checked(points, edges, *, directed=False):
         plain.add_node(node, x=x, y=y)
     plain.add_edges_from(edges)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=8.0))
-    return hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    return hn.ext.graphs.check_graph(topology, hn.ext.graphs.WaypointGraph.from_networkx(plain))
 
 
 def checked_links(nodes, links):
@@ -98,7 +98,7 @@ def checked_links(nodes, links):
     with TemporaryDirectory() as folder:
         path = Path(folder, "graph.json")
         path.write_text(json.dumps(whole))
-        return hn.check_graph(topology, hn.load_graph(path))
+        return hn.ext.graphs.check_graph(topology, hn.ext.graphs.load_graph(path))
 
 
 def names(ax):

@@ -114,11 +114,11 @@ def test_levels_are_panels_with_their_own_fields(figure1):
 
 
 def test_levels_need_a_level_and_a_column(figure1):
-    with pytest.raises(hn.InvalidValueError, match="at least one level"):
+    with pytest.raises(hn.errors.InvalidValueError, match="at least one level"):
         plot_levels(figure1, [])
-    with pytest.raises(hn.InvalidValueError, match="one column"):
+    with pytest.raises(hn.errors.InvalidValueError, match="one column"):
         plot_levels(figure1, columns=0)
-    with pytest.raises(hn.InvalidValueError, match="2 levels need as many axes, got 1"):
+    with pytest.raises(hn.errors.InvalidValueError, match="2 levels need as many axes, got 1"):
         plot_levels(figure1, [0, 1], axes=[Figure().add_subplot()])
     with pytest.raises(IndexError):
         plot_levels(figure1, [99])
@@ -176,7 +176,7 @@ def test_a_search_that_looked_at_nothing_and_a_corridor_of_another_map(figure1):
     ax = plot_search(figure1.grid, None)
     assert "0 states" in ax.get_title()
     assert labels(ax) == ["occupied"]
-    with pytest.raises(hn.InvalidValueError, match="corridor has"):
+    with pytest.raises(hn.errors.InvalidValueError, match="corridor has"):
         plot_search(figure1.grid, None, corridor=np.zeros((3, 4), dtype=np.bool_))
 
 
@@ -268,8 +268,10 @@ def test_a_map_without_a_free_cell_has_a_picture() -> None:
 
 def test_a_mesh_of_another_map_is_refused() -> None:
     mesh = build_mesh(np.ones((3, 4), np.bool_))
-    with pytest.raises(hn.InvalidValueError, match=r"\(3, 4\) cells, the grid has \(9, 14\)"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"\(3, 4\) cells, the grid has \(9, 14\)"
+    ):
         plot_mesh(turned(), mesh)
     trace = trace_search(mesh, ((0, 0), (2, 3)), ((0.5, 0.5), (2.5, 3.5)))
-    with pytest.raises(hn.InvalidValueError, match="build it from the grid's free cells"):
+    with pytest.raises(hn.errors.InvalidValueError, match="build it from the grid's free cells"):
         plot_search(turned(), trace)

@@ -316,7 +316,7 @@ def test_the_bar_states_factors_inside_the_figure(most: float, label: str) -> No
 
 def test_a_layer_of_another_map_and_unusable_paths_are_refused() -> None:
     grid = room()
-    with pytest.raises(hn.InvalidValueError, match="costs of 2 x 2 cells"):
+    with pytest.raises(hn.errors.InvalidValueError, match="costs of 2 x 2 cells"):
         plot_costs(grid, layer_of(np.ones((2, 2))))
-    with pytest.raises(hn.InvalidValueError, match="points need finite coordinates"):
+    with pytest.raises(hn.errors.InvalidValueError, match="points need finite coordinates"):
         plot_costs(grid, layer_of(np.ones(grid.shape)), paths={"a": [(0.0, np.nan)]})

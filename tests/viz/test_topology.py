@@ -291,7 +291,7 @@ def test_figure_1_is_drawn_on_four_given_axes(figure1):
     assert plot_figure1(figure1, axes=axes) == tuple(axes)
     assert tuple(figure.get_size_inches()) == (9, 7)
     assert len(lines(axes[2], "parallel-arcs")) == 2
-    with pytest.raises(hn.InvalidValueError, match="4 panels, got 3 axes"):
+    with pytest.raises(hn.errors.InvalidValueError, match="4 panels, got 3 axes"):
         plot_figure1(figure1, axes=axes[:3])
 
 
@@ -312,7 +312,7 @@ def test_guesses_are_dashed_and_the_title_counts_them():
     texts = [text.get_text() for text in ax.figure.findobj(Text)]
     assert "guess: margin below 0.05" in texts
     assert found(plot_topology(level), "guessed-parallel-arcs") is None
-    with pytest.raises(hn.InvalidValueError, match="guess_below must be a margin"):
+    with pytest.raises(hn.errors.InvalidValueError, match="guess_below must be a margin"):
         plot_topology(level, guess_below=float("nan"))
 
 
@@ -327,7 +327,9 @@ def test_maps_without_arcs_are_drawn(plot):
 def test_a_level_too_large_for_a_graph_is_refused(plot):
     grid = hn.OccupancyGrid(np.zeros((150, 150), np.float32))
     base = DualGraphPyramid.build(grid, merge_distance_m=4.0)[0]
-    with pytest.raises(hn.InvalidValueError, match="up to 20000 vertices, level 0 has 22500"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="up to 20000 vertices, level 0 has 22500"
+    ):
         plot(base)
 
 

@@ -481,7 +481,7 @@ def test_the_same_picture_gives_the_same_bytes(rooms, plan, tmp_path, suffix):
 )
 def test_a_file_that_cannot_be_written_gives_one_line(rooms, tmp_path, name, words):
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(hn.InvalidValueError) as caught:
+    with pytest.raises(hn.errors.InvalidValueError) as caught:
         save_figure(plot_map(rooms.grid), tmp_path / name, dpi=20)
     message = str(caught.value)
     assert words in message
@@ -491,19 +491,21 @@ def test_a_file_that_cannot_be_written_gives_one_line(rooms, tmp_path, name, wor
 
 @pytest.mark.parametrize("dpi", [0, -1, math.nan, math.inf, 1e6])
 def test_dpi_out_of_range_are_refused(rooms, tmp_path, dpi):
-    with pytest.raises(hn.InvalidValueError, match="dpi must be above 0"):
+    with pytest.raises(hn.errors.InvalidValueError, match="dpi must be above 0"):
         save_figure(plot_map(rooms.grid), tmp_path / "map.png", dpi=dpi)
 
 
 def test_arguments_that_make_no_sense_are_refused(rooms, plan):
     for point in ((1.0,), (1.0, math.nan), "here"):
-        with pytest.raises(hn.InvalidValueError, match="goal must be two finite coordinates"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="goal must be two finite coordinates"
+        ):
             plot_plan(rooms, plan, goal=point)
     for optimum in (-1.0, math.nan):
-        with pytest.raises(hn.InvalidValueError, match="optimum must be a length"):
+        with pytest.raises(hn.errors.InvalidValueError, match="optimum must be a length"):
             plot_plan(rooms, plan, optimum_m=optimum)
     for width in (0.0, math.inf, math.nan, 1e9):
-        with pytest.raises(hn.InvalidValueError, match="width must be"):
+        with pytest.raises(hn.errors.InvalidValueError, match="width must be"):
             plot_map(rooms.grid, width_in=width)
 
 

@@ -268,8 +268,8 @@ def _why_nothing(study: Study) -> str:
     return "the maps have no such pairs of free cells"
 
 
-def _graph(file: Path, floor: str | None) -> str | hn.WaypointGraph:
-    return str(file) if floor is None else hn.load_graph(file, floor=floor)
+def _graph(file: Path, floor: str | None) -> str | hn.ext.graphs.WaypointGraph:
+    return str(file) if floor is None else hn.ext.graphs.load_graph(file, floor=floor)
 
 
 def _yardstick(metric: str) -> Yardstick:

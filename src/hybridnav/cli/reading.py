@@ -174,7 +174,7 @@ def read_preset(source: str) -> Preset:
     input."""
     try:
         return hn.load_preset(source)
-    except hn.PresetNotFoundError as error:
+    except hn.errors.PresetNotFoundError as error:
         from hybridnav.planner.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
 
         if is_preset_name(source):
@@ -227,7 +227,7 @@ def overridden(
         settings.append(f"planner.smooth={smooth}")
     try:
         return hn.load_preset(plain, overrides=settings)
-    except hn.PresetError as error:
+    except hn.errors.PresetError as error:
         raise UsageError(str(error)) from None
 
 

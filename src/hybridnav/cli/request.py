@@ -97,7 +97,7 @@ class Request:
         if self.poses is not None:
             hn.export_path(outcome, self.poses)
         if self.bag is not None:
-            hn.save_bag(self.bag, [outcome], grid=grid)
+            hn.ext.live.save_bag(self.bag, [outcome], grid=grid)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
             draw(

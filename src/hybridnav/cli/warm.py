@@ -41,7 +41,7 @@ def compile_search(method: str) -> None:
     """Compile the search of a method, by a search of a small map."""
     from hybridnav.planner import planner_settings  # noqa: PLC0415 - loads pydantic
     from hybridnav.planner.methods import make_method  # noqa: PLC0415 - loads numba
-    from hybridnav.planner.methods.grid import Site  # noqa: PLC0415
+    from hybridnav.planner.methods.grid import KnownMap  # noqa: PLC0415
     from hybridnav.search.found import Query  # noqa: PLC0415
     from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
 
@@ -53,7 +53,7 @@ def compile_search(method: str) -> None:
     # On the cells alone, as `paper` searches inside its corridor.
     settings = planner_settings("grid-astar" if method == "paper" else method)
     start, goal = grid.frame.points_of(np.array(_ENDPOINTS))
-    found = make_method(Site(grid, None), settings).find(Query(_ENDPOINTS, (start, goal)))
+    found = make_method(KnownMap(grid, None), settings).find(Query(_ENDPOINTS, (start, goal)))
     _ = found.cells
 
 

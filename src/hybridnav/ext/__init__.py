@@ -1,1 +1,5 @@
 """The wing: what stands beside the mission. Nothing outside imports it."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

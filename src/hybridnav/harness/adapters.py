@@ -17,7 +17,7 @@ from hybridnav.search import found as search
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray
-    from hybridnav.harness.baselines import Method
+    from hybridnav.harness.baselines import Solver
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Metric, PlanResult, Preset
@@ -27,7 +27,7 @@ Cell = tuple[int, int]
 
 
 class HybridMethod:
-    """A preset of `HybridPlanner` as a method; see `baselines.Method`."""
+    """A preset of `HybridPlanner` as a method; see `baselines.Solver`."""
 
     def __init__(
         self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
@@ -231,7 +231,7 @@ class OnOwnGrid:
 
     region_of = None
 
-    def __init__(self, method: Method, grid: OccupancyGrid) -> None:
+    def __init__(self, method: Solver, grid: OccupancyGrid) -> None:
         self._method = method
         self._free = grid.classes == CellClass.FREE
         self.name = method.name

@@ -20,7 +20,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav.harness.baselines import Method, MethodResult
+    from hybridnav.harness.baselines import MethodResult, Solver
     from hybridnav.harness.names import NamedMethod
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
@@ -242,7 +242,7 @@ def _given(merge_distance_m: float | None, seed: int | None) -> dict[str, Any]:
 class Prepared:
     """A method ready for one map, and the effort of its preparation."""
 
-    method: Method
+    method: Solver
     topology: TopologicalMap | None
     """The places that it plans on, None for methods that need none."""
     pyramid_seconds: float
@@ -276,7 +276,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     if spec.pyramid:
         topology = TopologicalMap(DualGraphPyramid.build(grid, **spec.pyramid))
     built = time.perf_counter()
-    method: Method
+    method: Solver
     if spec.preset is not None and topology is not None:
         preset = Preset.model_validate(spec.preset)
         if preset.planner.refusal_of_costs():
@@ -299,7 +299,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
 
 def _of_class(
     spec: MethodSpec, given: OccupancyGrid | TopologicalMap, costs: CostLayer | None
-) -> tuple[Method, CostLayer | None]:
+) -> tuple[Solver, CostLayer | None]:
     """Return the method of a baseline or a class of others, and the costs that it plans by."""
     path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
     made_of = class_of(path)

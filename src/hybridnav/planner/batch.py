@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.copies import frozen
+from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.maps import CellClass
 from hybridnav.planner.result import PlanStatus
 from hybridnav.search.found import ClosedCells, QueryMany
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.search.found import FoundMany, Method
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class PlanBatch:
     """Outcomes of many queries, arrays of n.

@@ -163,7 +163,7 @@ class DoorTours:
         self._planner, self._first = planner, first
         self._waypoints, self._closed = waypoints, closed
         self._rooms = planner.topology.rooms
-        grid = planner.topology.grid
+        grid = planner.grid
         graph = door_graph(
             planner.topology,
             allow_unexplored=planner.preset.planner.allow_unexplored,
@@ -212,7 +212,7 @@ class DoorTours:
     def _track(self, tour: Tour) -> Track:
         """Return the line of a tour, measured as its planner plans."""
         layer = self._planner.costs
-        costs = None if layer is None else (self._planner.topology.grid, layer)
+        costs = None if layer is None else (self._planner.grid, layer)
         return Track(tour, self.near_m, costs=costs)
 
     def closed_round(self, tour: Tour) -> LongArray | None:

@@ -13,8 +13,8 @@ from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import class_reach, class_rules
 from hybridnav.maps.checks import checked_type
 from hybridnav.planner.methods import make_method
-from hybridnav.planner.methods.grid import Site
-from hybridnav.search.found import Change
+from hybridnav.planner.methods.grid import KnownMap
+from hybridnav.search.found import MapChange
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.planning import Planning
 
 
-class Update(NamedTuple):
+class PlannerUpdate(NamedTuple):
     """What an update gives to a planner: at least one of the first three."""
 
     costs: CostLayer | None
@@ -42,7 +42,7 @@ class Update(NamedTuple):
 
 def update_of(
     costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
-) -> Update:
+) -> PlannerUpdate:
     """Return the update that was given.
 
     Raises
@@ -58,10 +58,10 @@ def update_of(
         raise InvalidValueError(
             "update was given no costs, grid or topology, expected one of them: pass what changed"
         )
-    return Update(costs, grid, topology, box)
+    return PlannerUpdate(costs, grid, topology, box)
 
 
-def begun(now: Planning, update: Update) -> Callable[[], Planning]:
+def begun(now: Planning, update: PlannerUpdate) -> Callable[[], Planning]:
     """Check all of an update, and return what ends it while no query runs: how to plan then.
 
     Raises
@@ -84,11 +84,11 @@ def _recosted(now: Planning, costs: PlannerCosts, box: Box) -> Planning:
     """Return how to plan by other costs, by the method itself where it can take them."""
     method, layer = now.method, costs.layer
     if layer is None or not method.take_costs(layer, box):
-        method = make_method(Site(now.grid, now.topology, layer), now.preset.planner)
+        method = make_method(KnownMap(now.grid, now.topology, layer), now.preset.planner)
     return replace(now, method=method, costs=costs)
 
 
-def _followed(now: Planning, update: Update) -> Planning:
+def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     """Return how to plan on a changed map; what is now stays as it is."""
     settings, places, grid = now.preset.planner, update.topology, update.grid
     if now.ompl is not None:
@@ -112,9 +112,9 @@ def _followed(now: Planning, update: Update) -> Planning:
     cells, costs = changed_cells(now.grid, grid, update.box), now.costs.on(grid)
     if update.costs is not None:
         costs, _ = costs.changed(update.costs, update.box)
-    method = now.method.changed(Change(grid, places, costs.layer, cells))
+    method = now.method.changed(MapChange(grid, places, costs.layer, cells))
     if method is None:
-        method = make_method(Site(grid, places, costs.layer), settings)
+        method = make_method(KnownMap(grid, places, costs.layer), settings)
     built = now.built if places is None else places
     return replace(now, grid=grid, built=built, method=method, costs=costs, closures={})
 

@@ -15,7 +15,7 @@ from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import no_places, read_points
 from hybridnav.planner.follow import begun, update_of
 from hybridnav.planner.methods import make_method
-from hybridnav.planner.methods.grid import Site
+from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
 from hybridnav.planner.settings import OmplPlannerSettings
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanBatch, PlanResult
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.follow import Update
+    from hybridnav.planner.follow import PlannerUpdate
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.planning import Smooth
@@ -93,7 +93,7 @@ class HybridPlanner:
         grid, settings = topology.grid, self.preset.planner
         check_radius(grid, self.preset)
         by = PlannerCosts(grid, self.preset, costs)
-        site = Site(grid, topology, by.layer, prepared)
+        site = KnownMap(grid, topology, by.layer, prepared)
         method, ompl = make_method(site, settings), None
         if isinstance(settings, OmplPlannerSettings):
             # Loads modules for these presets only, or reports which one to install.
@@ -340,7 +340,7 @@ class HybridPlanner:
         update = update_of(costs, grid, topology, box)
         self._preparing.alone(partial(self._update, update))
 
-    def _update(self, update: Update) -> None:
+    def _update(self, update: PlannerUpdate) -> None:
         """Check all of an update, then make it."""
         self._turns.alone(self._complete)
         self._begun = begun(self._now, update)
@@ -366,11 +366,11 @@ class HybridPlanner:
         waypoints: Sequence[ArrayLike | str],
         *,
         at: At = "anywhere",
-        closed: ClosedCells | None = None,
+        blocked: Closable | ClosedCells | None = None,
     ) -> list[ArrayLike]:
         """Return a point for each waypoint, a name too, so that the path through all of them is
         cheapest."""
-        return self._now.points_of(waypoints, at, closed)
+        return self._now.points_of(waypoints, at, blocked)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""

@@ -44,16 +44,19 @@ _KEPT = 16
 """Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
 
 
-class Request(NamedTuple):
+class PlanRequest(NamedTuple):
     """What a caller wants to know, read."""
 
     poses: tuple[FloatArray, FloatArray]
     """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
     smooth: Smooth
+    """What is done with the path that the method finds."""
     closed: ClosedCells | None
+    """Cells that are closed for this query; None for none."""
     goal: ArrayLike | str
     """The goal as it was given."""
     began: float
+    """The time at which reading began, of `time.perf_counter`."""
 
 
 @copies_alike
@@ -92,16 +95,16 @@ class Planning:
         smooth: Smooth | None,
         blocked: Closable | ClosedCells | None,
         at: At,
-    ) -> Request:
+    ) -> PlanRequest:
         """Read a query; see `HybridPlanner.plan`."""
         began, waypoint = time.perf_counter(), goal
         check_at(at)
-        closed = self.closed(blocked)
         if isinstance(start, str) or isinstance(goal, str):
-            start, goal = self.points_of([start, goal], at, closed)
+            start, goal = self.points_of([start, goal], at, blocked)
+        closed = self.closed(blocked)
         read = partial(read_end, needs_heading=self.needs_headings)
         poses = read("start", start), read("goal", goal)
-        return Request(poses, self._checked(smooth), closed, waypoint, began)
+        return PlanRequest(poses, self._checked(smooth), closed, waypoint, began)
 
     @property
     def needs_headings(self) -> bool:
@@ -109,7 +112,10 @@ class Planning:
         return self.ompl is not None and self.ompl.ompl.has_heading
 
     def points_of(
-        self, waypoints: Sequence[ArrayLike | str], at: At, closed: ClosedCells | None
+        self,
+        waypoints: Sequence[ArrayLike | str],
+        at: At,
+        blocked: Closable | ClosedCells | None,
     ) -> list[ArrayLike]:
         """Return a point for each waypoint, so that the path through all of them is cheapest."""
         check_at(at)
@@ -126,7 +132,7 @@ class Planning:
             self.preset.planner,
             waypoints,
             at=at,
-            closed=self.closed_for_all(closed),
+            closed=self.closed_for_all(self.closed(blocked)),
             costs=self.costs.layer,
         )
 
@@ -164,7 +170,7 @@ class Planning:
             )
         return chosen
 
-    def query(self, request: Request) -> Query | PlanStatus:
+    def query(self, request: PlanRequest) -> Query | PlanStatus:
         """Return the query for the method, or the status that refuses start or goal."""
         poses, _, closed, *_ = request
         points, allowed = (poses[0][:2], poses[1][:2]), self.preset.planner.allow_unexplored
@@ -178,14 +184,14 @@ class Planning:
 
     # Planning: a path found by the method, then refined.
 
-    def plan(self, request: Request) -> PlanResult:
+    def plan(self, request: PlanRequest) -> PlanResult:
         """Plan a path."""
         query = self.query(request)
         if isinstance(query, PlanStatus):
             return self._answer(query, request)
         return self.result(request, query, self.method.find(query))
 
-    def draft(self, request: Request) -> PlanDraft:
+    def draft(self, request: PlanRequest) -> PlanDraft:
         """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
         query = self.query(request)
         if isinstance(query, PlanStatus):
@@ -197,7 +203,7 @@ class Planning:
         bound = min(found.lower_bound_m, found.cost_m)
         return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
 
-    def result(self, request: Request, query: Query, found: Found) -> PlanResult:
+    def result(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
         """Refine a path that was found, and return its result."""
         metric = self.method.metric
         if not found.has_path:
@@ -223,7 +229,7 @@ class Planning:
         source = self.guide.of(result.path, request.goal, request.poses[0].tolist())
         return replace(result, instruction_source=source)
 
-    def _in_sight(self, request: Request, query: Query, found: Found) -> PlanResult:
+    def _in_sight(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
         """Return the result of a path of cells that is shortened by line of sight."""
         began, sight, closed = time.perf_counter(), self._sight, request.closed
         if closed is not None:  # one for this query
@@ -246,7 +252,7 @@ class Planning:
         return None if layer is None else CostFinish(self.grid, layer, self.preset.planner)
 
     def _cheapest(
-        self, costs: CostFinish, request: Request, query: Query, found: Found
+        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
     ) -> PlanResult:
         """Return the result of a cheapest path of cells."""
         solved = partial(self._solved, request, found)
@@ -264,7 +270,7 @@ class Planning:
         return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
 
     def _by_ompl(
-        self, ompl: OmplPlanner, request: Request, query: Query, found: Found
+        self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
     ) -> PlanResult:
         """Return the result of a path refined by OMPL, with the bound of the method too."""
         now, closed = time.perf_counter(), request.closed
@@ -296,7 +302,7 @@ class Planning:
     # Results: with their routes, and the settings that they were planned by.
 
     def _solved(
-        self, request: Request, found: Found, path: Path, bound_m: float, **outcome: Any
+        self, request: PlanRequest, found: Found, path: Path, bound_m: float, **outcome: Any
     ) -> PlanResult:
         """Return the result of a path, whose bound is at most its cost."""
         cost_m = outcome.get("weighted_cost", path.length_m)
@@ -310,7 +316,7 @@ class Planning:
             **outcome,
         )
 
-    def _answer(self, status: PlanStatus, request: Request, **outcome: Any) -> PlanResult:
+    def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         # Each result has its own settings, so that a change of one does not affect the next.
         settings = {

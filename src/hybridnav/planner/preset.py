@@ -79,6 +79,11 @@ def planner_settings(method: str = "paper", **settings: Any) -> PlannerSettings:
     **settings
         Keys of its section.
 
+    Returns
+    -------
+    PlannerSettings
+        Checked, of the class of the method.
+
     Raises
     ------
     PresetError
@@ -243,7 +248,7 @@ def _first_problem(error: ValidationError) -> str:
         place = (place[0], *place[2:])  # without the tag of the method
     key = printable(".".join(map(str, place)))
     if problem["type"] == "extra_forbidden":
-        return f"{key}: unknown key; {_known_keys(problem['loc'][:-1])}"
+        return f"{key}: {_known_keys(problem['loc'][:-1], str(place[-1]))}"
     if problem["type"] == "union_tag_invalid":
         if not isinstance(given, dict):
             return f"{key}: expected a section with keys, got {brief(given)}"
@@ -264,8 +269,8 @@ def _first_problem(error: ValidationError) -> str:
     return f"{key}: {expected.removeprefix('input ')}, got {shown}"
 
 
-def _known_keys(section: tuple[int | str, ...]) -> str:
-    """Return the keys of a section, by the place of an error."""
+def _known_keys(section: tuple[int | str, ...], key: str) -> str:
+    """Return what is wrong with a key, and the keys of its section, by the place of an error."""
     model: Any = Preset
     for depth, part in enumerate(section):
         if section[0] == "planner" and depth < 2:  # noqa: PLR2004 - the method is its tag
@@ -275,5 +280,8 @@ def _known_keys(section: tuple[int | str, ...]) -> str:
             models = [kind for kind in get_args(annotation) if kind is not NoneType]
             model = models[0] if models else annotation
     names = ", ".join(name for name in model.model_fields if name != "name")
-    is_method = len(section) == 2 and section[0] == "planner"  # noqa: PLR2004
-    return f"{section[1]} has {names}" if is_method else f"known are {names}"
+    if len(section) != 2 or section[0] != "planner":  # noqa: PLR2004
+        return f"unknown key; known are {names}"
+    with_it = ", ".join(method for method in METHODS if key in SECTIONS[method].model_fields)
+    wrong = f"no key of method {section[1]}, but of {with_it}" if with_it else "unknown key"
+    return f"{wrong}; {section[1]} has {names}"

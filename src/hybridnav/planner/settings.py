@@ -108,7 +108,14 @@ Finish = Literal["none", "line-of-sight", "arcs"]
 
 
 class PlannerSettings(Section):
-    """Section `planner`: the method, and what each method has; the keys of one are its class."""
+    """Section `planner`: the method, and what each method has; the keys of one are its class.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("octile").allow_unexplored
+    False
+    """
 
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
@@ -158,7 +165,14 @@ _WITH_COSTS = (
 
 
 class ShortestSettings(PlannerSettings):
-    """Method `shortest`: the shortest any-angle path, on convex polygons of free space."""
+    """Method `shortest`: the shortest any-angle path, on convex polygons of free space.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("shortest", epsilon=0.02).epsilon
+    0.02
+    """
 
     method: Literal["shortest"] = "shortest"
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -170,7 +184,14 @@ class ShortestSettings(PlannerSettings):
 
 
 class OctileSettings(PlannerSettings):
-    """Method `octile`: the shortest path of cells, on the corner cells at which such paths turn."""
+    """Method `octile`: the shortest path of cells, on the corner cells at which such paths turn.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("octile", smooth="line-of-sight").finish
+    'line-of-sight'
+    """
 
     method: Literal["octile"] = "octile"
     smooth: Literal["none", "line-of-sight"] = "none"
@@ -217,7 +238,14 @@ class _ByCosts(PlannerSettings):
 
 class CheapestSettings(_ByCosts):
     """Method `cheapest`: the cheapest path of cells, on exact costs between the border cells of
-    fields on several levels of the pyramid."""
+    fields on several levels of the pyramid.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("cheapest", smooth="arcs").turning_radius_m
+    0.3
+    """
 
     method: Literal["cheapest"] = "cheapest"
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -239,14 +267,28 @@ class _Refined(_ByCosts):
 
 
 class GridSettings(_Refined):
-    """Method `grid-astar`: the cells of the whole map."""
+    """Method `grid-astar`: the cells of the whole map.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("grid-astar").refine
+    'grid-astar'
+    """
 
     method: Literal["grid-astar"] = "grid-astar"
 
 
 class PaperSettings(_Refined):
     """Method `paper`: the places, by the max-distance attribute of their arcs, choose the route;
-    a search of cells refines inside it."""
+    a search of cells refines inside it.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("paper", corridor="neighbours").corridor
+    'neighbours'
+    """
 
     method: Literal["paper"] = "paper"
     corridor: Literal["route", "neighbours"] = "route"
@@ -256,7 +298,14 @@ class PaperSettings(_Refined):
 
 
 class OmplPlannerSettings(PlannerSettings):
-    """Method `ompl`: a sampling-based planner of OMPL, along the path of another method."""
+    """Method `ompl`: a sampling-based planner of OMPL, along the path of another method.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("ompl", ompl={"planner": "RRTstar"}).along
+    'shortest'
+    """
 
     method: Literal["ompl"] = "ompl"
     along: Literal["shortest", "paper", "grid-astar"] = "shortest"
@@ -290,7 +339,14 @@ def _own_method(method: str) -> str:
 
 
 class OwnSettings(PlannerSettings):
-    """A method of your own, `module:Class`, which is imported when a planner is made."""
+    """A method of your own, `module:Class`, which is imported when a planner is made.
+
+    Examples
+    --------
+    >>> from hybridnav.planner import planner_settings
+    >>> planner_settings("mine:ByGraph", settings={"weight": 2}).settings
+    {'weight': 2}
+    """
 
     method: Annotated[str, AfterValidator(_own_method)]
     settings: dict[str, Any] = {}

@@ -241,8 +241,7 @@ def plan_tour(
     """
     if len(waypoints) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a tour needs at least two waypoints, got {len(waypoints)}")
-    closed = planner.closed(blocked)
-    points = planner.points_of(waypoints, at=at, closed=closed)
+    points, closed = planner.points_of(waypoints, at=at, blocked=blocked), planner.closed(blocked)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))

@@ -98,6 +98,7 @@ class Query(NamedTuple):
     """One query: two cells that may be entered, points in them, and what is closed for it."""
 
     cells: tuple[Cell, Cell]
+    """Start and goal, (row, col)."""
     points: tuple[FloatArray, FloatArray]
     """float64 (2,) each, start and goal, `(x, y)` in metres, map frame."""
     closed: ClosedCells | None = None
@@ -163,10 +164,11 @@ class FoundMany:
     """float64 (m, 2), (x, y) in metres, map frame."""
 
 
-class Change(NamedTuple):
+class MapChange(NamedTuple):
     """A map after its cells changed."""
 
     grid: OccupancyGrid
+    """The map now."""
     topology: TopologicalMap | None
     """Its places; None if they are not built."""
     costs: CostLayer | None
@@ -209,7 +211,7 @@ class Method(Protocol):
         progress(1, 1)
         return None
 
-    def changed(self, change: Change) -> Method | None:  # noqa: ARG002 - a default
+    def changed(self, change: MapChange) -> Method | None:  # noqa: ARG002 - a default
         """Return the method of a changed map, this one stays as it is; None to make it anew."""
         return None
 

@@ -222,7 +222,7 @@ def test_holes_are_measured_filled_and_every_part_has_its_own_outside(least, hol
 
 
 def test_a_negative_area_is_refused():
-    with pytest.raises(hn.InvalidValueError, match=">= 0"):
+    with pytest.raises(hn.errors.InvalidValueError, match=">= 0"):
         HomotopyClasses(topology_of(RING), least_hole_m2=-1.0)
 
 

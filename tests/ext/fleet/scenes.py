@@ -26,13 +26,13 @@ Where = tuple[int, Any]
 class Scene:
     """A building, and points on its floors."""
 
-    building: hn.Building
+    building: hn.ext.fleet.Building
     rng: np.random.Generator
 
     @property
     def grids(self) -> list[hn.OccupancyGrid]:
         """The maps of the floors."""
-        return [floor.planner.topology.grid for floor in self.building.floors]
+        return [floor.planner.grid for floor in self.building.floors]
 
     def somewhere(self) -> Where:
         """A floor, and a free point on it."""
@@ -64,20 +64,22 @@ def random_building(
         grid = hn.OccupancyGrid(probability, frame, robot_radius_m=0.1)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
         planner = hn.HybridPlanner(topology, preset=preset)
-        floors.append(hn.Floor(f"floor {number}", planner, elevation_m=3.0 * number))
+        floors.append(hn.ext.fleet.Floor(f"floor {number}", planner, elevation_m=3.0 * number))
     links = [random_link(f"link {number}", floors, rng) for number in range(rng.integers(1, 6))]
-    return Scene(hn.Building(floors, links, speed_m_s=float(rng.uniform(0.2, 1.0))), rng)
+    return Scene(hn.ext.fleet.Building(floors, links, speed_m_s=float(rng.uniform(0.2, 1.0))), rng)
 
 
-def random_link(name: str, floors: Sequence[hn.Floor], rng: np.random.Generator) -> hn.Link:
+def random_link(
+    name: str, floors: Sequence[hn.ext.fleet.Floor], rng: np.random.Generator
+) -> hn.ext.fleet.Link:
     """A link between some of the floors, whose ends do not line up."""
     count = int(rng.integers(2, len(floors) + 1))
     chosen = sorted(rng.choice(len(floors), size=count, replace=False).tolist())
     ends = []
     for index in chosen:
-        point = free_point(floors[index].planner.topology.grid, rng)
-        ends.append(hn.LinkEnd(floors[index].name, tuple(point.tolist())))
-    return hn.Link(
+        point = free_point(floors[index].planner.grid, rng)
+        ends.append(hn.ext.fleet.LinkEnd(floors[index].name, tuple(point.tolist())))
+    return hn.ext.fleet.Link(
         name=name,
         kind=KINDS[rng.integers(3)],  # type: ignore[arg-type]
         ends=tuple(ends),
@@ -88,7 +90,7 @@ def random_link(name: str, floors: Sequence[hn.Floor], rng: np.random.Generator)
     )
 
 
-def usable(scene: Scene, closed: set[str], *, stairs: bool) -> list[hn.Link]:
+def usable(scene: Scene, closed: set[str], *, stairs: bool) -> list[hn.ext.fleet.Link]:
     """The links that the robot may use, by their own rules."""
     radius_m = scene.building.robot_radius_m
     return [
@@ -100,13 +102,13 @@ def usable(scene: Scene, closed: set[str], *, stairs: bool) -> list[hn.Link]:
     ]
 
 
-def charge(link: hn.Link, start: int, goal: int, speed_m_s: float) -> float:
+def charge(link: hn.ext.fleet.Link, start: int, goal: int, speed_m_s: float) -> float:
     """What a ride between two of its ends costs, counted again."""
     return link.cost_m + speed_m_s * (link.wait_s + link.ride_s * abs(start - goal))
 
 
 def optimum_on_cells(
-    scene: Scene, start: Where, goal: Where, links: list[hn.Link], open_cells: list[Any]
+    scene: Scene, start: Where, goal: Where, links: list[hn.ext.fleet.Link], open_cells: list[Any]
 ) -> float:
     """The cost of a cheapest route by cells, by Dijkstra on the joined grids.
 
@@ -127,7 +129,9 @@ def optimum_on_cells(
     return _dijkstra(edges, n, first, last)
 
 
-def optimum_any_angle(scene: Scene, start: Where, goal: Where, links: list[hn.Link]) -> float:
+def optimum_any_angle(
+    scene: Scene, start: Where, goal: Where, links: list[hn.ext.fleet.Link]
+) -> float:
     """The cost of a cheapest route at any angle, by a visibility graph of each floor."""
     points: list[list[Any]] = [[] for _ in scene.grids]
     node_of: list[tuple[int, int]] = []

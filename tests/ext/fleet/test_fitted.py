@@ -26,7 +26,7 @@ from tests.plans import PLAIN
 SEEDS = st.integers(0, 10**6)
 
 
-def floors_with(links: int, rng: np.random.Generator) -> hn.Building:
+def floors_with(links: int, rng: np.random.Generator) -> hn.ext.fleet.Building:
     """Two floors of 12 x 16 m with obstacles, in frames of their own, and lifts."""
     floors = []
     for name in ("1", "2"):
@@ -35,21 +35,21 @@ def floors_with(links: int, rng: np.random.Generator) -> hn.Building:
         frame = hn.Frame(0.5, origin_m=origin, yaw_rad=float(rng.uniform(-3, 3)))
         grid = hn.OccupancyGrid(occupied, frame, robot_radius_m=0.0)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-        floors.append(hn.Floor(name, hn.HybridPlanner(topology)))
+        floors.append(hn.ext.fleet.Floor(name, hn.HybridPlanner(topology)))
     places = [free_places(floor, links, rng) for floor in floors]
     lifts = []
     for number in range(links):
         ends = tuple(
-            hn.LinkEnd(floor.name, tuple(of[number]))
+            hn.ext.fleet.LinkEnd(floor.name, tuple(of[number]))
             for floor, of in zip(floors, places, strict=True)
         )
-        lifts.append(hn.Link(name=f"lift {number}", kind="lift", ends=ends))
-    return hn.Building(floors, lifts)
+        lifts.append(hn.ext.fleet.Link(name=f"lift {number}", kind="lift", ends=ends))
+    return hn.ext.fleet.Building(floors, lifts)
 
 
-def free_places(floor: hn.Floor, count: int, rng: np.random.Generator) -> list[Any]:
+def free_places(floor: hn.ext.fleet.Floor, count: int, rng: np.random.Generator) -> list[Any]:
     """Centres of free cells, no two of them within 3 m."""
-    grid = floor.planner.topology.grid
+    grid = floor.planner.grid
     labels, sizes = np.unique(_parts(grid), return_counts=True)
     largest = labels[1:][sizes[1:].argmax()]
     cells = rng.permutation(np.argwhere(_parts(grid) == largest))
@@ -66,11 +66,11 @@ def _parts(grid: hn.OccupancyGrid) -> Any:
     return ndimage.label(grid.enterable())[0]
 
 
-def drawn_over(building: hn.Building) -> BuildingGraph:
+def drawn_over(building: hn.ext.fleet.Building) -> BuildingGraph:
     """A sound graph: nodes in free cells, edges between cells side by side, and the links."""
     floors = []
     for floor in building.floors:
-        grid = floor.planner.topology.grid
+        grid = floor.planner.grid
         plain: nx.Graph[str] = nx.Graph()
         for row, col in np.argwhere(grid.enterable()).tolist():
             x, y = grid.frame.points_of(np.array([row, col])).tolist()
@@ -78,7 +78,9 @@ def drawn_over(building: hn.Building) -> BuildingGraph:
             for other in (f"{row - 1} {col}", f"{row} {col - 1}"):
                 if other in plain:
                     plain.add_edge(f"{row} {col}", other)
-        floors.append(FloorGraph(name=floor.name, graph=hn.WaypointGraph.from_networkx(plain)))
+        floors.append(
+            FloorGraph(name=floor.name, graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+        )
     return BuildingGraph(name="drawn", floors=tuple(floors), links=building.links)
 
 
@@ -87,7 +89,7 @@ def with_stray(graph: BuildingGraph, off: tuple[float, float]) -> BuildingGraph:
     *others, last = graph.links
     one, other = last.ends
     x, y = other.position_m
-    stray = replace(last, ends=(one, hn.LinkEnd("2", (x + off[0], y + off[1]))))
+    stray = replace(last, ends=(one, hn.ext.fleet.LinkEnd("2", (x + off[0], y + off[1]))))
     return replace(graph, links=(*others, stray))
 
 
@@ -100,7 +102,7 @@ def in_frame(graph: BuildingGraph, pose: tuple[float, float, float]) -> Building
         one, other = link.ends
         u, v = other.position_m
         at = x + cosine * u - sine * v, y + sine * u + cosine * v
-        links.append(replace(link, ends=(one, hn.LinkEnd("2", at))))
+        links.append(replace(link, ends=(one, hn.ext.fleet.LinkEnd("2", at))))
     floors = graph.floors[0], moved_floor(graph.floors[1], pose)
     return replace(graph, floors=floors, links=tuple(links))
 
@@ -156,7 +158,9 @@ def test_small_errors_are_shared_by_all_links(seed: int) -> None:
     for link in sound.links:
         x, y = link.ends[1].position_m
         by = rng.uniform(-0.2, 0.2, 2).tolist()
-        links.append(replace(link, ends=(link.ends[0], hn.LinkEnd("2", (x + by[0], y + by[1])))))
+        links.append(
+            replace(link, ends=(link.ends[0], hn.ext.fleet.LinkEnd("2", (x + by[0], y + by[1]))))
+        )
     pose = (*rng.uniform(-30, 30, 2).tolist(), float(rng.uniform(-3, 3)))
     matched = match_graph(building, in_frame(replace(sound, links=tuple(links)), pose), align=True)
     assert 0.0 < matched.away_m < 0.6

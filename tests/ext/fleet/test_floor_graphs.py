@@ -40,7 +40,7 @@ def graph_at(*points):
     plain: nx.DiGraph[Any] = nx.DiGraph()
     for node, (x, y) in enumerate(points):
         plain.add_node(node, x=x, y=y)
-    return hn.WaypointGraph.from_networkx(plain)
+    return hn.ext.graphs.WaypointGraph.from_networkx(plain)
 
 
 def floor(name, *points):
@@ -69,7 +69,7 @@ def test_a_floor_moves_with_all_that_lies_on_it(points, pose):
     )
     assert there.areas[0].outline == pytest.approx(moved(own.areas[0].outline, pose), abs=1e-9)
     assert there.doors[0].rooms == ("a", None)
-    with pytest.raises(hn.InvalidValueError, match="finite numbers"):
+    with pytest.raises(hn.errors.InvalidValueError, match="finite numbers"):
         moved_floor(own, (0.0, math.nan, 0.0))
 
 
@@ -165,14 +165,14 @@ def test_links_join_floors_at_their_ends(building):
 )  # fmt: skip
 def test_floors_and_links_that_do_not_fit_are_refused(change, words):
     given = {"floors": (floor("1"), floor("2")), "links": (LIFT,)}
-    with pytest.raises(hn.InvalidValueError, match=words):
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
         BuildingGraph(name="b", **(given | change))
 
 
 def test_a_floor_that_is_not_there():
-    with pytest.raises(hn.InvalidValueError, match="no floor is called '3': there are 1, 2"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no floor is called '3': there are 1, 2"):
         BuildingGraph(name="b", floors=(floor("1"), floor("2"))).floor("3")
-    with pytest.raises(hn.InvalidValueError, match=r"'grond': did you mean ground\?"):
+    with pytest.raises(hn.errors.InvalidValueError, match=r"'grond': did you mean ground\?"):
         BuildingGraph(name="b", floors=(floor("ground"), floor("1"))).floor("grond")
 
 
@@ -196,12 +196,12 @@ def test_nodes_of_a_layout_are_joined_exactly_where_the_building_has_a_route(
     """The file of a building, read again: components of nodes against plans over floors."""
     building = random_building(seed, most_floors=3).building
     try:
-        graph = hn.building_graph(building, nodes=30)
-    except hn.InvalidValueError:
+        graph = hn.ext.fleet.building_graph(building, nodes=30)
+    except hn.errors.InvalidValueError:
         assume(False)
     file = tmp_path_factory.mktemp("lif") / "layout.json"
-    hn.export_lif(graph, file, vehicle_types=["Maker.Carrier"])
-    whole = to_networkx(hn.load_building_graph(file))
+    hn.ext.graphs.export_lif(graph, file, vehicle_types=["Maker.Carrier"])
+    whole = to_networkx(hn.ext.fleet.load_building_graph(file))
     piece_of = {
         node: number
         for number, piece in enumerate(nx.strongly_connected_components(whole))
@@ -237,7 +237,9 @@ def test_doors_that_no_edge_passes_are_not_in_the_graph_of_a_floor():
     rooms = topology_of(NOOK)
     wide = topology_of(NOOK, robot_radius_m=0.6)
     for topology, expected in ((rooms, 3), (wide, 1)):
-        floor = hn.floor_graph(topology, hn.build_route_graph(topology), name="1")
+        floor = hn.ext.fleet.floor_graph(
+            topology, hn.ext.graphs.build_route_graph(topology), name="1"
+        )
         named = {
             facts["door_name"] for facts in floor.graph.edge_facts.values() if "door_name" in facts
         }

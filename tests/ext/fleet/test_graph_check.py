@@ -30,8 +30,10 @@ NODES = {"a": (1.5, 1.5), "b": (2.5, 2.5), "c": (4.5, 2.5), "d": (6.5, 2.5), "e"
 EDGES = [("a", "b"), ("b", "c"), ("c", "d"), ("d", "e")]
 
 
-def link(name: str, kind: Any, *ends: tuple[str, Any], **more: Any) -> hn.Link:
-    return hn.Link(name=name, kind=kind, ends=tuple(hn.LinkEnd(*end) for end in ends), **more)
+def link(name: str, kind: Any, *ends: tuple[str, Any], **more: Any) -> hn.ext.fleet.Link:
+    return hn.ext.fleet.Link(
+        name=name, kind=kind, ends=tuple(hn.ext.fleet.LinkEnd(*end) for end in ends), **more
+    )
 
 
 LINKS = {
@@ -41,13 +43,13 @@ LINKS = {
 
 
 @pytest.fixture(scope="module")
-def house() -> hn.Building:
+def house() -> hn.ext.fleet.Building:
     """Three floors of two rooms, a lift from 1 to 2 and stairs from 2 to 3."""
     floors = []
     for name in ("1", "2", "3"):
         pyramid = hn.DualGraphPyramid.build(two_rooms(name), merge_distance_m=2.0)
-        floors.append(hn.Floor(name, hn.HybridPlanner(hn.TopologicalMap(pyramid))))
-    return hn.Building(floors, list(LINKS.values()))
+        floors.append(hn.ext.fleet.Floor(name, hn.HybridPlanner(hn.TopologicalMap(pyramid))))
+    return hn.ext.fleet.Building(floors, list(LINKS.values()))
 
 
 def floor(name: str, change: Callable[[nx.Graph[str]], object] | None = None) -> FloorGraph:
@@ -57,13 +59,13 @@ def floor(name: str, change: Callable[[nx.Graph[str]], object] | None = None) ->
     plain.add_edges_from(EDGES)
     if change is not None:
         change(plain)
-    return FloorGraph(name=name, graph=hn.WaypointGraph.from_networkx(plain))
+    return FloorGraph(name=name, graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
 
 
 def drawn(
     second: Callable[[nx.Graph[str]], object] | None = None,
     names: tuple[str, ...] = ("1", "2", "3"),
-    **links: hn.Link | None,
+    **links: hn.ext.fleet.Link | None,
 ) -> BuildingGraph:
     """The graph of the house, with its second floor or some links changed; None leaves one out."""
     chosen = [one for one in (LINKS | links).values() if one is not None]
@@ -84,7 +86,9 @@ def without(*edges: tuple[str, str]) -> Callable[[nx.Graph[str]], object]:
     return lambda plain: plain.remove_edges_from(edges)
 
 
-def test_a_sound_graph_has_no_findings_and_its_routes_are_followed(house: hn.Building) -> None:
+def test_a_sound_graph_has_no_findings_and_its_routes_are_followed(
+    house: hn.ext.fleet.Building,
+) -> None:
     matched = match_graph(house, drawn())
     assert found(check_building_graph(matched)) == {}
     report = judge_building_graph(matched, pairs=60)
@@ -171,7 +175,7 @@ FAULTS: dict[str, tuple[BuildingGraph, dict[str, list[str]], str]] = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_is_found(house: hn.Building, name: str) -> None:
+def test_a_planted_fault_is_found(house: hn.ext.fleet.Building, name: str) -> None:
     graph, findings, contradiction = FAULTS[name]
     matched = match_graph(house, graph)
     check = check_building_graph(matched)
@@ -181,13 +185,13 @@ def test_a_planted_fault_is_found(house: hn.Building, name: str) -> None:
     assert any(contradiction in text for text in texts) if contradiction else not texts
 
 
-def test_routes_there_and_back_may_lead_over_other_floors(house: hn.Building) -> None:
+def test_routes_there_and_back_may_lead_over_other_floors(house: hn.ext.fleet.Building) -> None:
     second = link("C", "lift", ("1", STAIRS), ("2", STAIRS))
-    building = hn.Building(house.floors, [*house.links, second])
+    building = hn.ext.fleet.Building(house.floors, [*house.links, second])
     plain: nx.DiGraph[str] = nx.DiGraph()
     plain.add_nodes_from((node, {"x": x, "y": y}) for node, (x, y) in NODES.items())
     plain.add_edges_from(EDGES)
-    one_way = FloorGraph(name="2", graph=hn.WaypointGraph.from_networkx(plain))
+    one_way = FloorGraph(name="2", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
     whole = drawn(C=second)
     loop = replace(whole, floors=(whole.floors[0], one_way, whole.floors[2]))
     assert found(check_building_graph(match_graph(building, loop))) == {}
@@ -199,7 +203,7 @@ def test_routes_there_and_back_may_lead_over_other_floors(house: hn.Building) ->
     }
 
 
-def test_what_no_robot_can_follow_may_be_left_out(house: hn.Building) -> None:
+def test_what_no_robot_can_follow_may_be_left_out(house: hn.ext.fleet.Building) -> None:
     for name in ("an edge through a wall", "a lift too many", "a lift at another place"):
         matched = match_graph(house, FAULTS[name][0])
         report = judge_building_graph(matched, pairs=100, clear_edges_only=True)
@@ -209,12 +213,12 @@ def test_what_no_robot_can_follow_may_be_left_out(house: hn.Building) -> None:
 def test_a_node_far_outside_an_open_map_is_never_seen() -> None:
     grid = hn.OccupancyGrid(np.zeros((6, 9), dtype=np.float32), robot_radius_m=0.0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-    building = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    building = hn.ext.fleet.Building([hn.ext.fleet.Floor("1", hn.HybridPlanner(topology))])
     plain: nx.Graph[str] = nx.Graph()
     for node, (x, y) in {"a": (1.5, 1.5), "far": (2e8, 1e8), "b": (7.5, 4.5)}.items():
         plain.add_node(node, x=x, y=y)
     plain.add_edges_from([("a", "far"), ("far", "b")])
-    graph = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    graph = FloorGraph(name="1", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
     network = BuildingNetwork(match_graph(building, BuildingGraph(name="open", floors=(graph,))))
     leg = np.array([0, 1, 2])
     for point in ((2.5, 2.5), (3.5, 5.5)):
@@ -227,13 +231,13 @@ def test_nodes_are_put_to_corners_and_centres_alone_and_into_no_wall() -> None:
     blocked[1, 1] = 1
     grid = hn.OccupancyGrid(blocked, robot_radius_m=0.0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    building = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    building = hn.ext.fleet.Building([hn.ext.fleet.Floor("1", hn.HybridPlanner(topology))])
     stay = [(1.3, 0.9995), (0.9995, 0.9995), (0.5004, 2.3), (0.5004, 0.9995)]
     put = {(2.0004, 1.9996): (2.0, 2.0), (0.5004, 2.4996): (0.5, 2.5)}
     plain: nx.Graph[int] = nx.Graph()
     for node, (x, y) in enumerate([*stay, *put]):
         plain.add_node(node, x=x, y=y)
-    graph = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    graph = FloorGraph(name="1", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
     matched = match_graph(building, BuildingGraph(name="drawn", floors=(graph,)))
     points = matched.floors["1"].graph.points
     assert points == pytest.approx(np.array([*stay, *put.values()]), abs=1e-9)
@@ -244,7 +248,7 @@ def test_every_kind_of_finding_is_planted_here() -> None:
     assert [kind for kind in BUILDING_KINDS if f'"{kind}"' not in text] == []
 
 
-def test_links_of_other_names_are_met_by_their_places(house: hn.Building) -> None:
+def test_links_of_other_names_are_met_by_their_places(house: hn.ext.fleet.Building) -> None:
     near = link("K1", "lift", ("1", (1.5, 1.6)), ("2", (1.5, 1.5)))
     matched = match_graph(house, drawn(lift=near))
     assert [one.own and one.own.name for one in matched.links] == ["lift", "B"]
@@ -253,38 +257,42 @@ def test_links_of_other_names_are_met_by_their_places(house: hn.Building) -> Non
     assert match_graph(house, drawn(lift=far)).links[0].own is None
 
 
-def test_stairs_are_taken_or_not(house: hn.Building) -> None:
+def test_stairs_are_taken_or_not(house: hn.ext.fleet.Building) -> None:
     matched = match_graph(house, drawn())
     counts = judge_building_graph(matched, pairs=60, stairs=False).counts
     assert counts["two floors"].answers["no path, right"] > 0
     assert "no path, right" not in counts["one floor"].answers
 
 
-def test_floors_have_other_names(house: hn.Building) -> None:
+def test_floors_have_other_names(house: hn.ext.fleet.Building) -> None:
     graph = drawn(names=("L1", "L2"))
-    with pytest.raises(hn.InvalidValueError, match=r"floors L1, L2 and the building has 1, 2, 3"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"floors L1, L2 and the building has 1, 2, 3"
+    ):
         match_graph(house, graph)
     matched = match_graph(house, graph, floors={"L1": "1"})
     assert list(matched.floors) == ["1"]
     assert matched.unknown_floors == ("L2",)
-    with pytest.raises(hn.InvalidValueError, match="both floor '1'"):
+    with pytest.raises(hn.errors.InvalidValueError, match="both floor '1'"):
         match_graph(house, graph, floors={"L1": "1", "L2": "1"})
-    with pytest.raises(hn.InvalidValueError, match="did you mean L1"):
+    with pytest.raises(hn.errors.InvalidValueError, match="did you mean L1"):
         match_graph(house, graph, floors={"l1": "1"})
-    with pytest.raises(hn.InvalidValueError, match="no floor is called '7'"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no floor is called '7'"):
         match_graph(house, graph, floors={"L1": "7"})
 
 
-def test_nothing_to_align_by(house: hn.Building) -> None:
-    with pytest.raises(hn.InvalidValueError, match=r"links lift and none|has the links none"):
+def test_nothing_to_align_by(house: hn.ext.fleet.Building) -> None:
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"links lift and none|has the links none"
+    ):
         match_graph(house, drawn(lift=None, B=None), align=True)
 
 
-def test_planners_that_find_no_shortest_paths_are_refused(house: hn.Building) -> None:
+def test_planners_that_find_no_shortest_paths_are_refused(house: hn.ext.fleet.Building) -> None:
     floors = [
         replace(one, planner=hn.HybridPlanner(one.planner.topology, preset="octile"))
         for one in house.floors
     ]
-    other = hn.Building(floors, house.links)
-    with pytest.raises(hn.InvalidValueError, match="load it with preset shortest"):
+    other = hn.ext.fleet.Building(floors, house.links)
+    with pytest.raises(hn.errors.InvalidValueError, match="load it with preset shortest"):
         judge_building_graph(match_graph(other, drawn()))

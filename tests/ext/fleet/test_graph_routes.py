@@ -60,14 +60,14 @@ def drawn(seed: int) -> Drawing:
             off = rng.uniform(0.02, 0.3, 2) * rng.choice([-1, 1], 2) * rng.choice([1, 1, 1, 6])
             at = np.asarray(end.position_m) + off
             drawing.ends[link.name, end.floor] = add_node(drawing, plain, end.floor, at)
-            ends.append(hn.LinkEnd(end.floor, tuple(at.tolist())))
-        links.append(hn.Link(name=link.name, kind=link.kind, ends=tuple(ends)))
+            ends.append(hn.ext.fleet.LinkEnd(end.floor, tuple(at.tolist())))
+        links.append(hn.ext.fleet.Link(name=link.name, kind=link.kind, ends=tuple(ends)))
     floors = []
     for name, graph in plain.items():
         for _ in range(3 * len(graph)):
             tail, head = rng.integers(len(graph), size=2).tolist()
             graph.add_edge(tail, head)
-        floors.append(FloorGraph(name=name, graph=hn.WaypointGraph.from_networkx(graph)))
+        floors.append(FloorGraph(name=name, graph=hn.ext.graphs.WaypointGraph.from_networkx(graph)))
     drawing.graph = BuildingGraph(name="drawn", floors=tuple(floors), links=tuple(links))
     return drawing
 

@@ -33,7 +33,11 @@ def drawn_conditions(scene: Scene) -> tuple[set[str], bool]:
 
 
 def check_figures(
-    scene: Scene, plan: hn.BuildingPlan, start: Where, goal: Where, links: list[hn.Link]
+    scene: Scene,
+    plan: hn.ext.fleet.BuildingPlan,
+    start: Where,
+    goal: Where,
+    links: list[hn.ext.fleet.Link],
 ) -> None:
     """Count every figure of a route again from its parts."""
     building = scene.building
@@ -129,7 +133,7 @@ def test_hundreds_of_links(charged: bool) -> None:  # noqa: FBT001 - a parameter
     links = [random_link(f"link {number}", floors, rng) for number in range(300)]
     if not charged:
         links = [replace(link, wait_s=0.0, ride_s=0.0, cost_m=0.0) for link in links]
-    scene = replace(scene, building=hn.Building(floors, links, speed_m_s=0.5))
+    scene = replace(scene, building=hn.ext.fleet.Building(floors, links, speed_m_s=0.5))
     rides = 0
     for query in range(8):
         start, goal = scene.somewhere(), scene.somewhere()
@@ -159,7 +163,7 @@ def test_a_floor_with_many_ends_is_prepared_without_all_pairs() -> None:
     scene = random_building(11, most_floors=2, shape=(24, 28))
     floors, rng = scene.building.floors[:2], scene.rng
     links = [random_link(f"link {number}", floors, rng) for number in range(200)]
-    many, few = (hn.Building(floors, some) for some in (links, links[:10]))
+    many, few = (hn.ext.fleet.Building(floors, some) for some in (links, links[:10]))
     many.prepare()
     few.prepare()
     assert all(np.isnan(known.cost).all() for known in many.known)
@@ -173,7 +177,7 @@ def test_no_path_on_a_floor_without_links(preset: str) -> None:
         scene = random_building(seed, preset=preset, most_floors=2)
         alone = random_building(seed + 100, preset=preset, most_floors=2)
         extra = replace(alone.building.floors[0], name="alone")
-        building = hn.Building((*scene.building.floors, extra), scene.building.links)
+        building = hn.ext.fleet.Building((*scene.building.floors, extra), scene.building.links)
         scene = replace(scene, building=building)
         cells = [grid.enterable() for grid in scene.grids]
         at = len(cells) - 1

@@ -29,35 +29,35 @@ from tests.plans import PLAIN
 SEEDS = st.integers(0, 10**6)
 
 
-def floor_of(name: str, names: tuple[str, str], **how: Any) -> hn.Floor:
+def floor_of(name: str, names: tuple[str, str], **how: Any) -> hn.ext.fleet.Floor:
     """A floor with two rooms, `names`."""
     grid = two_rooms(f"map {name}")
     label_of = np.where(np.indices(grid.shape)[1] < 4, 0, 1)
     rooms = hn.RoomLabels(names, label_of)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=rooms))
-    return hn.Floor(name, hn.HybridPlanner(topology, **how))
+    return hn.ext.fleet.Floor(name, hn.HybridPlanner(topology, **how))
 
 
-def office(**how: Any) -> hn.Building:
+def office(**how: Any) -> hn.ext.fleet.Building:
     """Two floors: a lift in the left rooms, which one leaves to the east, and stairs."""
     floors = [floor_of("1", ("lab", "kitchen"), **how), floor_of("2", ("store", "kitchen"), **how)]
-    lift = hn.Link(
+    lift = hn.ext.fleet.Link(
         name="west lift",
         kind="lift",
-        ends=(hn.LinkEnd("1", LIFT, 0.0), hn.LinkEnd("2", LIFT, 0.0)),
+        ends=(hn.ext.fleet.LinkEnd("1", LIFT, 0.0), hn.ext.fleet.LinkEnd("2", LIFT, 0.0)),
         wait_s=2,
         max_radius_m=0.4,
     )
-    stairs = hn.Link(
+    stairs = hn.ext.fleet.Link(
         name="B",
         kind="stairs",
-        ends=(hn.LinkEnd("1", STAIRS), hn.LinkEnd("2", STAIRS)),
+        ends=(hn.ext.fleet.LinkEnd("1", STAIRS), hn.ext.fleet.LinkEnd("2", STAIRS)),
         cost_m=3,
     )
-    return hn.Building(floors, [lift, stairs])
+    return hn.ext.fleet.Building(floors, [lift, stairs])
 
 
-def sequences_of(links: list[hn.Link]) -> list[tuple[hn.Link, ...]]:
+def sequences_of(links: list[hn.ext.fleet.Link]) -> list[tuple[hn.ext.fleet.Link, ...]]:
     """All sequences of different links, up to three of them."""
     return [chosen for count in range(4) for chosen in itertools.permutations(links, count)]
 
@@ -67,7 +67,9 @@ def sequences_of(links: list[hn.Link]) -> list[tuple[hn.Link, ...]]:
 def test_alternatives_are_the_cheapest_of_each_sequence_of_links(seed: int) -> None:
     scene = random_building(seed, preset="octile", most_floors=3, shape=(6, 7))
     building = scene.building
-    building = hn.Building(building.floors, building.links[:3], speed_m_s=building.speed_m_s)
+    building = hn.ext.fleet.Building(
+        building.floors, building.links[:3], speed_m_s=building.speed_m_s
+    )
     scene = replace(scene, building=building)
     start, goal = scene.somewhere(), scene.somewhere()
     found = building.alternatives(scene.named(start), scene.named(goal), 30, max_stretch=math.inf)
@@ -114,7 +116,7 @@ def test_a_search_that_stops_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def cheapest_by(
-    scene: Scene, start: Any, goal: Any, links: tuple[hn.Link, ...], cells: list[Any]
+    scene: Scene, start: Any, goal: Any, links: tuple[hn.ext.fleet.Link, ...], cells: list[Any]
 ) -> float:
     """The cost of a cheapest route by a sequence of links: Dijkstra on layers, link by link."""
     best = {start[0]: [(0.0, start[1])]}
@@ -203,7 +205,7 @@ def test_a_changed_floor_is_followed(seed: int) -> None:
             index = [floor.name for floor in scene.building.floors].index(end.floor)
             keep.setdefault(index, []).append(end.position_m)
     for number, floor in enumerate(scene.building.floors):
-        grid = floor.planner.topology.grid
+        grid = floor.planner.grid
         probability = np.array(grid.probability)
         probability[scene.rng.random(grid.shape) < 0.2] = 1.0
         probability[scene.rng.random(grid.shape) < 0.2] = 0.0
@@ -261,14 +263,19 @@ def test_words_say_which_link_to_take_and_how_to_leave_it() -> None:
 def test_floors_without_rooms_have_the_rides_in_words() -> None:
     named = office()
     bare = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(two_rooms())))
-    building = hn.Building([named.floors[0], hn.Floor("2", bare)], named.links)
+    building = hn.ext.fleet.Building([named.floors[0], hn.ext.fleet.Floor("2", bare)], named.links)
     assert building.plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5))).words() == [
         "start in the lab with door 1 to the kitchen on the left",
         "after 2 m take the west lift to floor 2",
         "after 3 m you are at (1.5, 4.5) on this floor",
     ]
-    floors = [hn.Floor(name, bare) for name in ("1", "2")]
-    assert hn.Building(floors, named.links).plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5))).words() == []
+    floors = [hn.ext.fleet.Floor(name, bare) for name in ("1", "2")]
+    assert (
+        hn.ext.fleet.Building(floors, named.links)
+        .plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5)))
+        .words()
+        == []
+    )
 
 
 @pytest.mark.parametrize("at", ["anywhere", "point"])
@@ -280,13 +287,15 @@ def test_rooms_are_named_by_the_floor_or_alone(at: Any) -> None:
     assert plan.gap == 0.0
     assert (plan.length_m == 0.0) == (at == "anywhere")
     assert building.plan(("1", "kitchen"), ("2", "kitchen")).solved
-    with pytest.raises(hn.InvalidValueError, match=r"on floors 1 and 2: .* as in 1:kitchen, or"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"on floors 1 and 2: .* as in 1:kitchen, or"
+    ):
         building.plan("kitchen", "lab")
     with pytest.raises(
-        hn.InvalidValueError, match=r"no room .* 'kitchn'; did you|did you mean kit"
+        hn.errors.InvalidValueError, match=r"no room .* 'kitchn'; did you|did you mean kit"
     ):
         building.plan("kitchn", "lab")
-    with pytest.raises(hn.InvalidValueError, match="no floor is called '3': there are 1, 2"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no floor is called '3': there are 1, 2"):
         building.plan(("3", (1.0, 1.0)), "lab")
 
 
@@ -302,17 +311,17 @@ def test_who_may_use_a_link() -> None:
     assert none.status is hn.PlanStatus.NO_PATH
     assert math.isinf(none.lower_bound)
     assert none.to_dict()["cost"] is None
-    with pytest.raises(hn.PlanError, match="no route over floors was planned: no path"):
+    with pytest.raises(hn.errors.PlanError, match="no route over floors was planned: no path"):
         none.raise_for_status()
     narrow = [replace(link, max_radius_m=0.1) for link in building.links]
     wide = [
-        hn.Floor(
+        hn.ext.fleet.Floor(
             floor.name,
             hn.HybridPlanner(
                 hn.TopologicalMap(
                     hn.DualGraphPyramid.build(
                         replace(
-                            floor.planner.topology.grid,
+                            floor.planner.grid,
                             robot_radius_m=0.3,
                             radius_is_default=False,
                         )
@@ -322,8 +331,8 @@ def test_who_may_use_a_link() -> None:
         )
         for floor in building.floors
     ]
-    assert not hn.Building(wide, narrow).plan(start, goal).solved
-    assert hn.Building(wide, building.links).plan(start, goal).solved
+    assert not hn.ext.fleet.Building(wide, narrow).plan(start, goal).solved
+    assert hn.ext.fleet.Building(wide, building.links).plan(start, goal).solved
 
 
 def test_statuses_say_which_endpoint_is_at_fault() -> None:
@@ -357,7 +366,7 @@ def test_statuses_say_which_endpoint_is_at_fault() -> None:
 def test_mistakes_of_a_caller_are_one_line(asked: dict[str, Any], message: str) -> None:
     given_all = {"start": ("1", (1.5, 1.5)), "goal": ("2", (1.5, 1.5))} | asked
     start, goal = given_all.pop("start"), given_all.pop("goal")
-    with pytest.raises(hn.InvalidValueError) as refused:
+    with pytest.raises(hn.errors.InvalidValueError) as refused:
         office().plan(start, goal, **given_all)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
@@ -366,11 +375,11 @@ def test_mistakes_of_a_caller_are_one_line(asked: dict[str, Any], message: str) 
 def test_floors_and_links_that_do_not_fit_are_refused() -> None:
     one, other = office().floors
     lift = office().links[0]
-    shifted = replace(lift, ends=(lift.ends[0], hn.LinkEnd("2", (4.5, 1.5))))
-    far = replace(lift, ends=(lift.ends[0], hn.LinkEnd("2", (40.0, 1.5))))
-    unknown = replace(lift, ends=(lift.ends[0], hn.LinkEnd("3", (1.5, 1.5))))
-    octile = hn.Floor("3", hn.HybridPlanner(other.planner.topology, preset="octile"))
-    cases: list[tuple[list[hn.Floor], list[hn.Link], str]] = [
+    shifted = replace(lift, ends=(lift.ends[0], hn.ext.fleet.LinkEnd("2", (4.5, 1.5))))
+    far = replace(lift, ends=(lift.ends[0], hn.ext.fleet.LinkEnd("2", (40.0, 1.5))))
+    unknown = replace(lift, ends=(lift.ends[0], hn.ext.fleet.LinkEnd("3", (1.5, 1.5))))
+    octile = hn.ext.fleet.Floor("3", hn.HybridPlanner(other.planner.topology, preset="octile"))
+    cases: list[tuple[list[hn.ext.fleet.Floor], list[hn.ext.fleet.Link], str]] = [
         ([], [], "at least one floor"),
         ([one, one], [], "floor 1: the name is given twice"),
         ([one, other], [lift, lift], "link west lift: the name is given twice"),
@@ -380,14 +389,14 @@ def test_floors_and_links_that_do_not_fit_are_refused() -> None:
         ([one, octile], [], "floor 3 is planned by preset octile and floor 1 by shortest"),
     ]
     for floors, links, message in cases:
-        with pytest.raises(hn.InvalidValueError, match=message):
-            hn.Building(floors, links)
+        with pytest.raises(hn.errors.InvalidValueError, match=message):
+            hn.ext.fleet.Building(floors, links)
     for name in ("", " ", "a\nb", "x" * 81):
-        with pytest.raises(hn.InvalidValueError):
-            hn.Floor(name, one.planner)
+        with pytest.raises(hn.errors.InvalidValueError):
+            hn.ext.fleet.Floor(name, one.planner)
     for speed in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(hn.InvalidValueError, match="speed_m_s"):
-            hn.Building([one], speed_m_s=speed)
+        with pytest.raises(hn.errors.InvalidValueError, match="speed_m_s"):
+            hn.ext.fleet.Building([one], speed_m_s=speed)
 
 
 def test_copies_and_pickles_answer_alike() -> None:

@@ -19,13 +19,13 @@ from tests.drawn_rooms import HOUSE, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid
 
 HERE = topology_of(HOUSE, origin_m=(-3.0, 1.0), yaw_rad=0.4)
-SOUND = hn.build_route_graph(HERE)
+SOUND = hn.ext.graphs.build_route_graph(HERE)
 
 
 @pytest.fixture
 def features(tmp_path):
     """The features of a sound graph's file."""
-    hn.export_nav2(SOUND, tmp_path / "sound.geojson")
+    hn.ext.graphs.export_nav2(SOUND, tmp_path / "sound.geojson")
     return json.loads((tmp_path / "sound.geojson").read_text())["features"]
 
 
@@ -36,7 +36,9 @@ def checked(tmp_path):
     def check(features):
         whole = {"type": "FeatureCollection", "features": features}
         (tmp_path / "planted.geojson").write_text(json.dumps(whole))
-        found = hn.check_graph(HERE, hn.load_graph(tmp_path / "planted.geojson"))
+        found = hn.ext.graphs.check_graph(
+            HERE, hn.ext.graphs.load_graph(tmp_path / "planted.geojson")
+        )
         return {each.kind: each.count for each in found.findings}, found
 
     return check
@@ -285,7 +287,7 @@ def test_unexplored_space_and_parts_without_nodes():
     plain.add_nodes_from([("c", {"x": 10.5, "y": 8})])
     plain.add_edges_from([("a", "b"), ("a", "c")])
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
-    found = hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    found = hn.ext.graphs.check_graph(topology, hn.ext.graphs.WaypointGraph.from_networkx(plain))
     assert {each.kind: each.count for each in found.findings} == {
         "node-unexplored": 1,
         "edge-unexplored": 4,
@@ -310,26 +312,26 @@ def test_free_ground_outside_the_building_gets_no_nodes_and_a_warning():
     nameless = [line.replace("o", ".") for line in WITH_MARGIN]
     topology = topology_of(nameless)
     letters = np.array([list(line) for line in reversed(WITH_MARGIN)])
-    graph = hn.build_route_graph(topology, spacing_m=2.0)
+    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=2.0)
     cells = topology.grid.frame.cells_of(graph.points)
     assert set(letters[tuple(cells.T)]) == {"k", "a"}
     plain = graph.to_networkx()
     assert nx.is_connected(plain.to_undirected())
     plain.add_node(9000, x=0.25, y=0.25)
-    found = hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    found = hn.ext.graphs.check_graph(topology, hn.ext.graphs.WaypointGraph.from_networkx(plain))
     (beyond,) = found.findings
     assert (beyond.kind, beyond.severity, beyond.count) == ("node-beyond", "warning", 1)
     assert beyond.examples[0].where == "node 9000"
     assert found.in_sight == 1.0
-    assert hn.judge_route_graph(graph, pairs=200).best.solved == 1.0
+    assert hn.ext.graphs.judge_route_graph(graph, pairs=200).best.solved == 1.0
 
 
 def test_a_room_outside_is_no_free_ground():
     topology = topology_of(WITH_MARGIN)
-    graph = hn.build_route_graph(topology, spacing_m=2.0)
+    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=2.0)
     assert "hall" in graph.rooms
-    assert not hn.check_graph(
-        topology, hn.WaypointGraph.from_networkx(graph.to_networkx())
+    assert not hn.ext.graphs.check_graph(
+        topology, hn.ext.graphs.WaypointGraph.from_networkx(graph.to_networkx())
     ).findings
 
 
@@ -358,12 +360,12 @@ def test_free_nodes_and_edges_are_those_of_exact_geometry(classes, data):
     plain = nx.complete_graph(len(points), create_using=nx.DiGraph)
     for node, (x, y) in enumerate(points):
         plain.nodes[node].update(x=x, y=y)
-    graph = hn.WaypointGraph.from_networkx(plain)
+    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain)
     grid = occupancy_grid(classes)
     if not (classes == hn.CellClass.FREE).any():
         return
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    found = hn.check_graph(topology, graph)
+    found = hn.ext.graphs.check_graph(topology, graph)
     # A point on the side of two cells lies in the one above or to the right, as Nav2 takes it.
     cells = [(math.floor(y + 1e-9), math.floor(x + 1e-9)) for x, y in points]
     free = {tuple(cell) for cell in np.argwhere(classes == hn.CellClass.FREE).tolist()}
@@ -378,8 +380,8 @@ def test_maps_that_allow_corner_cutting_are_refused():
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     plain: nx.Graph[Any] = nx.Graph()
     plain.add_node(1, x=1, y=1)
-    graph = hn.WaypointGraph.from_networkx(plain)
-    with pytest.raises(hn.InvalidValueError, match="corner_cutting"):
-        hn.check_graph(topology, graph)
-    with pytest.raises(hn.InvalidValueError, match="expected a WaypointGraph"):
-        hn.check_graph(topology, plain)  # type: ignore[arg-type]
+    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    with pytest.raises(hn.errors.InvalidValueError, match="corner_cutting"):
+        hn.ext.graphs.check_graph(topology, graph)
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a WaypointGraph"):
+        hn.ext.graphs.check_graph(topology, plain)  # type: ignore[arg-type]

@@ -40,8 +40,8 @@ def lanes_of(graph):
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7])
 def test_lanes_run_on_the_right_of_their_edge_and_apart(yaw_rad):
     here = topology_of(HOUSE, origin_m=(3.0, -2.0), yaw_rad=yaw_rad)
-    plain = hn.build_route_graph(here, stretch=1.02)
-    graph = hn.keep_right(here, plain, apart_m=APART)
+    plain = hn.ext.graphs.build_route_graph(here, stretch=1.02)
+    graph = hn.ext.graphs.keep_right(here, plain, apart_m=APART)
     straight = set(map(tuple, plain.edges.tolist()))
     points = graph.points
     found = lanes_of(graph)
@@ -82,8 +82,8 @@ def test_lanes_are_free_and_cut_nothing(classes, apart_m):
         return
     grid = occupancy_grid(classes)
     here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    plain = hn.build_route_graph(here)
-    graph = hn.keep_right(here, plain, apart_m=apart_m)
+    plain = hn.ext.graphs.build_route_graph(here)
+    graph = hn.ext.graphs.keep_right(here, plain, apart_m=apart_m)
     assert np.array_equal(graph.points[: plain.n_nodes], plain.points)
     for edge in graph.edges.tolist():
         assert segment_faults(grid, graph.points[edge]) == ()
@@ -95,7 +95,9 @@ def test_lanes_are_free_and_cut_nothing(classes, apart_m):
     assert sorted(map(sorted, parts)) == sorted(sorted(part) for part in strong if part)
     keys = graph.edges[:, 0] * graph.n_nodes + graph.edges[:, 1]
     assert len(np.unique(keys)) == len(keys)
-    found = hn.check_graph(here, hn.WaypointGraph.from_networkx(_with_points(graph)))
+    found = hn.ext.graphs.check_graph(
+        here, hn.ext.graphs.WaypointGraph.from_networkx(_with_points(graph))
+    )
     assert {one.kind for one in found.findings} <= {"same-point"}
 
 
@@ -113,16 +115,16 @@ def test_a_corridor_too_narrow_for_two_has_no_lanes_and_a_wide_one_has():
         cells[1:-1, 1:-1] = 0.0
         grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.3)
         here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-        graph = hn.build_route_graph(here, spacing_m=2.0)
-        graph = hn.keep_right(here, graph, apart_m=0.8)
+        graph = hn.ext.graphs.build_route_graph(here, spacing_m=2.0)
+        graph = hn.ext.graphs.keep_right(here, graph, apart_m=0.8)
         assert ("lane" in graph.kinds) == fits
         assert graph.is_lane.any() == fits
 
 
 def test_lanes_are_marked_in_the_file(tmp_path):
     here = topology_of(HOUSE)
-    graph = hn.keep_right(here, hn.build_route_graph(here), apart_m=APART)
-    hn.export_nav2(graph, tmp_path / "lanes.geojson")
+    graph = hn.ext.graphs.keep_right(here, hn.ext.graphs.build_route_graph(here), apart_m=APART)
+    hn.ext.graphs.export_nav2(graph, tmp_path / "lanes.geojson")
     read = read_nav2(tmp_path / "lanes.geojson")
     assert len(read.parts()) == 1
     lanes = {n for n, facts in read.node_facts.items() if facts["class"] == "lane"}
@@ -134,11 +136,11 @@ def test_lanes_are_marked_in_the_file(tmp_path):
 def test_distances_out_of_range_are_refused(apart_m):
     grid = hn.OccupancyGrid(np.zeros((20, 40), np.float32), hn.Frame(0.1), robot_radius_m=0.3)
     here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-    graph = hn.build_route_graph(here)
-    with pytest.raises(hn.InvalidValueError, match="apart_m"):
-        hn.keep_right(here, graph, apart_m=apart_m)
-    with pytest.raises(hn.InvalidValueError, match="built from this topology"):
-        hn.keep_right(topology_of(HOUSE), graph, apart_m=0.8)
+    graph = hn.ext.graphs.build_route_graph(here)
+    with pytest.raises(hn.errors.InvalidValueError, match="apart_m"):
+        hn.ext.graphs.keep_right(here, graph, apart_m=apart_m)
+    with pytest.raises(hn.errors.InvalidValueError, match="built from this topology"):
+        hn.ext.graphs.keep_right(topology_of(HOUSE), graph, apart_m=0.8)
 
 
 KEPT = {"room", "door", "place"}
@@ -150,8 +152,8 @@ def test_polylines_are_free_and_connect_what_was_connected(classes):
     if not (classes == hn.CellClass.FREE).any():
         return
     grid = occupancy_grid(classes)
-    graph = hn.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    bent = hn.merge_bends(graph)
+    graph = hn.ext.graphs.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    bent = hn.ext.graphs.merge_bends(graph)
     kept = [node for node, kind in enumerate(graph.kinds) if kind in KEPT]
     assert np.array_equal(bent.points, graph.points[kept])
     full: nx.Graph[int] = graph.to_networkx().to_undirected()
@@ -176,8 +178,8 @@ def test_polylines_are_free_and_connect_what_was_connected(classes):
 
 @pytest.mark.parametrize("stretch", [1.0, 1.05, 1.5])
 def test_routes_between_kept_nodes_stay_nearly_as_short(stretch):
-    graph = hn.build_route_graph(topology_of(HOUSE))
-    bent = hn.merge_bends(graph, stretch=stretch)
+    graph = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
+    bent = hn.ext.graphs.merge_bends(graph, stretch=stretch)
     kept = [node for node, kind in enumerate(graph.kinds) if kind in KEPT]
     full = graph.to_networkx()
     few: nx.DiGraph[int] = nx.DiGraph()
@@ -194,7 +196,9 @@ def test_routes_between_kept_nodes_stay_nearly_as_short(stretch):
 
 @pytest.mark.parametrize("stretch", [1.0, 1.05])
 def test_no_polyline_is_one_too_many(stretch):
-    bent = hn.merge_bends(hn.build_route_graph(topology_of(HOUSE)), stretch=stretch)
+    bent = hn.ext.graphs.merge_bends(
+        hn.ext.graphs.build_route_graph(topology_of(HOUSE)), stretch=stretch
+    )
     pairs = {tuple(sorted(pair)) for pair in bent.edges.tolist()}
     # Where polylines of three nodes make one way, no fourth one goes along it.
     costs = dict(zip(map(tuple, bent.edges.tolist()), bent.costs.tolist(), strict=True))
@@ -210,15 +214,17 @@ def test_no_polyline_is_one_too_many(stretch):
 
 @pytest.mark.parametrize("stretch", [0.99, np.nan])
 def test_a_stretch_that_is_none_is_refused(stretch):
-    graph = hn.build_route_graph(topology_of(HOUSE))
-    with pytest.raises(hn.InvalidValueError, match="stretch"):
-        hn.merge_bends(graph, stretch=stretch)
+    graph = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
+    with pytest.raises(hn.errors.InvalidValueError, match="stretch"):
+        hn.ext.graphs.merge_bends(graph, stretch=stretch)
 
 
 def test_the_file_holds_polylines_doors_and_rooms(tmp_path):
     here = topology_of(HOUSE)
-    graph = hn.build_route_graph(here)
-    hn.export_nav2(hn.merge_bends(graph), tmp_path / "bent.geojson", frame="floor")
+    graph = hn.ext.graphs.build_route_graph(here)
+    hn.ext.graphs.export_nav2(
+        hn.ext.graphs.merge_bends(graph), tmp_path / "bent.geojson", frame="floor"
+    )
     read = read_nav2(tmp_path / "bent.geojson")
     assert set(read.frames.values()) == {"floor"}
     assert {facts["class"] for facts in read.node_facts.values()} <= KEPT
@@ -250,12 +256,12 @@ def test_the_file_holds_polylines_doors_and_rooms(tmp_path):
 
 def test_the_check_follows_lines_where_robots_do():
     here = topology_of(HOUSE)
-    bent = hn.merge_bends(hn.build_route_graph(here))
-    along = hn.check_graph(here, bent, along_lines=True)
+    bent = hn.ext.graphs.merge_bends(hn.ext.graphs.build_route_graph(here))
+    along = hn.ext.graphs.check_graph(here, bent, along_lines=True)
     assert along.findings == ()
     assert along.doors == (6, 6)
     assert along.is_clear.all()
-    straight = hn.check_graph(here, bent)
+    straight = hn.ext.graphs.check_graph(here, bent)
     for edge, ends in enumerate(bent.edges.tolist()):
         assert straight.is_clear[edge] == (not segment_faults(here.grid, bent.points[ends]))
     assert not straight.is_clear.all()
@@ -263,11 +269,11 @@ def test_the_check_follows_lines_where_robots_do():
     clear = [edge for edge in range(bent.n_edges) if straight.is_clear[edge]]
     tail, head = bent.points[bent.edges[clear[0]]]
     lines = bent.lines | {clear[0]: np.array([tail, [0.25, 0.25], head])}
-    wrong = hn.check_graph(here, replace(bent, lines=lines), along_lines=True)
+    wrong = hn.ext.graphs.check_graph(here, replace(bent, lines=lines), along_lines=True)
     assert np.flatnonzero(~wrong.is_clear).tolist() == [clear[0]]
     assert [(one.kind, one.count) for one in wrong.findings] == [("edge-through-wall", 1)]
     lines[clear[0]] = np.array([tail, [-500.0, 0.25], head])
-    wrong = hn.check_graph(here, replace(bent, lines=lines), along_lines=True)
+    wrong = hn.ext.graphs.check_graph(here, replace(bent, lines=lines), along_lines=True)
     assert np.flatnonzero(~wrong.is_clear).tolist() == [clear[0]]
     drawn = plot_graph_check(along)
     shown = [line for one in drawn.collections for line in getattr(one, "get_segments", list)()]
@@ -276,6 +282,6 @@ def test_the_check_follows_lines_where_robots_do():
 
 def test_lanes_are_refused():
     here = topology_of(HOUSE)
-    graph = hn.keep_right(here, hn.build_route_graph(here), apart_m=1.0)
-    with pytest.raises(hn.InvalidValueError, match="has lanes"):
-        hn.merge_bends(graph)
+    graph = hn.ext.graphs.keep_right(here, hn.ext.graphs.build_route_graph(here), apart_m=1.0)
+    with pytest.raises(hn.errors.InvalidValueError, match="has lanes"):
+        hn.ext.graphs.merge_bends(graph)

@@ -37,7 +37,7 @@ DEEP_CELLS = 0.01
 
 def map_of(name, *, radius_m=RADIUS_M):
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", hn.MapWarning)
+        warnings.simplefilter("ignore", hn.errors.MapWarning)
         grid = hn.load_map(name, robot_radius_m=radius_m)
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
 
@@ -68,8 +68,8 @@ def slanted():
 
 def agreed(topology, folder, **options):
     """Export the graph of a map, and compare all who judge it; return the graph."""
-    built = hn.build_route_graph(topology, **options)
-    hn.export_nav2(built, folder / "graph.geojson")
+    built = hn.ext.graphs.build_route_graph(topology, **options)
+    hn.ext.graphs.export_nav2(built, folder / "graph.geojson")
     graph, costmap = read_nav2(folder / "graph.geojson"), Costmap(topology.grid)
     planner = hn.HybridPlanner(topology)
     begin = next(iter(graph.points.values()))
@@ -78,7 +78,7 @@ def agreed(topology, folder, **options):
         assert planner.plan(begin, point).status in {"solved", "no path"}
     for tail, head in graph.edges.values():
         assert not costmap.collides(graph.points[tail], graph.points[head])
-    check = hn.check_graph(topology, hn.load_graph(folder / "graph.geojson"))
+    check = hn.ext.graphs.check_graph(topology, hn.ext.graphs.load_graph(folder / "graph.geojson"))
     # An export with few nodes may leave out rooms on purpose; none of these does.
     assert check.findings == ()
     return built
@@ -120,9 +120,11 @@ def test_maps_of_others(data, name, tmp_path):
 @pytest.mark.parametrize("apart_m", [0.4, 0.5, 0.65])
 def test_lanes(apart_m, tmp_path):
     topology = boxes(0)
-    graph = hn.keep_right(topology, hn.build_route_graph(topology), apart_m=apart_m)
+    graph = hn.ext.graphs.keep_right(
+        topology, hn.ext.graphs.build_route_graph(topology), apart_m=apart_m
+    )
     assert "lane" in graph.kinds
-    hn.export_nav2(graph, tmp_path / "lanes.geojson")
+    hn.ext.graphs.export_nav2(graph, tmp_path / "lanes.geojson")
     read, costmap = read_nav2(tmp_path / "lanes.geojson"), Costmap(topology.grid)
     assert min(costmap.depth(*point) for point in read.points.values()) > 5e-4
     assert not any(
@@ -136,7 +138,7 @@ def test_any_map(classes):
     if not (classes == hn.CellClass.FREE).any():
         return
     grid = occupancy_grid(classes)
-    graph = hn.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    graph = hn.ext.graphs.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
     costmap, points = Costmap(grid), graph.points.tolist()
     assert min(costmap.depth(*point) for point in points) > DEEP_CELLS
     for tail, head in graph.edges.tolist():
@@ -170,8 +172,8 @@ def floor(seed: int) -> hn.TopologicalMap:
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_no_route_is_a_tenth_longer_than_the_shortest_path(seed):
-    graph = hn.build_route_graph(floor(seed))
-    report = hn.judge_route_graph(graph, pairs=1500)
+    graph = hn.ext.graphs.build_route_graph(floor(seed))
+    report = hn.ext.graphs.judge_route_graph(graph, pairs=1500)
     assert report.best.solved == 1.0
     assert report.best.mean <= 0.02
     assert report.best.greatest <= 0.1
@@ -185,11 +187,11 @@ def test_a_robot_in_a_hall_is_near_a_node_and_leaves_by_the_nearest():
     cells[1:40, 150] = cells[60:-1, 150] = 1.0
     grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    graph = hn.build_route_graph(topology)
+    graph = hn.ext.graphs.build_route_graph(topology)
     centres = np.argwhere(FreeSpace.of(grid).free) + 0.5
     away = np.asarray(KDTree(graph.positions).query(centres)[0])
     assert away.max() * 0.1 <= 1.0
-    nearest = hn.judge_route_graph(graph, pairs=2000).nearest
+    nearest = hn.ext.graphs.judge_route_graph(graph, pairs=2000).nearest
     assert nearest.solved == 1.0
     assert nearest.mean <= 0.011
     assert nearest.greatest <= 0.15
@@ -212,7 +214,7 @@ def near_pairs(space: FreeSpace, count: int, reach: int) -> tuple[np.ndarray, np
 @pytest.mark.parametrize(("seed", "reach"), [(0, 4), (1, 30), (3, 10)])
 def test_pairs_near_each_other_have_short_routes_too(seed, reach):
     topology = floor(seed)
-    graph = hn.build_route_graph(topology)
+    graph = hn.ext.graphs.build_route_graph(topology)
     space = FreeSpace.of(topology.grid)
     starts, goals = near_pairs(space, 30_000, reach)
     lengths = Network.of(space.sight, graph.positions, graph.edges).join(starts, goals).best()
@@ -266,7 +268,7 @@ def test_no_node_lies_where_two_blocked_cells_meet():
         cells[row, col] = cells[row + 1, col + 1] = 1.0
     grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0)
     space = FreeSpace.of(grid)
-    graph = hn.build_route_graph(
+    graph = hn.ext.graphs.build_route_graph(
         hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
     )
     assert (graph.positions % 1 > 0).all()
@@ -278,15 +280,15 @@ def test_no_node_lies_where_two_blocked_cells_meet():
 
 
 @pytest.fixture(scope="module")
-def graph() -> hn.RouteGraph:
+def graph() -> hn.ext.graphs.RouteGraph:
     plan = np.zeros((30, 40))
     plan[:20, 20] = 1.0
     grid = grid_of(plan, hn.Frame(0.1, (3.0, 4.0), 1.0), robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
-    return hn.build_route_graph(topology, nodes=12)
+    return hn.ext.graphs.build_route_graph(topology, nodes=12)
 
 
-def walk(graph: hn.RouteGraph, rng: np.random.Generator, steps: int) -> list[int]:
+def walk(graph: hn.ext.graphs.RouteGraph, rng: np.random.Generator, steps: int) -> list[int]:
     """A walk along edges."""
     nodes = [int(rng.integers(graph.n_nodes))]
     for _ in range(steps):
@@ -297,9 +299,9 @@ def walk(graph: hn.RouteGraph, rng: np.random.Generator, steps: int) -> list[int
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_route_has_the_ids_and_costs_of_the_exported_file(
-    graph: hn.RouteGraph, seed: int, tmp_path: Any
+    graph: hn.ext.graphs.RouteGraph, seed: int, tmp_path: Any
 ) -> None:
-    hn.export_nav2(graph, tmp_path / "graph.geojson")
+    hn.ext.graphs.export_nav2(graph, tmp_path / "graph.geojson")
     file = read_nav2(tmp_path / "graph.geojson")
     nodes = walk(graph, np.random.default_rng(seed), seed)
     found = json.loads(json.dumps(route_messages(graph, nodes, frame_id="floor", stamp_ns=5)))
@@ -332,21 +334,23 @@ def test_a_route_has_the_ids_and_costs_of_the_exported_file(
         ([0, 0], "no edge leads from node 0 to node 0"),
     ],
 )
-def test_wrong_routes_are_refused_in_one_line(graph: hn.RouteGraph, nodes: Any, words: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=words):
+def test_wrong_routes_are_refused_in_one_line(
+    graph: hn.ext.graphs.RouteGraph, nodes: Any, words: str
+) -> None:
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
         route_messages(graph, nodes)
 
 
-def test_ids_that_messages_cannot_hold_are_refused(graph: hn.RouteGraph) -> None:
+def test_ids_that_messages_cannot_hold_are_refused(graph: hn.ext.graphs.RouteGraph) -> None:
     """Nodes that no edge leads to push the ids of edges over 65,535."""
     many = np.zeros((65_536, 2))
     many[: graph.n_nodes] = graph.positions
     large = replace(graph, positions=many)
     assert route_messages(large, [65_535])["route"]["nodes"][0]["nodeid"] == 65_535
-    with pytest.raises(hn.InvalidValueError, match="build the graph with fewer nodes"):
+    with pytest.raises(hn.errors.InvalidValueError, match="build the graph with fewer nodes"):
         route_messages(large, graph.edges[0].tolist())
 
 
 def test_other_things_than_graphs_are_refused() -> None:
-    with pytest.raises(hn.InvalidValueError, match="expected a RouteGraph"):
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a RouteGraph"):
         route_messages("graph", [0])  # type: ignore[arg-type]

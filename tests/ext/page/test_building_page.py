@@ -42,11 +42,11 @@ def _planned(shown: Shown) -> None:
 
 def test_start_and_goal_on_different_floors(shown: Shown, folder: Path) -> None:
     _planned(shown)
-    own = hn.load_building(folder / "building.yaml", robot_radius_m=0.2)
+    own = hn.ext.fleet.load_building(folder / "building.yaml", robot_radius_m=0.2)
     ends = []
     for number, point in ((0, (40.5, 20.5)), (1, (8.5, 60.5))):
         floor = own.floors[number]
-        at = floor.planner.topology.grid.frame.points_of_grid([point])[0]
+        at = floor.planner.grid.frame.points_of_grid([point])[0]
         ends.append((floor.name, tuple(at.tolist())))
     plan = own.plan(*ends)
     assert shown.length_m == pytest.approx(plan.length_m, abs=0.05)  # clicks fall on pixels
@@ -204,7 +204,7 @@ def test_a_saved_page_has_all_floors(
 ) -> None:
     del building  # has written the files
     out = folder.parent / "page.html"
-    own = hn.load_building(folder / "building.yaml", robot_radius_m=0.2)
+    own = hn.ext.fleet.load_building(folder / "building.yaml", robot_radius_m=0.2)
     points = []
     for floor, name in zip(own.floors, ("a", "h"), strict=True):
         x, y = floor.planner.topology.rooms.point_of(name)

@@ -47,7 +47,7 @@ def test_a_cut_leaves_every_cell_on_its_side(
     sure = np.abs(left) > 1e-6
     try:
         after = changed(ROOMS, change, GRID)
-    except hn.InvalidValueError:
+    except hn.errors.InvalidValueError:
         assert not (sure & mine & (left < 0)).any() or not (sure & mine & (left >= 0)).any()
         return
     assert after.names == ("a", "b", "c", "new")
@@ -63,7 +63,7 @@ def test_a_union_has_the_cells_of_both_and_the_first_name() -> None:
 
 
 def test_rooms_apart_do_not_merge() -> None:
-    with pytest.raises(hn.InvalidValueError, match="do not touch"):
+    with pytest.raises(hn.errors.InvalidValueError, match="do not touch"):
         changed(ROOMS, Merge(op="merge", room="a", other="c"), GRID)
 
 
@@ -93,7 +93,7 @@ def test_a_moved_corner_changes_the_cells_between_both_outlines(
     )
     try:
         found = changed(ROOMS, change, GRID)
-    except hn.InvalidValueError:
+    except hn.errors.InvalidValueError:
         assert any(not (expected[sure] == label).any() for label in range(3))
         return
     assert (found.label_of[sure] == expected[sure]).all()

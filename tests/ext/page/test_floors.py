@@ -22,16 +22,16 @@ GOAL: dict[str, Any] = {"floor": 1, "point": [60.5, 8.5]}
 QUERY: dict[str, Any] = {"start": START, "goal": GOAL, "preset": "shortest"}
 
 
-def _own(folder: Path) -> hn.Building:
-    return hn.load_building(folder / "building.yaml", robot_radius_m=0.2)
+def _own(folder: Path) -> hn.ext.fleet.Building:
+    return hn.ext.fleet.load_building(folder / "building.yaml", robot_radius_m=0.2)
 
 
-def _ends(building: hn.Building) -> list[Any]:
+def _ends(building: hn.ext.fleet.Building) -> list[Any]:
     ends = []
     for end in (START, GOAL):
         floor = building.floors[end["floor"]]
         x, y = end["point"]
-        at = floor.planner.topology.grid.frame.points_of_grid([(y, x)]).round(6)[0]
+        at = floor.planner.grid.frame.points_of_grid([(y, x)]).round(6)[0]
         ends.append((floor.name, tuple(at.tolist())))
     return ends
 
@@ -63,7 +63,7 @@ def test_a_plan_over_floors_is_that_of_the_library(building: Client, folder: Pat
     assert [part["floor"] for part in found["parts"]] == [0, 1]
     for part, result, floor in zip(found["parts"], plan.results, own.floors, strict=True):
         rows_and_cols = np.array(part["line"])[:, ::-1]
-        points = floor.planner.topology.grid.frame.points_of_grid(rows_and_cols)
+        points = floor.planner.grid.frame.points_of_grid(rows_and_cols)
         assert result.path is not None
         np.testing.assert_allclose(points, result.path.points, atol=1e-3)
     assert [ride["link"] for ride in found["rides"]] == [ride.link.name for ride in plan.rides]
@@ -72,7 +72,9 @@ def test_a_plan_over_floors_is_that_of_the_library(building: Client, folder: Pat
     by_cells = building.post("optimum", QUERY).value
     assert by_cells["metric"] == "octile"
     assert by_cells["cost"] == pytest.approx(
-        hn.load_building(folder / "building.yaml", robot_radius_m=0.2, preset="grid-astar")
+        hn.ext.fleet.load_building(
+            folder / "building.yaml", robot_radius_m=0.2, preset="grid-astar"
+        )
         .plan(*_ends(own))
         .cost
     )
@@ -134,7 +136,7 @@ def test_a_link_that_loses_its_room_is_named(
     building.post("floor/1/edit", {"version": 0, "change": change})
     notice = building.post("floor/1/save", {"version": 1}).value["notice"]
     assert notice.startswith(f"saved to rooms-2.yaml; {caution}")
-    with pytest.raises(hn.MapError):  # as the notice says, the file has to be changed
+    with pytest.raises(hn.errors.MapError):  # as the notice says, the file has to be changed
         _own(folder)
 
 
@@ -157,10 +159,10 @@ def test_rooms_outside_the_folder_are_not_saved(folder: Path) -> None:
 
 def test_floors_of_one_map_share_their_rooms(folder: Path) -> None:
     planner = session_of(folder / "four.yaml").planning.planner("shortest")
-    floors = [hn.Floor(name, planner) for name in ("1", "2")]
+    floors = [hn.ext.fleet.Floor(name, planner) for name in ("1", "2")]
     from hybridnav.ext.page import Site
 
-    with served(Site.of_building(hn.Building(floors), "twice"), folder) as client:
+    with served(Site.of_building(hn.ext.fleet.Building(floors), "twice"), folder) as client:
         change = {"op": "rename", "room": "a", "name": "kitchen"}
         assert client.post("floor/0/edit", {"version": 0, "change": change}).code == 200
         assert client.get("floor/1/rooms.json").value["rooms"][0]["name"] == "kitchen"
@@ -171,7 +173,7 @@ def test_a_floor_without_rooms_gets_those_that_are_found(folder: Path) -> None:
 
     grid = hn.load(folder / "four.yaml", robot_radius_m=0.2).grid
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    building = hn.Building([hn.Floor("1", planner)])
+    building = hn.ext.fleet.Building([hn.ext.fleet.Floor("1", planner)])
     with served(Site.of_building(building, "bare"), folder) as client:
         found = client.get("floor/0/rooms.json").value["rooms"]
         assert [room["name"] for room in found] == list(hn.find_rooms(grid).names)
@@ -185,7 +187,10 @@ def test_files_of_a_building(building: Client, folder: Path, tmp_path: Path) -> 
     before = sorted(file.name for file in folder.iterdir())
     model = tmp_path / "own.hnm"
     model.write_bytes(building.post("export/model", None).body)
-    assert [floor.name for floor in hn.load_building(model).floors] == ["ground", "2: upper"]
+    assert [floor.name for floor in hn.ext.fleet.load_building(model).floors] == [
+        "ground",
+        "2: upper",
+    ]
     own = _own(folder)
     plan = own.plan(*_ends(own))
     for number, result in enumerate(plan.results):
@@ -206,7 +211,7 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
     folder: Path, tmp_path: Path
 ) -> None:
     model, out = tmp_path / "building.hnm", tmp_path / "changed.hnm"
-    hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
+    hn.save(hn.ext.fleet.load_building(write_building(folder), robot_radius_m=0.2), model)
     before = sorted(tmp_path.iterdir())
     with served(building_site_of(model), tmp_path) as client:
         found = client.get("floor/1/map.json").value
@@ -217,6 +222,6 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
         content = client.post("export/model", None).body
     assert sorted(tmp_path.iterdir()) == before
     out.write_bytes(content)
-    rooms = hn.load_building(out).floors[1].rooms
+    rooms = hn.ext.fleet.load_building(out).floors[1].rooms
     assert rooms is not None
     assert set(rooms.names) == {"attic", "f", "g", "h"}

@@ -88,10 +88,10 @@ def test_cells_are_there_before_rooms(folder: Path) -> None:
 
 def test_what_cannot_be_prepared_ends_the_server(folder: Path) -> None:
     def make(_: Callable[[str], None]) -> Site:
-        raise hn.InvalidValueError("no rooms today")
+        raise hn.errors.InvalidValueError("no rooms today")
 
     opening = Opening(hn.load(folder / "four.yaml", robot_radius_m=0.2).grid, make)
-    with pytest.raises(hn.InvalidValueError, match="no rooms today"):
+    with pytest.raises(hn.errors.InvalidValueError, match="no rooms today"):
         serve(opening, folder)
 
 
@@ -131,20 +131,20 @@ def test_what_is_wrong_with_a_building_ends_the_server(folder: Path) -> None:
     file = write_building(folder)
     file.write_text(file.read_text("utf-8").replace("room: e}", "room: nowhere}"), "utf-8")
     opening = building_page(file).opening()
-    with pytest.raises(hn.MapError, match="nowhere"):
+    with pytest.raises(hn.errors.MapError, match="nowhere"):
         serve(opening, folder)
 
 
 def test_a_wrong_lowest_floor_is_refused_before_the_page_opens(folder: Path) -> None:
     file = write_building(folder)
     (folder / "four.yaml").unlink()
-    with pytest.raises(hn.MapError, match=r"floor ground.*four\.yaml"):
+    with pytest.raises(hn.errors.MapError, match=r"floor ground.*four\.yaml"):
         building_page(file).opening()
 
 
 def test_a_model_has_all_its_floors_at_once(folder: Path, tmp_path: Path) -> None:
     model = tmp_path / "building.hnm"
-    hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
+    hn.save(hn.ext.fleet.load_building(write_building(folder), robot_radius_m=0.2), model)
     shown = building_page(model, robot_radius_m=None).opening()
     assert isinstance(shown, Site)
 

@@ -145,7 +145,7 @@ def test_links_out_of_the_folder_are_not_followed(folder: Path) -> None:
     outside = folder.parent / "outside.yaml"
     (folder / "rooms.yaml").rename(outside)
     (folder / "rooms.yaml").symlink_to(outside)
-    with pytest.raises(hn.RoomsError, match="leads out of"):
+    with pytest.raises(hn.errors.RoomsError, match="leads out of"):
         session_of(folder / "four.yaml")
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines import Method, MethodResult
+from hybridnav.harness.baselines import MethodResult, Solver
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
 from hybridnav.harness.baselines.regions import joined_regions
 from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid, first_arcs
@@ -34,7 +34,7 @@ from tests.strategies import (
     scenes,
 )
 
-METHODS: dict[str, Callable[[OccupancyGrid], Method]] = {
+METHODS: dict[str, Callable[[OccupancyGrid], Solver]] = {
     "grid-astar": GridAstar,
     "grid-dijkstra": GridDijkstra,
     "weighted-astar-1.5": WeightedAstar,
@@ -52,7 +52,7 @@ WALL = drawn(
 )
 
 
-def make(name: str, grid: OccupancyGrid) -> Method:
+def make(name: str, grid: OccupancyGrid) -> Solver:
     """The method that tables call by this name."""
     method = METHODS[name](grid)
     assert method.name == name
@@ -199,7 +199,7 @@ def endpoints_match(answer: MethodResult, start: Cell, goal: Cell) -> bool:
     return cells is not None and tuple(cells[0]) == start and tuple(cells[-1]) == goal
 
 
-def assert_plan_holds(method: Method, answer: MethodResult, start: Cell, goal: Cell) -> None:
+def assert_plan_holds(method: Solver, answer: MethodResult, start: Cell, goal: Cell) -> None:
     """The plan goes from the start's place to the goal's, and the path stays inside it."""
     region_of = method.region_of
     assert region_of is not None

@@ -211,7 +211,7 @@ def test_an_arc_through_an_obstacle_is_seen_though_its_chord_is_free() -> None:
 
 @pytest.mark.parametrize("headings", [[0.0], [0.0, math.nan], [[0.0, 0.0]]])
 def test_headings_that_are_none_are_refused(headings: Any) -> None:
-    with pytest.raises(hn.InvalidValueError, match="state one for each point"):
+    with pytest.raises(hn.errors.InvalidValueError, match="state one for each point"):
         chords_of(GRID, [(2.0, 2.0), (3.0, 3.0)], headings)
 
 
@@ -262,9 +262,9 @@ def test_corners_are_cut_where_the_map_allows_it() -> None:
 def test_cells_and_layers_of_other_maps_are_refused() -> None:
     grid = grid_of(np.zeros((2, 3)), robot_radius_m=0)
     with pytest.raises(
-        hn.InvalidValueError,
+        hn.errors.InvalidValueError,
         match=r"goal is cell \(2, 0\), expected one of the map of 2 rows and 3 columns",
     ):
         CheapestCost(grid).cost_m((0, 0), (2, 0))
-    with pytest.raises(hn.InvalidValueError, match="costs of 4 x 4 cells are not those"):
+    with pytest.raises(hn.errors.InvalidValueError, match="costs of 4 x 4 cells are not those"):
         CheapestCost(grid, layer_of(np.ones((4, 4))))

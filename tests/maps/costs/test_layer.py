@@ -190,7 +190,7 @@ ARRAYS: list[tuple[Any, str]] = [
 
 @pytest.mark.parametrize(("given", "message"), ARRAYS)
 def test_unusable_factors_are_refused_in_one_line(given: Any, message: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)) as refused:
         layer_of(given)
     assert "\n" not in str(refused.value)
 
@@ -216,18 +216,20 @@ CALLS: list[tuple[str, Any, str]] = [
 def test_unusable_settings_are_refused_in_one_line(name: str, wrong: Any, message: str) -> None:
     grid = grid_of(np.zeros((1, 2)), robot_radius_m=0)
     settings = {} if name == "clearance" else {"values": [[0, 0]]}
-    with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
+    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)) as refused:
         getattr(hn.CostLayer, name)(grid, **settings | wrong)
     assert "\n" not in str(refused.value)
 
 
 def test_layers_of_other_shapes_and_closed_cells_of_other_kinds_are_refused() -> None:
     layer = layer_of(np.ones((2, 3)))
-    with pytest.raises(hn.InvalidValueError, match="cannot be joined"):
+    with pytest.raises(hn.errors.InvalidValueError, match="cannot be joined"):
         layer | layer_of(np.ones((3, 2)))
-    with pytest.raises(hn.InvalidValueError, match="closed cells must be bool of the shape"):
+    with pytest.raises(hn.errors.InvalidValueError, match="closed cells must be bool of the shape"):
         layer_of(np.ones((2, 3)), np.zeros((2, 3)))
-    with pytest.raises(hn.InvalidValueError, match="costs of 3 x 2 cells are not those of a map"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="costs of 3 x 2 cells are not those of a map"
+    ):
         layer.check_fits(grid_of(np.zeros((3, 3))))
 
 
@@ -250,7 +252,9 @@ def test_a_changed_layer_differs_in_the_box_alone() -> None:
     np.testing.assert_array_equal(back.factors, old.factors)
     np.testing.assert_array_equal(back.closed, old.closed)
     for row, col in ((-1, 0), (5, 0), (0, 6), (0, -1)):
-        with pytest.raises(hn.InvalidValueError, match="do not lie inside costs of 8 x 6 cells"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="do not lie inside costs of 8 x 6 cells"
+        ):
             old.changed(part, row, col)
 
 
@@ -266,7 +270,7 @@ def test_a_changed_layer_differs_in_the_box_alone() -> None:
     ids=lambda box: f"{type(box).__name__}",
 )
 def test_a_part_that_is_no_box_is_refused_in_one_line(box: Any) -> None:
-    with pytest.raises(hn.InvalidValueError, match="inside costs of 8 x 6 cells") as raised:
+    with pytest.raises(hn.errors.InvalidValueError, match="inside costs of 8 x 6 cells") as raised:
         layer_of(np.ones((6, 8))).part(box)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 250
@@ -282,7 +286,7 @@ def test_a_part_that_is_no_box_is_refused_in_one_line(box: Any) -> None:
 )
 def test_a_change_at_no_cell_of_the_layer_is_refused_in_one_line(where: Any) -> None:
     layer = layer_of(np.ones((6, 8)))
-    with pytest.raises(hn.InvalidValueError, match=r"two whole|do not lie") as raised:
+    with pytest.raises(hn.errors.InvalidValueError, match=r"two whole|do not lie") as raised:
         layer.changed(layer_of(np.ones((1, 1))), *where)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 250
@@ -290,7 +294,7 @@ def test_a_change_at_no_cell_of_the_layer_is_refused_in_one_line(where: Any) -> 
 
 @pytest.mark.parametrize("part", [None, "layer", 1.5, np.ones((1, 1)), [[1.0]], 10**5000], ids=type)
 def test_a_change_to_no_layer_is_refused_in_one_line(part: Any) -> None:
-    with pytest.raises(hn.InvalidValueError, match="expected a CostLayer") as raised:
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a CostLayer") as raised:
         layer_of(np.ones((6, 8))).changed(part, 0, 0)
     assert "\n" not in str(raised.value)
 
@@ -416,5 +420,5 @@ def test_a_point_costs_nothing_and_a_diagonal_passes_no_side_cell() -> None:
 )
 def test_unusable_points_are_refused(points: Any, message: str) -> None:
     grid = grid_of(np.zeros((2, 2)), robot_radius_m=0)
-    with pytest.raises(hn.InvalidValueError, match=re.escape(message)):
+    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)):
         cost_along(grid, layer_of(np.ones((2, 2))), points)

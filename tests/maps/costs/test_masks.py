@@ -79,13 +79,13 @@ def test_masks_become_layers_of_the_map(tmp_path: Path) -> None:
 
 def test_unreadable_masks_are_refused(tmp_path: Path) -> None:
     grid = grid_of(np.zeros((1, 12)), robot_radius_m=0)
-    with pytest.raises(hn.MapNotFoundError):
+    with pytest.raises(hn.errors.MapNotFoundError):
         hn.load_speed_mask(tmp_path / "none.yaml", grid)
-    with pytest.raises(hn.MapError, match="mode must be one of"):
+    with pytest.raises(hn.errors.MapError, match="mode must be one of"):
         hn.load_keepout_mask(mask_file(tmp_path, "loud"), grid)
-    with pytest.raises(hn.MapError, match="cells"):
+    with pytest.raises(hn.errors.MapError, match="cells"):
         hn.load_keepout_mask(mask_file(tmp_path, "raw"), grid, max_cells=5)
-    with pytest.raises(hn.InvalidValueError, match="full_speed_mps is needed"):
+    with pytest.raises(hn.errors.InvalidValueError, match="full_speed_mps is needed"):
         hn.load_speed_mask(mask_file(tmp_path, "raw"), grid, unit="m/s")
 
 
@@ -138,12 +138,12 @@ def test_the_frame_of_the_mask_has_a_pose() -> None:
     ],
 )
 def test_wrong_infos_are_refused_in_one_line(of: Any, words: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=words):
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
         filter_costs(GRID, of, MASK)
 
 
 def test_wrong_masks_are_refused_as_masks() -> None:
-    with pytest.raises(hn.InvalidValueError, match="filter mask: data has 1 values"):
+    with pytest.raises(hn.errors.InvalidValueError, match="filter mask: data has 1 values"):
         filter_costs(GRID, info(0, 0, 1), MASK | {"data": [0]})
 
 
@@ -266,7 +266,7 @@ def test_a_mask_may_have_another_size_in_the_frame_of_the_map() -> None:
     small = hn.CostLayer.keepout_mask(grid, [[0, 100]], grid.frame)
     assert small.keepout is not None
     assert small.keepout.tolist() == [[False, True, False, False], [False] * 4]
-    with pytest.raises(hn.InvalidValueError, match="give the frame of the mask"):
+    with pytest.raises(hn.errors.InvalidValueError, match="give the frame of the mask"):
         hn.CostLayer.keepout_mask(grid, [[0, 100]])
 
 
@@ -286,7 +286,7 @@ def test_wrong_poses_are_refused_in_one_line(tmp_path: Path, pose: Any) -> None:
     grid = grid_of(np.zeros((1, 1)), robot_radius_m=0)
     path = write_mask(tmp_path, np.array([[100]]), hn.Frame())
     for load in (hn.load_keepout_mask, hn.load_speed_mask, hn.load_blocked):
-        with pytest.raises(hn.InvalidValueError) as error:
+        with pytest.raises(hn.errors.InvalidValueError) as error:
             load(path, grid, pose=pose)
         assert "\n" not in str(error.value)
 
@@ -372,20 +372,20 @@ def test_presets_with_costs_take_the_mask_as_costs(floor: Any, preset: str) -> N
 def test_presets_on_lengths_name_the_way_that_they_have(floor: Any) -> None:
     grid, topology, path = floor
     layer = hn.load_keepout_mask(path, grid, pose=POSE)
-    with pytest.raises(hn.InvalidValueError, match="closed cells alone go as `blocked`"):
+    with pytest.raises(hn.errors.InvalidValueError, match="closed cells alone go as `blocked`"):
         hn.HybridPlanner(topology, preset="shortest", costs=layer)
 
 
 def test_a_mask_that_closes_nothing_here_is_refused(floor: Any) -> None:
     grid, _, path = floor
-    with pytest.raises(hn.MapError, match="closes no cell of the map"):
+    with pytest.raises(hn.errors.MapError, match="closes no cell of the map"):
         hn.load_blocked(path, grid)  # without the pose it lies elsewhere
 
 
 def test_a_pose_goes_with_masks_alone(floor: Any, tmp_path: Path) -> None:
     line = tmp_path / "line.geojson"
     line.write_text('{"type": "LineString", "coordinates": [[1, 1], [2, 2]]}')
-    with pytest.raises(hn.InvalidValueError, match="goes with a mask of map_server"):
+    with pytest.raises(hn.errors.InvalidValueError, match="goes with a mask of map_server"):
         hn.load_blocked(line, floor[0], pose=POSE)
 
 
@@ -420,7 +420,7 @@ MASKS = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 @pytest.mark.parametrize("mask", MASKS)
 def test_masks_that_people_drew_close_their_cells(data: Path, mask: str) -> None:
     """By Pillow and index arithmetic: the masks have the yaw 0 and the resolution of the map."""
@@ -444,7 +444,7 @@ def test_masks_that_people_drew_close_their_cells(data: Path, mask: str) -> None
     assert (layer.keepout == expected).all()
 
 
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 def test_the_speed_mask_of_nav2_slows_its_lanes(data: Path) -> None:
     grid = hn.load_map(data / "nav2/maps/depot.yaml", robot_radius_m=0)
     path = data / "nav2/filter_masks/depot_speed.yaml"

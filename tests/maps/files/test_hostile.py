@@ -418,7 +418,7 @@ def _huge(folder):
 def test_a_huge_map_is_refused_with_its_cells_its_memory_and_the_option(tmp_path, monkeypatch):
     path = _huge(tmp_path)
     monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("pixels were read"))
-    with pytest.raises(hn.MapError, match="5000 x 5000 = 25,000,000 cells, ") as refused:
+    with pytest.raises(hn.errors.MapError, match="5000 x 5000 = 25,000,000 cells, ") as refused:
         hn.load_map(path)
     told = str(refused.value)
     assert LIMIT + "up to 7.5 GB" in told
@@ -430,19 +430,23 @@ def test_a_huge_map_is_refused_with_its_cells_its_memory_and_the_option(tmp_path
 def test_a_huge_movingai_map_is_refused_by_its_header(tmp_path):
     path = tmp_path / "huge.map"
     path.write_text("type octile\nheight 5000\nwidth 5000\nmap\n")
-    with pytest.raises(hn.MapError, match="5000 x 5000 = 25,000,000 cells, " + LIMIT):
+    with pytest.raises(hn.errors.MapError, match="5000 x 5000 = 25,000,000 cells, " + LIMIT):
         hn.load_map(path)
 
 
 def test_the_limit_is_inclusive_and_may_be_raised_and_lowered(maps):
     for path in maps:
         assert hn.load_map(path, max_cells=600).shape == (20, 30)
-        with pytest.raises(hn.MapError, match="30 x 20 = 600 cells, more than the limit of 599;"):
+        with pytest.raises(
+            hn.errors.MapError, match="30 x 20 = 600 cells, more than the limit of 599;"
+        ):
             hn.load_map(path, max_cells=599)
-        with pytest.raises(hn.InvalidValueError, match="max_cells must be a positive number"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="max_cells must be a positive number"
+        ):
             hn.load_map(path, max_cells=0)
         read_map.cache_clear()
-        with pytest.raises(hn.MapError, match="limit of 599"):
+        with pytest.raises(hn.errors.MapError, match="limit of 599"):
             read_map(MapSpec(str(path), 0.0, max_cells=599))
 
 
@@ -469,5 +473,5 @@ def test_a_label_image_of_another_size_is_refused_by_its_header(maps, tmp_path, 
     _huge(tmp_path)
     (tmp_path / "rooms.yaml").write_text("locations: [hall]\ndata: huge.png\n")
     monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("pixels were read"))
-    with pytest.raises(hn.RoomsError, match="image of 5000 x 5000 pixels, the map has"):
+    with pytest.raises(hn.errors.RoomsError, match="image of 5000 x 5000 pixels, the map has"):
         hn.load_rooms(tmp_path / "rooms.yaml", grid)

@@ -202,7 +202,7 @@ def test_the_first_line_of_the_map_is_its_highest_row(folder):
 
 def test_what_cannot_be_written_is_refused(folder):
     grid = occupancy_grid(drawn("."))
-    with pytest.raises(hn.MapError, match=r"must be named \.map"):
+    with pytest.raises(hn.errors.MapError, match=r"must be named \.map"):
         hn.write_movingai_map(grid, folder / "map.txt")
-    with pytest.raises(hn.MapError, match="cannot write"):
+    with pytest.raises(hn.errors.MapError, match="cannot write"):
         hn.write_movingai_map(grid, folder / "none" / "one.map")

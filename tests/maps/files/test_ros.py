@@ -413,7 +413,7 @@ def written_again(path: Path, folder: Path) -> Path:
     thresholds(),
 )
 @settings(max_examples=examples(100))
-@pytest.mark.filterwarnings("ignore:.* cells have grey 205:hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore:.* cells have grey 205:hybridnav.errors.MapWarning")
 def test_an_image_of_8_bits_is_written_with_equal_pixels(
     folder: Path,
     pixels: np.ndarray,
@@ -457,7 +457,7 @@ def test_cells_keep_their_class_and_nearly_their_occupancy(
     hn.write_ros_map(grid, folder / "any.yml")
     with warnings.catch_warnings():
         # A free cell may have the grey of unknown ones, which a reader is warned of.
-        warnings.simplefilter("ignore", hn.MapWarning)
+        warnings.simplefilter("ignore", hn.errors.MapWarning)
         again = hn.load_map(folder / "any.yml", robot_radius_m=0)
     assert np.array_equal(again.measured, grid.measured)
     known = ~np.isnan(probability)
@@ -484,15 +484,15 @@ def test_the_description_is_yaml_as_map_saver_writes_it(tmp_path: Path) -> None:
 
 def test_a_map_that_cannot_be_written_is_refused_in_one_line(tmp_path: Path) -> None:
     grid = hn.example_map("figure1")
-    with pytest.raises(hn.InvalidValueError, match="expected an OccupancyGrid"):
+    with pytest.raises(hn.errors.InvalidValueError, match="expected an OccupancyGrid"):
         hn.write_ros_map(grid.classes, tmp_path / "map.yaml")  # type: ignore[arg-type]
-    with pytest.raises(hn.MapError, match=r"must be named \.yaml"):
+    with pytest.raises(hn.errors.MapError, match=r"must be named \.yaml"):
         hn.write_ros_map(grid, tmp_path / "map.pgm")
-    with pytest.raises(hn.MapError, match="cannot write"):
+    with pytest.raises(hn.errors.MapError, match="cannot write"):
         hn.write_ros_map(grid, tmp_path / "none" / "map.yaml")
     narrow = hn.OccupancyGrid(
         np.array([[0.5]], np.float32), free_threshold=0.4999, occupied_threshold=0.5001
     )
-    with pytest.raises(hn.MapError, match="leave no grey of 8 bits for unexplored cells"):
+    with pytest.raises(hn.errors.MapError, match="leave no grey of 8 bits for unexplored cells"):
         hn.write_ros_map(narrow, tmp_path / "narrow.yaml")
     assert list(tmp_path.iterdir()) == []

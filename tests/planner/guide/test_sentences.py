@@ -203,7 +203,7 @@ def test_an_arrival_behind_the_door_of_the_room_needs_no_line():
 
 @pytest.mark.parametrize("given", ["fr", "EN", "", "english", None, 7, "x" * 500])
 def test_an_unknown_language_is_refused_in_one_line(given):
-    with pytest.raises(hn.InvalidValueError) as refused:
+    with pytest.raises(hn.errors.InvalidValueError) as refused:
         sentences([], given)
     assert str(refused.value).startswith("language must be one of de (Deutsch), en (English), got ")
     assert "\n" not in str(refused.value)

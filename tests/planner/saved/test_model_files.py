@@ -64,7 +64,7 @@ def read_all(path: Path) -> list[float]:
 
 def refusal(path: Path) -> str:
     """The line with which a file is refused."""
-    with pytest.raises(hn.ModelError) as raised:
+    with pytest.raises(hn.errors.ModelError) as raised:
         read_all(path)
     text = str(raised.value)
     assert text.isprintable()
@@ -187,7 +187,7 @@ CRAFTED: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "wrong value": (put("grid", "values", "resolution_m", to=-1.0), "resolution"),
     "text as value": (put("mesh", "values", "expanded", to="many"), "expanded"),
     "wrong levels": (put("pyramid", "values", "tops", to=[500, 501]), "tops"),
-    "wrong preset": (put("preset", "values", "planner", to={"method": "x"}), "method"),
+    "wrong preset": (put("preset", "values", "planner", to={"method": "x"}), "Input tag 'x'"),
     "wrong name": (put("rooms", "values", "names", to=["1,2"]), "point"),
     "wrong type": (put("mesh", "arrays", "kinds", "dtype", to="int8"), "kinds is int8"),
     "object type": (put("mesh", "arrays", "kinds", "dtype", to="object"), "dtype"),
@@ -212,7 +212,7 @@ def test_a_header_that_cannot_be_is_refused(name: str, content: bytes, tmp_path:
     change, words = CRAFTED[name]
     path = tmp_path / "m.hnm"
     path.write_bytes(altered(content, change))
-    with pytest.raises(hn.MapError) as raised:
+    with pytest.raises(hn.errors.MapError) as raised:
         read_all(path)
     text = str(raised.value)
     assert text.isprintable()
@@ -314,7 +314,7 @@ def test_values_that_contradict_each_other_are_found_though_their_checksum_is_ri
     arrays.update({name: array.copy() for name, array in arrays.items()})
     change(arrays)
     container.write_parts(path, found, compress=False)
-    with pytest.raises(hn.ModelError, match=f"{kind}: .*{message}"):
+    with pytest.raises(hn.errors.ModelError, match=f"{kind}: .*{message}"):
         prepared_planners(path)
 
 
@@ -334,7 +334,7 @@ def test_other_files_are_no_models(tmp_path: Path) -> None:
     path.mkdir()
     assert "no file" in refusal(path)
     path.rmdir()
-    with pytest.raises(hn.MapNotFoundError, match="no such file"):
+    with pytest.raises(hn.errors.MapNotFoundError, match="no such file"):
         hn.load(path)
 
 
@@ -354,7 +354,7 @@ before = peak_kb()
 for path in sys.argv[2:]:
     try:
         hn.load(path).topology
-    except hn.MapError as error:
+    except hn.errors.MapError as error:
         print(error)
 print(peak_kb() - before)
 """

@@ -275,7 +275,7 @@ def test_what_is_written_to_arrays_of_a_model_stays_out_of_its_file(tmp_path: Pa
     ],
 )
 def test_other_things_are_no_models(thing: Any, words: str, tmp_path: Path) -> None:
-    with pytest.raises(hn.InvalidValueError, match=words):
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
         hn.save(thing, tmp_path / "m.hnm")
     assert list(tmp_path.iterdir()) == []
 
@@ -283,14 +283,14 @@ def test_other_things_are_no_models(thing: Any, words: str, tmp_path: Path) -> N
 def test_planners_of_several_maps_are_no_model(tmp_path: Path) -> None:
     other = hn.TopologicalMap(hn.DualGraphPyramid.build(topology().grid))
     planners = [hn.HybridPlanner(on) for on in (topology(), other)]
-    with pytest.raises(hn.InvalidValueError, match="one topological map"):
+    with pytest.raises(hn.errors.InvalidValueError, match="one topological map"):
         hn.save(planners, tmp_path / "m.hnm")
 
 
 def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path) -> None:
-    with pytest.raises(hn.InvalidValueError, match="must end in"):
+    with pytest.raises(hn.errors.InvalidValueError, match="must end in"):
         hn.save(topology(), tmp_path / "m.model")
-    with pytest.raises(hn.ModelError, match="cannot be written"):
+    with pytest.raises(hn.errors.ModelError, match="cannot be written"):
         hn.save(topology(), tmp_path / "nowhere" / "m.hnm")
 
 

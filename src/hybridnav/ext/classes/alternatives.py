@@ -128,7 +128,7 @@ class ClassTours:
         assert own.path is not None  # noqa: S101 - the first is solved
         endpoints = _endpoints(own)
         found = self._paths(endpoints, count, None if self._closed is None else self._closed.flat)
-        per_cell = self._planner.topology.grid.resolution_m
+        per_cell = self._planner.grid.resolution_m
         bound_m = found.shortest_cells * per_cell
         results: dict[Word, PlanResult] = {}
         length_cells = path_length_in_cells(own.path.cells)
@@ -198,7 +198,7 @@ class ClassTours:
 
     def _shortest(self, endpoints: tuple[Cell, Cell]) -> LongArray:
         """Return a shortest path of cells."""
-        grid = self._planner.topology.grid
+        grid = self._planner.grid
         search = GridSearch(grid.enterable(allow_unexplored=self._allowed), corner_cutting=False)
         flat = None if self._closed is None else self._closed.flat
         cells = search.search(*endpoints, blocked=flat).cells
@@ -226,7 +226,7 @@ class ClassTours:
         self, result: PlanResult, other: ClassPath, closed: LongArray, bound_m: float
     ) -> PlanResult:
         """Return the result of a path of cells in the metric of another result."""
-        grid = self._planner.topology.grid
+        grid = self._planner.grid
         length_m = other.length_cells * grid.resolution_m
         found = self._result(result, other.cells, length_m, min(bound_m, length_m))
         if result.metric == "octile":

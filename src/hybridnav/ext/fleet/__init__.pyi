@@ -27,5 +27,11 @@ from .link_nodes import (
 from .links import Link as Link, LinkEnd as LinkEnd, LinkKind as LinkKind
 from .plan import BuildingPlan as BuildingPlan, Ride as Ride
 from .plot import plot_building as plot_building
+from .files import (
+    building_graph as building_graph,
+    floor_graph as floor_graph,
+    load_building as load_building,
+    load_building_graph as load_building_graph,
+)
 
 __all__: list[str]

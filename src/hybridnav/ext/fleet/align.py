@@ -50,11 +50,12 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import FloorGraph, moved_floor
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=1.0, y=0.0)
-    >>> floor = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    >>> floor = FloorGraph(name="1", graph=WaypointGraph.from_networkx(plain))
     >>> moved_floor(floor, (10.0, 0.0, np.pi / 2)).graph.points.round(6).tolist()
     [[10.0, 1.0]]
     """
@@ -98,11 +99,12 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, align_floors
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
     >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (5, 0)), LinkEnd("2", (2, 1))))
     >>> aligned = align_floors(BuildingGraph(name="house", floors=floors, links=(lift,)))

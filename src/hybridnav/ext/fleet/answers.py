@@ -214,8 +214,9 @@ class BuildingAlternatives(Sequence["BuildingPlan"]):
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    >>> house = Building([Floor("1", hn.HybridPlanner(topology))])
     >>> found = house.alternatives(("1", (0.5, 0.5)), ("1", (2.0, 2.5)), 2)
     >>> len(found), found[0].solved, found.complete
     (1, True, True)

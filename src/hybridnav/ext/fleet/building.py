@@ -60,11 +60,12 @@ class Building:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
-    >>> lift = hn.Link(name="lift", kind="lift", ends=ends, wait_s=20, ride_s=5)
-    >>> building = hn.Building(floors, [lift])
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> lift = Link(name="lift", kind="lift", ends=ends, wait_s=20, ride_s=5)
+    >>> building = Building(floors, [lift])
     >>> plan = building.plan(("1", (1.5, 0.5)), ("2", (2.0, 2.5)))
     >>> round(plan.length_m, 3), plan.charge_m, plan.gap
     (3.546, 12.5, 0.0)
@@ -102,7 +103,7 @@ class Building:
     @property
     def robot_radius_m(self) -> float:
         """Radius of the robot that all floors are for, in metres."""
-        return self.floors[0].planner.topology.grid.robot_radius_m
+        return self.floors[0].planner.grid.robot_radius_m
 
     def floor(self, name: str) -> Floor:
         """Return the floor with a name.
@@ -389,7 +390,7 @@ def refusal_of(
         if isinstance(end.waypoint, str):
             continue
         planner = floors[end.floor].planner
-        grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
+        grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
         point = read_point(kind, end.waypoint)
         cells = cells_of_endpoints(grid, (point, point), allow_unexplored=allowed)
         status = cells if isinstance(cells, PlanStatus) else None

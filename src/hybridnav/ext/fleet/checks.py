@@ -48,9 +48,9 @@ def check_floors(floors: Sequence[Floor]) -> None:
                 "which ends of links do not have: take a preset without"
             )
     first = floors[0]
-    radius_m = first.planner.topology.grid.robot_radius_m
+    radius_m = first.planner.grid.robot_radius_m
     for floor in floors[1:]:
-        other_m = floor.planner.topology.grid.robot_radius_m
+        other_m = floor.planner.grid.robot_radius_m
         if other_m != radius_m:
             raise InvalidValueError(
                 f"floor {floor.name} is for a robot radius of {other_m:g} m and floor "
@@ -102,13 +102,13 @@ def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
                 f"link {link.name}: no floor is called {end.floor!r:.80}"
                 f"{did_you_mean(end.floor, tuple(floors))}"
             )
-        if link.admits(floors[end.floor].planner.topology.grid.robot_radius_m):
+        if link.admits(floors[end.floor].planner.grid.robot_radius_m):
             _check_free(link, end, floors[end.floor])
 
 
 def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
     planner = floor.planner
-    grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
+    grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
     x, y = end.position_m
     at = f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name}"
     row, col = grid.frame.cell_of(x, y)
@@ -160,7 +160,7 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
         When an end lies in such a part.
     """
     for end in link.ends:
-        grid = floors[end.floor].planner.topology.grid
+        grid = floors[end.floor].planner.grid
         if not link.admits(grid.robot_radius_m):
             continue
         of_cell, sizes = parts[end.floor]
@@ -192,7 +192,7 @@ def parts_of(
     """
     from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
 
-    grid = floor.planner.topology.grid
+    grid = floor.planner.grid
     is_open = grid.enterable(allow_unexplored=allow_unexplored).copy()
     if closed is not None:
         is_open.ravel()[closed] = False

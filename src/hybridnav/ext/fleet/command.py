@@ -42,12 +42,14 @@ def preset_of_floors(reading: MapOptions) -> hn.Preset | None:
     return read_settings(reading.preset, reading.overrides, None, None)
 
 
-def load_floors(file: Path, reading: MapOptions, seconds: dict[str, float]) -> hn.Building:
+def load_floors(
+    file: Path, reading: MapOptions, seconds: dict[str, float]
+) -> hn.ext.fleet.Building:
     """Load a building as the options say."""
     preset = preset_of_floors(reading)
     load_numba()
     with stage(f"reading {file}", seconds, "load"):
-        return hn.load_building(
+        return hn.ext.fleet.load_building(
             file,
             robot_radius_m=reading.robot_radius_m,
             preset=preset,
@@ -86,7 +88,7 @@ def plan_over_floors(
     others: BuildingAlternatives | None = None
     with stage("planning", {}, "plan"):
         if alternatives == 1:
-            plans: Sequence[hn.BuildingPlan] = (building.plan(first, last, **how),)
+            plans: Sequence[hn.ext.fleet.BuildingPlan] = (building.plan(first, last, **how),)
         else:
             how["max_stretch"] = 2.0 if max_stretch is None else max_stretch
             plans = others = building.alternatives(first, last, alternatives, **how)
@@ -123,7 +125,7 @@ def _typed(option: str, point: Any, other: str, text: str | None) -> str:
 
 
 def _closures(
-    building: hn.Building, blocked: Sequence[str]
+    building: hn.ext.fleet.Building, blocked: Sequence[str]
 ) -> tuple[list[str], dict[str, hn.Blocked]]:
     """Return the closed links, and what is closed on each floor."""
     links: list[str] = []
@@ -141,14 +143,14 @@ def _closures(
             texts.setdefault(building.floor(kind).name, []).append(rest)
     closed_on = {}
     for name, given in texts.items():
-        grid = building.floor(name).planner.topology.grid
+        grid = building.floor(name).planner.grid
         closed = parsed_closing(given).read(grid)
         if closed is not None:
             closed_on[name] = closed
     return links, closed_on
 
 
-def _summary(file: Path, building: hn.Building, figures: dict[str, Any]) -> str:
+def _summary(file: Path, building: hn.ext.fleet.Building, figures: dict[str, Any]) -> str:
     """Return the lines that describe the answer to a person."""
     radius = f"robot radius {building.robot_radius_m:g} m"
     name = printable(file.name)
@@ -184,7 +186,7 @@ def _route_lines(figures: dict[str, Any]) -> list[str]:
     ]
 
 
-def _endpoint(text: str, building: hn.Building) -> Any:
+def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:
     """Return the start or goal that a text names: `FLOOR:X,Y`, `FLOOR:NAME`, or a name."""
     floors = tuple(floor.name for floor in building.floors)
     # The longest name first: one floor may be called as another one with a colon.

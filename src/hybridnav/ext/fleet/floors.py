@@ -36,8 +36,9 @@ class Floor:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Floor
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> hn.Floor("3", hn.HybridPlanner(topology), elevation_m=7.2).name
+    >>> Floor("3", hn.HybridPlanner(topology), elevation_m=7.2).name
     '3'
     """
 
@@ -99,9 +100,9 @@ class FloorTable:
         self.positions_m = positions_m
         self._positions: list[tuple[float, float]] = positions_m.tolist()
         planner = floor.planner
-        self._of = planner.topology, planner.costs
+        self._of = planner.grid, planner.costs
         is_any_angle = planner.method.metric == "any-angle"
-        self._slack_m = 0.0 if is_any_angle else math.sqrt(2) * planner.topology.grid.resolution_m
+        self._slack_m = 0.0 if is_any_angle else math.sqrt(2) * planner.grid.resolution_m
         """Metres by which a path between two points may be shorter than the line between them:
         paths of cells lead from centre to centre."""
         n = len(positions_m)
@@ -130,7 +131,7 @@ class FloorTable:
     def is_current(self) -> bool:
         """Whether the planner still has the map and the costs of the table."""
         planner = self.floor.planner
-        return planner.topology is self._of[0] and planner.costs is self._of[1]
+        return planner.grid is self._of[0] and planner.costs is self._of[1]
 
     def renewed(self) -> FloorTable:
         """Return the table itself while it is current, else an empty one of the map now."""
@@ -200,7 +201,7 @@ class FloorTable:
         if not isinstance(waypoint, str):
             away = positions_m - np.asarray(waypoint, dtype=np.float64)[:2]
             return np.hypot(away[:, 0], away[:, 1])
-        grid = self.floor.planner.topology.grid
+        grid = self.floor.planner.grid
         at = grid.frame.positions_of(positions_m)
         low, high = self._box_of(waypoint)
         away = np.maximum(np.maximum(low - at, at - high), 0.0)
@@ -212,7 +213,7 @@ class FloorTable:
         assert rooms is not None  # noqa: S101 - names have been checked
         corners = []
         if name in rooms.points:
-            frame = self.floor.planner.topology.grid.frame
+            frame = self.floor.planner.grid.frame
             corners.append(frame.positions_of(np.array([rooms.points[name]])))
         box = self._boxes[rooms.index(name)] if name in rooms.names else None
         if box is not None:

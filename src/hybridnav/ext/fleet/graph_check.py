@@ -33,10 +33,11 @@ class BuildingGraphCheck:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph
     >>> from hybridnav.ext.fleet import check_building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = hn.Building([hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> graph = hn.building_graph(house, nodes=20)
+    >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
+    >>> graph = building_graph(house, nodes=20)
     >>> check = check_building_graph(match_graph(house, graph))
     >>> check.count, list(check.floors)
     (0, ['1', '2'])
@@ -80,10 +81,11 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph
     >>> from hybridnav.ext.fleet import check_building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = hn.Building([hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> drawn = hn.building_graph(hn.Building(house.floors[:1]), nodes=20)
+    >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
+    >>> drawn = building_graph(Building(house.floors[:1]), nodes=20)
     >>> check = check_building_graph(match_graph(house, drawn))
     >>> [found.kind for found in check.findings]
     ['floor-missing']
@@ -168,7 +170,7 @@ def _parts(network: BuildingNetwork) -> LongArray:
             at = []
             for end in link.ends:
                 index = names.index(end.floor)
-                grid = network.building.floors[index].planner.topology.grid
+                grid = network.building.floors[index].planner.grid
                 part = int(part_at[index][grid.frame.cell_of(*end.position_m)])
                 at += [bases[index] + part] if part >= 0 else []
             joined += [(at[0], other) for other in at[1:]]

@@ -161,12 +161,13 @@ def judge_building_graph(
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, building_graph
     >>> from hybridnav.ext.fleet import judge_building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
-    >>> house = hn.Building(floors, [hn.Link(name="lift", kind="lift", ends=ends)])
-    >>> matched = match_graph(house, hn.building_graph(house, nodes=20))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
+    >>> matched = match_graph(house, building_graph(house, nodes=20))
     >>> judge_building_graph(matched, pairs=20).counts["all"].answers
     {'solved': 20}
     """
@@ -212,8 +213,8 @@ def drawn_pairs(
     for index, floor in enumerate(building.floors):
         labels = parts_of(floor)
         area_m2 = np.bincount(labels[labels >= 0], minlength=1).astype(np.float64)
-        area_m2 *= floor.planner.topology.grid.cell_area_m2
-        is_inside = (labels >= 0) & ~outside_of(floor.planner.topology.grid)
+        area_m2 *= floor.planner.grid.cell_area_m2
+        is_inside = (labels >= 0) & ~outside_of(floor.planner.grid)
         large = np.argwhere(is_inside & (area_m2[labels] >= LEAST_AREA_M2))
         if len(large):
             cells_of[index] = large.astype(np.float64) + 0.5
@@ -242,7 +243,7 @@ def _judged(
     graph_s = time.perf_counter() - began
     building = network.building
     ends = [
-        (floor.name, floor.planner.topology.grid.frame.points_of_grid(at[None])[0])
+        (floor.name, floor.planner.grid.frame.points_of_grid(at[None])[0])
         for floor, at in ((building.floors[index], at) for index, at in (start, goal))
     ]
     began = time.perf_counter()
@@ -294,5 +295,5 @@ def _counts(judged: Sequence[_Judged]) -> RouteCounts:
 
 def _text(building: Building, end: Position) -> str:
     floor = building.floors[end[0]]
-    x, y = floor.planner.topology.grid.frame.points_of_grid(end[1][None])[0].tolist()
+    x, y = floor.planner.grid.frame.points_of_grid(end[1][None])[0].tolist()
     return f"{floor.name}:{x:.2f},{y:.2f}"

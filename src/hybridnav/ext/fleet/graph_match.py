@@ -58,10 +58,10 @@ class MatchedGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.fleet import match_graph
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = hn.Building([hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> matched = match_graph(house, hn.building_graph(house, nodes=20))
+    >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
+    >>> matched = match_graph(house, building_graph(house, nodes=20))
     >>> list(matched.floors), matched.unknown_floors
     (['1', '2'], ())
     """
@@ -132,10 +132,10 @@ def match_graph(
 
     Examples
     --------
-    >>> from hybridnav.ext.fleet import match_graph
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = hn.Building([hn.Floor("ground", hn.HybridPlanner(topology))])
-    >>> drawn = hn.building_graph(hn.Building([hn.Floor("L1", house.floors[0].planner)]), nodes=20)
+    >>> house = Building([Floor("ground", hn.HybridPlanner(topology))])
+    >>> drawn = building_graph(Building([Floor("L1", house.floors[0].planner)]), nodes=20)
     >>> list(match_graph(house, drawn, floors={"L1": "ground"}).floors)
     ['ground']
     """
@@ -167,7 +167,7 @@ def _placed(graph: FloorGraph, pose: Pose, floor: Floor) -> FloorGraph:
     would lie in it by a micrometre. None is put from a free cell into a blocked one.
     """
     moved = moved_floor(graph, pose)
-    grid = floor.planner.topology.grid
+    grid = floor.planner.grid
     free, points = grid.enterable(allow_unexplored=False), moved.graph.points
     positions = grid.frame.positions_of(points)
     halves = np.round(2.0 * positions) / 2.0
@@ -217,7 +217,7 @@ def _poses(building: Building, graph: BuildingGraph, own_name: dict[str, str]) -
         ]
         if pairs:
             theirs, ours = (np.array(points) for points in zip(*pairs, strict=True))
-            drawn, grid = graph.floor(name).graph, building.floor(own).planner.topology.grid
+            drawn, grid = graph.floor(name).graph, building.floor(own).planner.grid
             middles = drawn.points[drawn.edges].mean(axis=1)
             points = np.concatenate([drawn.points, middles])
             poses[name] = placed_pose(theirs, ours, points, grid)

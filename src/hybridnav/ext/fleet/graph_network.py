@@ -84,7 +84,7 @@ class PlacedFloor:
         cls, building: Building, graph: FloorGraph, base: int, *, clear_edges_only: bool
     ) -> PlacedFloor:
         """Place a graph on the map of its floor."""
-        grid = building.floor(graph.name).planner.topology.grid
+        grid = building.floor(graph.name).planner.grid
         free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
         sight = Sight(free)
         placed = PlacedGraph.of(graph.graph, grid, free)

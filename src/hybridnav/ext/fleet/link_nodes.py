@@ -80,11 +80,12 @@ class FloorGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import FloorGraph
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> floor = FloorGraph(name="2", graph=hn.WaypointGraph.from_networkx(plain), elevation_m=3.5)
+    >>> floor = FloorGraph(name="2", graph=WaypointGraph.from_networkx(plain), elevation_m=3.5)
     >>> floor.name, floor.graph.n_nodes
     ('2', 1)
     """
@@ -109,11 +110,12 @@ class BuildingGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> floors = [FloorGraph(name=name, graph=graph) for name in ("1", "2")]
     >>> ends = LinkEnd("1", (0.5, 1.0)), LinkEnd("2", (0.5, 1.0))
     >>> lift = Link(name="lift", kind="lift", ends=ends, ride_s=5)
@@ -186,11 +188,12 @@ def join_links(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
     >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (3, 4)), LinkEnd("2", (3, 4))))
     >>> joined = join_links(BuildingGraph(name="house", floors=floors, links=(lift,)))
@@ -231,11 +234,12 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, to_networkx
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
     >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (0, 0)), LinkEnd("2", (0, 0))))
     >>> whole = to_networkx(BuildingGraph(name="house", floors=floors, links=(lift,)))

@@ -22,7 +22,8 @@ class LinkEnd:
 
     Examples
     --------
-    >>> hn.LinkEnd("3", (1.5, 2.0)).floor
+    >>> from hybridnav.ext.fleet import LinkEnd
+    >>> LinkEnd("3", (1.5, 2.0)).floor
     '3'
     """
 

@@ -68,10 +68,11 @@ class BuildingPlan:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
-    >>> building = hn.Building(floors, [hn.Link(name="lift", kind="lift", ends=ends)])
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> building = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
     >>> plan = building.plan(("1", (0.5, 0.5)), ("2", (2.0, 2.5)))
     >>> plan.floors, len(plan.rides), plan.gap
     (('1', '2'), 1, 0.0)

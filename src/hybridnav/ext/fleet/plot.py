@@ -74,15 +74,15 @@ def plot_building(
 
     Examples
     --------
-    >>> from hybridnav.ext.fleet import plot_building
+    >>> from hybridnav.ext.fleet import Building, Floor, plot_building
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> len(plot_building(hn.Building(floors)))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> len(plot_building(Building(floors)))
     2
     """
     shown = (plans,) if isinstance(plans, BuildingPlan) else tuple(plans)
     shown = tuple(plan for plan in shown if plan.solved)
-    views = [known_view(floor.planner.topology.grid) for floor in building.floors]
+    views = [known_view(floor.planner.grid) for floor in building.floors]
     heights = [floor.elevation_m for floor in building.floors]
     order = sorted(range(len(views)), key=lambda number: (-heights[number], -number))
     if axes is None:
@@ -135,7 +135,7 @@ def _panels(views: Sequence[View], order: Sequence[int], width_in: float) -> lis
 
 def _words(floor: Floor, plans: Sequence[BuildingPlan]) -> list[str]:
     """Return the parts of a panel's title."""
-    words = [f"floor {floor.name}", floor.planner.topology.grid.name]
+    words = [f"floor {floor.name}", floor.planner.grid.name]
     if plans:
         on_floor = [
             result.path.length_m
@@ -199,7 +199,7 @@ def _draw_ground(
     canvas: Canvas, floor: Floor, lines: Sequence[FloatArray], ends: Sequence[tuple[float, float]]
 ) -> tuple[list[Entry], LabelPlacer]:
     """Draw rooms with their names, or the map alone; return entries of the legend, and labels."""
-    grid = floor.planner.topology.grid
+    grid = floor.planner.grid
     rooms = floor.rooms
     if rooms is None:
         field_of = (grid.measured == CellClass.UNEXPLORED).astype(np.int64)

@@ -57,7 +57,7 @@ def _parts(planner: HybridPlanner, closed: ClosedCells | None) -> IntArray:
     from scipy import ndimage  # noqa: PLC0415 - most queries need none
 
     allowed = planner.preset.planner.allow_unexplored
-    is_open = planner.topology.grid.enterable(allow_unexplored=allowed).copy()
+    is_open = planner.grid.enterable(allow_unexplored=allowed).copy()
     if closed is not None:
         is_open.ravel()[closed.flat] = False
     labels, _ = ndimage.label(is_open, np.ones((3, 3)))
@@ -216,7 +216,7 @@ class LinkSearch:
         self._divided.add(floor)
         table, closed = self._tables[floor], self._closed.get(floor)
         part_of = _parts(table.floor.planner, closed)
-        frame = table.floor.planner.topology.grid.frame
+        frame = table.floor.planner.grid.frame
         own = part_of[tuple(frame.cells_of(table.positions_m).T)]
         costs = self._costs_on(floor)
         for known in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:

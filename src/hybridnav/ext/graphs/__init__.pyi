@@ -17,5 +17,13 @@ from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot
 from .polylines import merge_bends as merge_bends
 from .route_messages import route_messages as route_messages
 from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
+from .files import (
+    Anchor as Anchor,
+    export_lif as export_lif,
+    export_nav2 as export_nav2,
+    export_osm as export_osm,
+    export_rmf as export_rmf,
+    load_graph as load_graph,
+)
 
 __all__: list[str]

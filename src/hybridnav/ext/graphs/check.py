@@ -40,13 +40,14 @@ class GraphCheck:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph, check_graph
     >>> import networkx as nx
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> plain = nx.Graph()
     >>> plain.add_node("a", x=2.5, y=5.0)
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> check = hn.check_graph(topology, graph)
+    >>> check = check_graph(topology, graph)
     >>> check.count, check.in_sight
     (0, 1.0)
     """
@@ -107,15 +108,16 @@ def check_graph(
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph, check_graph
     >>> import networkx as nx
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> plain = nx.Graph()
     >>> plain.add_node("a", x=2.5, y=5.0)
     >>> plain.add_node("b", x=50.0, y=5.0)
     >>> plain.add_edge("a", "b")
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> [found.kind for found in hn.check_graph(topology, graph).findings]
+    >>> [found.kind for found in check_graph(topology, graph).findings]
     ['node-outside', 'edge-through-wall']
     """
     checked_type("topology", topology, TopologicalMap)

@@ -95,7 +95,7 @@ def _check_over_floors(
     seconds: dict[str, float] = {}
     names = _names_of(match or ())
     with stage(f"reading {graph_file}", seconds, "graph"):
-        graph = hn.load_building_graph(graph_file)
+        graph = hn.ext.fleet.load_building_graph(graph_file)
     building = load_floors(map_file, reading, seconds)
     with stage("checking", seconds, "check"):
         matched = match_graph(building, graph, floors=names, align=align)
@@ -231,12 +231,12 @@ def check(
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     with stage(f"reading {graph_file}", seconds, "graph"):
-        graph = hn.load_graph(graph_file, floor=floor)
+        graph = hn.ext.graphs.load_graph(graph_file, floor=floor)
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)
     with stage("checking", seconds, "check"):
-        found = hn.check_graph(topology, graph, along_lines=along_lines)
+        found = hn.ext.graphs.check_graph(topology, graph, along_lines=along_lines)
     from hybridnav.ext.graphs.page import check_facts, render_check  # noqa: PLC0415 - on demand
 
     wrong = _counted({"": found.findings}, ignore)

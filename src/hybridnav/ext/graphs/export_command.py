@@ -178,7 +178,7 @@ def export(
         return
     began = time.perf_counter()
     with progress_bar("building the graph") as advance:
-        graph = hn.build_route_graph(
+        graph = hn.ext.graphs.build_route_graph(
             topology,
             nodes=nodes,
             spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
@@ -187,15 +187,15 @@ def export(
             progress=advance,
         )
         if lanes_m is not None:
-            graph = hn.keep_right(topology, graph, apart_m=lanes_m)
+            graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        written = hn.merge_bends(graph, stretch=stretch) if polylines else graph
+        written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
         left_out = _write_graph(topology, (graph, written), fleet, out, frame)
     judged = None
     if report is not None:
         with stage("comparing routes", seconds, "report"):
-            judged = hn.judge_route_graph(graph, pairs=report)
+            judged = hn.ext.graphs.judge_route_graph(graph, pairs=report)
     figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None else {"left_out": list(left_out)}
     lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
@@ -235,7 +235,7 @@ def _export_over_floors(
     building = load_floors(map_file, reading, seconds)
     began = time.perf_counter()
     with progress_bar("building the graphs") as advance:
-        graph = hn.building_graph(
+        graph = hn.ext.fleet.building_graph(
             building,
             name=map_file.stem,
             nodes=nodes,
@@ -306,7 +306,7 @@ def _write_graph(
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
     if fleet is None:
-        hn.export_nav2(graphs[1], out, frame=frame)
+        hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
         return ()
     return fleet.write(topology, graphs[0], out)
 
@@ -376,7 +376,7 @@ def _line(excess: Excess) -> str:
 
 
 def _counts(graph: RouteGraph | WaypointGraph) -> dict[str, int]:
-    if isinstance(graph, hn.WaypointGraph):
+    if isinstance(graph, hn.ext.graphs.WaypointGraph):
         kinds = [facts["metadata"]["class"] for facts in graph.node_facts.values()]
     else:
         kinds = list(graph.kinds)

@@ -62,7 +62,7 @@ class Fleet:
 
     kind: str
     floor: str
-    anchor: hn.Anchor | None
+    anchor: hn.ext.graphs.Anchor | None
     vehicles: tuple[str, ...]
     doors: bool
 
@@ -108,19 +108,19 @@ class Fleet:
         """Write a file of one floor; return what it does not hold."""
         from hybridnav.ext.fleet import BuildingGraph  # noqa: PLC0415 - on demand
 
-        floor = hn.floor_graph(topology, graph, name=self.floor)
+        floor = hn.ext.fleet.floor_graph(topology, graph, name=self.floor)
         return self.write_building(BuildingGraph(name=graph.grid.name, floors=(floor,)), out)
 
     def write_building(self, building: BuildingGraph, out: Path) -> tuple[str, ...]:
         """Write a file of a building; return what it does not hold."""
         if self.kind == "rmf":
-            return hn.export_rmf(building, out, doors=self.doors)
+            return hn.ext.graphs.export_rmf(building, out, doors=self.doors)
         if self.anchor is not None:
-            return hn.export_osm(building, out, anchor=self.anchor)
-        return hn.export_lif(building, out, vehicle_types=self.vehicles)
+            return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
+        return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
 
 
-def _anchor(text: str) -> hn.Anchor:
+def _anchor(text: str) -> hn.ext.graphs.Anchor:
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
@@ -128,6 +128,6 @@ def _anchor(text: str) -> hn.Anchor:
     if not _FEWEST <= len(numbers) <= _MOST or not all(map(math.isfinite, numbers)):
         raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}")
     try:
-        return hn.Anchor(*numbers)
-    except hn.InvalidValueError as error:
+        return hn.ext.graphs.Anchor(*numbers)
+    except hn.errors.InvalidValueError as error:
         raise UsageError(f"--anchor: {error}") from None

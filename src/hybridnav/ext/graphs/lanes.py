@@ -152,9 +152,10 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import build_route_graph, keep_right
     >>> grid = hn.OccupancyGrid(np.zeros((20, 80)), hn.Frame(0.1), robot_radius_m=0.2)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-    >>> graph = hn.keep_right(topology, hn.build_route_graph(topology), apart_m=0.6)
+    >>> graph = keep_right(topology, build_route_graph(topology), apart_m=0.6)
     >>> "lane" in graph.kinds
     True
     """

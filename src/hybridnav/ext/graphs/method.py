@@ -30,7 +30,7 @@ def checked_graph(given: str | WaypointGraph) -> WaypointGraph:
 
 
 class GraphMethod:
-    """Routes on a graph of nodes and straight edges; see `baselines.Method`.
+    """Routes on a graph of nodes and straight edges; see `baselines.Solver`.
 
     The policy: a route runs straight from the start to the nearest node in sight of it, over the
     edges that are shortest in metres to the nearest node in sight of the goal, and straight to the

@@ -59,14 +59,14 @@ def plot_graph_check(
     Examples
     --------
     >>> import networkx as nx
-    >>> from hybridnav.ext.graphs import plot_graph_check
+    >>> from hybridnav.ext.graphs import WaypointGraph, check_graph, plot_graph_check
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> plain = nx.Graph()
     >>> plain.add_node("a", x=2.5, y=5.0)
     >>> plain.add_node("b", x=30.0, y=5.0)
     >>> plain.add_edge("a", "b")
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> check = hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    >>> check = check_graph(topology, WaypointGraph.from_networkx(plain))
     >>> plot_graph_check(check, title="checked").get_title()
     'checked'
     """
@@ -216,10 +216,10 @@ def plot_route_graph(
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import plot_route_graph
+    >>> from hybridnav.ext.graphs import build_route_graph, plot_route_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> plot_route_graph(hn.build_route_graph(topology), title="graph").get_title()
+    >>> plot_route_graph(build_route_graph(topology), title="graph").get_title()
     'graph'
     """
     grid = graph.grid

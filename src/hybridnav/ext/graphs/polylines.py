@@ -106,10 +106,11 @@ def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import build_route_graph, merge_bends
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> graph = hn.build_route_graph(topology)
-    >>> hn.merge_bends(graph).n_nodes < graph.n_nodes
+    >>> graph = build_route_graph(topology)
+    >>> merge_bends(graph).n_nodes < graph.n_nodes
     True
     """
     checked_type("graph", graph, RouteGraph)

@@ -35,12 +35,13 @@ class WaypointGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph
     >>> import networkx as nx
     >>> plain = nx.DiGraph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
     >>> plain.add_node("gate", x=3.5, y=5.0)
     >>> plain.add_edge("dock", "gate")
-    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> graph = WaypointGraph.from_networkx(plain)
     >>> graph.n_nodes, graph.edges.tolist(), graph.lengths_m.tolist()
     (2, [[0, 1]], [5.0])
     """
@@ -99,12 +100,13 @@ class WaypointGraph:
 
         Examples
         --------
+        >>> from hybridnav.ext.graphs import WaypointGraph
         >>> import networkx as nx
         >>> plain = nx.Graph()
         >>> plain.add_node(1, pos=(0.0, 0.0))
         >>> plain.add_node(2, pos=(1.0, 0.0))
         >>> plain.add_edge(1, 2, weight=7)
-        >>> hn.WaypointGraph.from_networkx(plain).costs
+        >>> WaypointGraph.from_networkx(plain).costs
         array([7., 7.])
         """
         gathered = Gathered("networkx graph")

@@ -7,5 +7,11 @@ from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdat
 from .rooms_doors import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
 from .shift import CarriedCosts as CarriedCosts, Flips as Flips, carry_costs as carry_costs
 from .tiles import NO_PLACE as NO_PLACE
+from .files import (
+    BagLog as BagLog,
+    CarmenLog as CarmenLog,
+    load_bag_map as load_bag_map,
+    save_bag as save_bag,
+)
 
 __all__: list[str]

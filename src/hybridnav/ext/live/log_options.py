@@ -32,10 +32,10 @@ def open_log(path: Path, topic: str | None = None, frame: str | None = None) -> 
         As in `BagLog`, for bags.
     """
     if is_bag(path):
-        return hn.BagLog(path, topic=topic, frame=frame)
+        return hn.ext.live.BagLog(path, topic=topic, frame=frame)
     if topic is not None or frame is not None:
         option = "--topic" if topic is not None else "--frame"
         raise UsageError(
             f"{option} is for bags of ROS, got the log {printable(path)}: leave it out"
         )
-    return hn.CarmenLog(path)
+    return hn.ext.live.CarmenLog(path)

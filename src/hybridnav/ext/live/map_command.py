@@ -157,7 +157,7 @@ def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noq
 
     if topic not in Bag(bag).topics_of({GRID}):
         return False
-    grid = hn.load_bag_map(bag, topic=topic, robot_radius_m=0.0)
+    grid = hn.ext.live.load_bag_map(bag, topic=topic, robot_radius_m=0.0)
     hn.write_ros_map(grid, out)
     rows, cols = grid.shape
     if as_json:

@@ -30,7 +30,7 @@ GRID = "grid-astar"
 """The preset of the optimum on the grid."""
 
 
-class Planning:
+class PagePlanning:
     """The planners of one topological map, made when a preset is first asked for.
 
     Parameters

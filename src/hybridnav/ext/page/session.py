@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.page.graph import in_metres, level_graph, map_facts, room_facts
-from hybridnav.ext.page.planning import Planning
+from hybridnav.ext.page.planning import PagePlanning
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps import RoomLabels
@@ -92,7 +92,7 @@ class Session:
 
     def _use(self, topology: TopologicalMap) -> None:
         self._facts: dict[str, Any] | None = None
-        self.planning = Planning(self._model, topology, self._settings, self._costs)
+        self.planning = PagePlanning(self._model, topology, self._settings, self._costs)
         for name in [name for name in self._layers if not name.startswith("costs-")]:
             del self._layers[name]
 

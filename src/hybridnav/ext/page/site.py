@@ -87,10 +87,11 @@ class Site:
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor
     >>> from hybridnav.ext.page import Site
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> Site.of_building(hn.Building(floors), "two floors").describe()["floors"]
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> Site.of_building(Building(floors), "two floors").describe()["floors"]
     ['1', '2']
     """
 
@@ -215,7 +216,7 @@ class _OverFloors:
         links: Sequence[LinkEntry],
     ) -> Session:
         """Return the session of the floors of one map, whose planner keeps what it has prepared."""
-        model, topology = Model(planner.topology.grid), planner.topology
+        model, topology = Model(planner.grid), planner.topology
         if topology.pyramid.rooms is None:
             topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
         file = (files or {}).get(names[0])

@@ -1,7 +1,7 @@
 from .regions import (
     AnyAngleResult as AnyAngleResult,
     CostClaim as CostClaim,
-    Method as Method,
+    Solver as Solver,
     MethodResult as MethodResult,
 )
 

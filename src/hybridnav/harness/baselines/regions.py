@@ -227,7 +227,7 @@ class MethodResult:
     """int64 (n, 2), the path as (row, col) from start to goal, legal moves of the octile grid; None
     if the method found none, or an `any_angle` one."""
     nodes: tuple[int, ...] | None = None
-    """The topological plan: labels of `Method.region_of` in the order passed, the start's first;
+    """The topological plan: labels of `Solver.region_of` in the order passed, the start's first;
     None if the method has no topological layer or made no plan. A plan without a path contradicts
     consistency, which the harness reports unless the method `gave_up`."""
     arcs: tuple[int, ...] | None = None
@@ -262,7 +262,7 @@ class MethodResult:
         return self.cells is not None or self.any_angle is not None
 
 
-class Method(Protocol):
+class Solver(Protocol):
     """One method prepared for one map.
 
     A method that cannot take a map, by a limit of its own, raises `UnsuitableMapError` in its

@@ -9,7 +9,7 @@ from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.methods.grid import Site
+    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.search.found import Method
 
 _METHODS = {
@@ -22,7 +22,7 @@ _METHODS = {
 """Module and class of each method; only that of a preset is loaded."""
 
 
-def make_method(site: Site, settings: PlannerSettings) -> Method:
+def make_method(site: KnownMap, settings: PlannerSettings) -> Method:
     """Make the method that some settings name.
 
     Raises

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav._base.turns import Turns
-from hybridnav.planner.methods.grid import Site, WholeMap, on_cells, round_closed
+from hybridnav.planner.methods.grid import KnownMap, WholeMap, on_cells, round_closed
 from hybridnav.search.found import Method, PlanStats
 from hybridnav.search.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner.settings import CheapestSettings
-    from hybridnav.search.found import Change, Found, Metric, Query
+    from hybridnav.search.found import Found, MapChange, Metric, Query
     from hybridnav.search.overlay import Overlay
 
 
@@ -45,7 +45,7 @@ class OverOverlay(Method):
         Whether unexplored cells may be entered, and the accepted distance from the optimum.
     """
 
-    def __init__(self, site: Site, settings: CheapestSettings) -> None:
+    def __init__(self, site: KnownMap, settings: CheapestSettings) -> None:
         assert site.topology is not None  # noqa: S101 - no method of places is made without
         self._topology, self._settings = site.topology, settings
         self._allow_unexplored = settings.allow_unexplored
@@ -65,7 +65,7 @@ class OverOverlay(Method):
         free = self._topology.grid.enterable(allow_unexplored=self._allow_unexplored)
         return _WORTH * int(free.sum())
 
-    def _take(self, site: Site) -> None:
+    def _take(self, site: KnownMap) -> None:
         self._whole_map = WholeMap(site, self._settings)
         self._refiner, _ = self._whole_map.refiners
         self.metric: Metric = self._whole_map.metric
@@ -115,7 +115,7 @@ class OverOverlay(Method):
         return True
 
     def _take_costs(self, costs: CostLayer, box: Box) -> None:
-        self._take(Site(self._topology.grid, self._topology, costs))
+        self._take(KnownMap(self._topology.grid, self._topology, costs))
         if self._built is None:
             self._is_too_long = False
             return
@@ -125,9 +125,9 @@ class OverOverlay(Method):
         except PathsTooLongError:
             self._built, self._is_too_long = None, True
 
-    def changed(self, change: Change) -> OverOverlay:
+    def changed(self, change: MapChange) -> OverOverlay:
         """Return the method of a changed map, which takes the overlay over; see `Method`."""
-        other = OverOverlay(Site(*change[:3]), self._settings)
+        other = OverOverlay(KnownMap(*change[:3]), self._settings)
         other._built, other._expanded = self._built, self._expanded
         if self._built is not None:
             before, now = self._state(), other._state()

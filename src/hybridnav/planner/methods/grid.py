@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 
-class Site(NamedTuple):
+class KnownMap(NamedTuple):
     """What a method is made for: a map, and what is known of it."""
 
     grid: OccupancyGrid
+    """The map."""
     topology: TopologicalMap | None
     """Its places; None where a changed grid has none yet."""
     costs: CostLayer | None = None
@@ -89,7 +90,7 @@ class WholeMap(Method):
         Whether unexplored cells may be entered, and the refiner, used where nothing is closed.
     """
 
-    def __init__(self, site: Site, settings: PlannerSettings) -> None:
+    def __init__(self, site: KnownMap, settings: PlannerSettings) -> None:
         self.metric: Metric = "octile" if site.costs is None else "weighted"
         self.refiners = site.refiner(settings), own_refiner(site.grid, settings)
         """The search of cells, with the costs; and that of the user's own, None for none."""

@@ -11,14 +11,14 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav.maps.centres import centres
-from hybridnav.planner.methods.grid import Site, WholeMap, enterable_of, round_closed
+from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpPatch, JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
-    from hybridnav.search.found import Change, Metric, Query, QueryMany
+    from hybridnav.search.found import MapChange, Metric, Query, QueryMany
 
 
 CONTRACTED_FROM = 2000
@@ -43,7 +43,7 @@ class OverJumps(Method):
 
     metric: Metric = "octile"
 
-    def __init__(self, site: Site, settings: PlannerSettings) -> None:
+    def __init__(self, site: KnownMap, settings: PlannerSettings) -> None:
         self._grid, self._settings = site.grid, settings
         self._allow_unexplored = settings.allow_unexplored
         self._whole_map = WholeMap(site, settings)
@@ -74,7 +74,7 @@ class OverJumps(Method):
         assert self._search is not None  # noqa: S101 - built above
         return self._search
 
-    def changed(self, change: Change) -> OverJumps:
+    def changed(self, change: MapChange) -> OverJumps:
         """Return the method of the changed map, whose corners look anew; see `Method`."""
         allowed, search, (grid, *_, cells) = self._allow_unexplored, self._search, change
         if search is not None:
@@ -82,7 +82,7 @@ class OverJumps(Method):
             was = enterable_of(self._grid, cells, allow_unexplored=allowed)
             changed = cells[was != free[tuple(cells.T)]]
             search = search.renewed(free, changed) if len(changed) else search
-        return OverJumps(Site(grid, change.topology, prepared=search), self._settings)
+        return OverJumps(KnownMap(grid, change.topology, prepared=search), self._settings)
 
     def find(self, query: Query) -> Found:
         """Find a shortest path between two cells; see `Method`."""

@@ -20,8 +20,7 @@ from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
-from hybridnav.refine.ompl import Clearance, Setup, Worker
-from hybridnav.refine.ompl import Query as OmplQuery
+from hybridnav.refine.ompl import Clearance, OmplQuery, Setup, Worker
 from hybridnav.search.found import Query
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planner import Metric
-    from hybridnav.planner.methods.grid import Site
+    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.settings import OmplPlannerSettings
     from hybridnav.refine.ompl import Reply, Search
     from hybridnav.search.found import Method
@@ -49,7 +48,7 @@ class OmplPlan:
     search: Search | None = None
 
 
-def ompl_planner(site: Site, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
+def ompl_planner(site: KnownMap, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
     """Make a planner with OMPL along the paths of a method.
 
     Raises

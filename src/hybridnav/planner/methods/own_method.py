@@ -17,12 +17,12 @@ from hybridnav.search.found import Found, Method
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.methods.grid import Site
+    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.refine import GridRefiner
     from hybridnav.search.found import Prepared, Query
 
 
-def own_method(site: Site, settings: PlannerSettings) -> Method:
+def own_method(site: KnownMap, settings: PlannerSettings) -> Method:
     """Import the class that settings name as their method, and make a method of it.
 
     The class is called with the grid, the keywords `costs` and `allow_unexplored`, and those of

@@ -21,7 +21,7 @@ from hybridnav.search.found import Found, Method, PlanStats
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
-    from hybridnav.planner.methods.grid import Site
+    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.search.found import Metric, Query
@@ -42,7 +42,7 @@ class MaxDistance(Method):
         Whether unexplored cells may be entered, the corridor, and the refiner.
     """
 
-    def __init__(self, site: Site, settings: PaperSettings) -> None:
+    def __init__(self, site: KnownMap, settings: PaperSettings) -> None:
         assert site.topology is not None  # noqa: S101 - no method of places is made without
         self.metric: Metric = "octile" if site.costs is None else "weighted"
         self._topology, self._settings = site.topology, settings

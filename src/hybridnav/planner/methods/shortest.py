@@ -15,7 +15,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.planner.methods.grid import Site, enterable_of
+from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.mesh import (
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.planner.settings import ShortestSettings
-    from hybridnav.search.found import Change, ClosedCells, Metric, Query, QueryMany
+    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
 Position = tuple[float, float]
 
@@ -64,7 +64,7 @@ class OverMesh(Method):
 
     metric: Metric = "any-angle"
 
-    def __init__(self, site: Site, settings: ShortestSettings) -> None:
+    def __init__(self, site: KnownMap, settings: ShortestSettings) -> None:
         grid, search = site.grid, site.prepared
         if grid.corner_cutting:
             raise InvalidValueError(
@@ -89,10 +89,10 @@ class OverMesh(Method):
         """The search of the mesh, None until it is built, and after a change of the map."""
         return None if self._is_renewed else self._search
 
-    def changed(self, change: Change) -> OverMesh:
+    def changed(self, change: MapChange) -> OverMesh:
         """Return the method of the changed map; polygons beside changed cells are cut anew, and
         the graph of corners is stale until it is prepared again. See `Method`."""
-        made, cells = OverMesh(Site(change.grid, change.topology), self._settings), change.cells
+        made, cells = OverMesh(KnownMap(change.grid, change.topology), self._settings), change.cells
         search = self._search
         if search is not None:
             was = enterable_of(self._grid, cells, allow_unexplored=self._allow_unexplored)

@@ -1,5 +1,5 @@
 from .client import (
-    Query as Query,
+    OmplQuery as OmplQuery,
     Reply as Reply,
     Search as Search,
     Setup as Setup,

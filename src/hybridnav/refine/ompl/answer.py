@@ -16,7 +16,7 @@ from hybridnav.refine.ompl.solve import IMPROVING, Problem, solve
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.client import Query, Reply
+    from hybridnav.refine.ompl.client import OmplQuery, Reply
     from hybridnav.refine.ompl.problem import Base, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
@@ -31,7 +31,7 @@ _ENOUGH = 1 + 1e-4
 """A path that is no longer than this times the lower bound needs no improvement."""
 
 
-def answer(base: Base, query: Query, send: Callable[[Reply], None]) -> Reply:
+def answer(base: Base, query: OmplQuery, send: Callable[[Reply], None]) -> Reply:
     """Try the corridors of a query in turn and return the last reply.
 
     Parameters

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.refine.ompl import OmplSettings
-    from hybridnav.refine.ompl.client import Query
+    from hybridnav.refine.ompl.client import OmplQuery
     from hybridnav.refine.ompl.problem import Base, Clearance, SearchArea
 
 
@@ -44,7 +44,7 @@ class Attempts:
     def __init__(
         self,
         base: Base,
-        query: Query,
+        query: OmplQuery,
         send: Callable[[Reply], None],
     ) -> None:
         began = time.monotonic()

@@ -21,7 +21,7 @@ from hybridnav.refine.ompl.solve import IMPROVING, Problem, solve
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.refine.ompl.attempts import Attempts
-    from hybridnav.refine.ompl.client import Query
+    from hybridnav.refine.ompl.client import OmplQuery
     from hybridnav.refine.ompl.problem import Box, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
@@ -266,14 +266,14 @@ class Poses:
     Parameters
     ----------
     query
-        Query with the path of cells.
+        OmplQuery with the path of cells.
     corridor
         Corridor that states must lie in.
     whole
         State space of the corridor.
     """
 
-    def __init__(self, query: Query, corridor: SearchArea, whole: StateSpace) -> None:
+    def __init__(self, query: OmplQuery, corridor: SearchArea, whole: StateSpace) -> None:
         self._check = corridor.check
         self._has_heading = whole.dimension > 2  # noqa: PLR2004
         self._resolution_m = corridor.grid.resolution_m

@@ -49,7 +49,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Query:
+class OmplQuery:
     """One problem."""
 
     start: FloatArray
@@ -208,7 +208,7 @@ class Worker:
             else:
                 self._start_and_wait()
 
-    def send(self, query: Query) -> None:
+    def send(self, query: OmplQuery) -> None:
         """Send the process a query; `reply` waits for the result."""
         left_s = query.deadline_s - time.monotonic()
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)

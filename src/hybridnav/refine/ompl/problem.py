@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.refine.ompl import OmplSettings
-    from hybridnav.refine.ompl.client import Query, Setup
+    from hybridnav.refine.ompl.client import OmplQuery, Setup
 
 
 Box = tuple[int, int, int, int]
@@ -100,7 +100,7 @@ def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def search_area_of(base: Base, query: Query, fields: BoolArray | None) -> SearchArea:
+def search_area_of(base: Base, query: OmplQuery, fields: BoolArray | None) -> SearchArea:
     """Return the corridor of some fields; for None, that of all cells."""
     setup, grid, inside = base.setup, base.setup.grid, None
     box: Box = (0, grid.shape[0], 0, grid.shape[1])

@@ -26,7 +26,7 @@ from hybridnav.refine.ompl.problem import Base
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.client import Query, Reply, Setup
+    from hybridnav.refine.ompl.client import OmplQuery, Reply, Setup
 
 GRACE = 0.03
 """Share of the budget after its end at which a fork is killed."""
@@ -87,7 +87,7 @@ def _warm_up(base: Base) -> None:
 
 
 def _answer(
-    base: Base, query: Query, connection: Connection, tell: Callable[[Reply], None]
+    base: Base, query: OmplQuery, connection: Connection, tell: Callable[[Reply], None]
 ) -> Reply:
     """Fork, pass on its replies, kill it if it takes too long, and return the last reply."""
     left_s = query.deadline_s - time.monotonic()
@@ -149,7 +149,7 @@ def _replied(replies: Connection, connection: Connection, until_s: float) -> boo
     return bool(ready)
 
 
-def _run(base: Base, query: Query, replies: Connection) -> None:
+def _run(base: Base, query: OmplQuery, replies: Connection) -> None:
     """Run a query in a fork; never return."""
     try:
         from ompl import util  # noqa: PLC0415

@@ -43,7 +43,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Searched:
     """Result of a planner."""
 
     points: FloatArray
@@ -59,7 +59,7 @@ def solve(
     *,
     on_path: Callable[[FloatArray], None] | None = None,
     search: Search | None = None,
-) -> Found:
+) -> Searched:
     """Solve a problem by the planner of the settings.
 
     Parameters
@@ -198,17 +198,17 @@ def _grow(
         growth = min(2 * growth, _MOST_GROWTH)
 
 
-def _found(problem: Problem, definition: Any) -> Found:
+def _found(problem: Problem, definition: Any) -> Searched:
     path = definition.getSolutionPath() if definition.hasSolution() else None
     if path is None:
-        return Found(np.empty((0, 3)), is_exact=False)
+        return Searched(np.empty((0, 3)), is_exact=False)
     points = problem.space.driven(problem.space.points(path.getStates()))
     if not len(points):
-        return Found(points, is_exact=False)
+        return Searched(points, is_exact=False)
     # OMPL's own flag is wrong for roadmaps that grew after a first answer.
     off = points[-1] - problem.goal
     turned = 0.0 if problem.space.dimension == 2 else math.remainder(off[2], math.tau)  # noqa: PLR2004
-    return Found(points, is_exact=bool(math.hypot(off[0], off[1]) + abs(turned) <= NEAR))
+    return Searched(points, is_exact=bool(math.hypot(off[0], off[1]) + abs(turned) <= NEAR))
 
 
 def _note_edges(space: StateSpace, planner: Any, search: Search) -> None:

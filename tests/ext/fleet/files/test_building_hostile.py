@@ -29,8 +29,8 @@ def read(tmp_path):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         try:
-            return hn.load_building_graph(path)
-        except hn.MapError as error:
+            return hn.ext.fleet.load_building_graph(path)
+        except hn.errors.MapError as error:
             text = str(error)
         assert text.isprintable()
         assert name in text
@@ -118,8 +118,8 @@ def test_what_is_no_building_ends_in_one_line(read, name, content, words):
 @pytest.mark.parametrize("name", ["a.osm", "a.graphml"])
 def test_another_encoding_of_xml_ends_in_one_line(tmp_path, name, encoding):
     (tmp_path / name).write_text(f'<?xml version="1.0" encoding="{encoding}"?><osm>{PLACE}</osm>')
-    load = hn.load_building_graph if name == "a.osm" else hn.load_graph
-    with pytest.raises(hn.MapError) as refused:
+    load = hn.ext.fleet.load_building_graph if name == "a.osm" else hn.ext.graphs.load_graph
+    with pytest.raises(hn.errors.MapError) as refused:
         load(tmp_path / name)
     assert f"{name}: declares the encoding {encoding[:20]!r}"[:-1] in str(refused.value)
     assert "expected UTF-8" in str(refused.value)
@@ -216,8 +216,10 @@ def test_values_of_any_kind_at_any_place(read, tmp_path, one, other, third):
         for content in contents:
             building = read(name, json.dumps(content))
             if not isinstance(building, str):
-                hn.export_osm(building, tmp_path / "b.osm", anchor=hn.Anchor(0, 0))
-                hn.export_lif(building, tmp_path / "b.lif", vehicle_types=["A.B"])
+                hn.ext.graphs.export_osm(
+                    building, tmp_path / "b.osm", anchor=hn.ext.graphs.Anchor(0, 0)
+                )
+                hn.ext.graphs.export_lif(building, tmp_path / "b.lif", vehicle_types=["A.B"])
 
 
 OSM = st.sampled_from(
@@ -239,4 +241,6 @@ def test_elements_in_any_order(read, tmp_path, parts):
     for text in ("".join(parts), f"<osm>{PLACE}{ROUTE}{''.join(parts)}</osm>"):
         building = read("a.osm", text)
         if not isinstance(building, str):
-            hn.export_osm(building, tmp_path / "b.osm", anchor=hn.Anchor(0, 0))
+            hn.ext.graphs.export_osm(
+                building, tmp_path / "b.osm", anchor=hn.ext.graphs.Anchor(0, 0)
+            )

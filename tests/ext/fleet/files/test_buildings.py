@@ -57,8 +57,8 @@ def written(folder: Path, tree: Any) -> Path:
     return file
 
 
-def loaded(folder: Path, tree: Any) -> hn.Building:
-    return hn.load_building(written(folder, tree), robot_radius_m=0)
+def loaded(folder: Path, tree: Any) -> hn.ext.fleet.Building:
+    return hn.ext.fleet.load_building(written(folder, tree), robot_radius_m=0)
 
 
 def test_a_file_says_what_the_building_is(folder: Path) -> None:
@@ -69,7 +69,7 @@ def test_a_file_says_what_the_building_is(folder: Path) -> None:
     lift = building.link("lift")
     assert (lift.kind, lift.wait_s, lift.ride_s, lift.cost_m) == ("lift", 10, 4, 0)
     assert math.isinf(lift.max_radius_m)
-    assert lift.ends[0] == hn.LinkEnd("1", (1.2, 1.2))
+    assert lift.ends[0] == hn.ext.fleet.LinkEnd("1", (1.2, 1.2))
     rooms = building.floor("2").planner.topology.rooms
     assert lift.ends[1].position_m == rooms.point_of("hall")
     plan = building.plan(("1", (1.2, 2.2)), ("2", "lab"))
@@ -156,7 +156,7 @@ WHOLE = {"empty", "list", "no floors", "floors no list", "unknown key", "speed"}
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_wrong_is_one_line(folder: Path, name: str) -> None:
     tree, message = REFUSED[name]
-    with pytest.raises(hn.MapError) as refused:
+    with pytest.raises(hn.errors.MapError) as refused:
         loaded(folder, tree)
     text = str(refused.value)
     assert message in text
@@ -171,8 +171,8 @@ def test_what_is_wrong_is_one_line(folder: Path, name: str) -> None:
 )
 def test_a_wrong_setting_is_no_fault_of_the_file(folder: Path, settings: Any) -> None:
     loaded(folder, description())
-    with pytest.raises(hn.InvalidValueError, match="must be a") as refused:
-        hn.load_building(folder / "building.yaml", **settings)
+    with pytest.raises(hn.errors.InvalidValueError, match="must be a") as refused:
+        hn.ext.fleet.load_building(folder / "building.yaml", **settings)
     assert "line" not in str(refused.value)
 
 
@@ -186,7 +186,7 @@ def test_an_end_that_is_cut_off_is_refused(folder: Path) -> None:
     tree = with_link(ends=ends)
     tree["floors"][1] |= {"map": "wing.yaml", "rooms": None}
     with pytest.raises(
-        hn.MapError,
+        hn.errors.MapError,
         match=r"line \d+: link lift: .* lies in a part of 3 m² that is cut off from the rest",
     ):
         loaded(folder, tree)
@@ -198,15 +198,17 @@ def test_a_link_that_is_too_narrow_needs_no_free_ends(folder: Path) -> None:
     narrow = with_end(floor="2", at=[0.2, 0.2])
     narrow["links"][0]["max_radius_m"] = 0.1
     file = written(folder, narrow)
-    building = hn.load_building(file, robot_radius_m=0.2)
+    building = hn.ext.fleet.load_building(file, robot_radius_m=0.2)
     assert not building.plan(("1", (1.2, 1.2)), ("2", (1.2, 1.2))).solved
     # Nor does one whose door has no free cell for the robot.
     by_door = with_end(floor="2", door=1, room="hall")
     by_door["links"][0]["max_radius_m"] = 0.7
-    with pytest.raises(hn.MapError, match=r"door 1 has no free cell for a robot radius of 0\.6 m"):
-        hn.load_building(written(folder, by_door), robot_radius_m=0.6)
+    with pytest.raises(
+        hn.errors.MapError, match=r"door 1 has no free cell for a robot radius of 0\.6 m"
+    ):
+        hn.ext.fleet.load_building(written(folder, by_door), robot_radius_m=0.6)
     by_door["links"][0]["max_radius_m"] = 0.3
-    building = hn.load_building(written(folder, by_door), robot_radius_m=0.6)
+    building = hn.ext.fleet.load_building(written(folder, by_door), robot_radius_m=0.6)
     door = building.floor("2").planner.topology.rooms.door(1)
     assert building.link("lift").ends[1].position_m == door.position
     assert not building.plan(("1", (1.2, 1.2)), ("2", (1.2, 1.2))).solved
@@ -218,8 +220,8 @@ def test_bytes_are_refused_in_one_line(content: bytes) -> None:
     file = Path("bytes.yaml")
     file.write_bytes(b"floors:\n" + content)
     try:
-        with pytest.raises(hn.MapError) as refused:
-            hn.load_building(file)
+        with pytest.raises(hn.errors.MapError) as refused:
+            hn.ext.fleet.load_building(file)
         assert "\n" not in str(refused.value)
     finally:
         file.unlink()
@@ -229,7 +231,7 @@ def test_a_large_file_is_refused_soon(folder: Path) -> None:
     ends = [{"floor": "1", "at": [1.2, 1.2]}, {"floor": "2", "at": [1.2, 1.2]}]
     links = [{"name": f"lift {number}", "kind": "lift", "ends": ends} for number in range(1500)]
     began = time.perf_counter()
-    with pytest.raises(hn.MapError):
+    with pytest.raises(hn.errors.MapError):
         loaded(folder, yaml.dump(description(links=links), Dumper=_NoAliases))
     assert time.perf_counter() - began < 20
 
@@ -250,10 +252,14 @@ def test_buildings_are_told_from_maps(folder: Path, tmp_path: Path) -> None:
                   folder / "two.pgm", folder / "none.yaml",
                   folder / f"{'long' * 99}.yaml"):  # fmt: skip
         assert not is_building(other)
-    with pytest.raises(hn.ModelError, match="it is that of a building, expected one of a map"):
+    with pytest.raises(
+        hn.errors.ModelError, match="it is that of a building, expected one of a map"
+    ):
         hn.load(folder / "b.hnm")
-    with pytest.raises(hn.ModelError, match="it is that of a map, expected one of a building"):
-        hn.load_building(folder / "m.hnm")
+    with pytest.raises(
+        hn.errors.ModelError, match="it is that of a map, expected one of a building"
+    ):
+        hn.ext.fleet.load_building(folder / "m.hnm")
 
 
 @pytest.mark.parametrize("compress", [False, True])
@@ -262,7 +268,7 @@ def test_a_model_answers_as_the_building(tmp_path: Path, preset: str, compress: 
     scene = random_building(5, preset=preset)
     scene.building.prepare()
     hn.save(scene.building, tmp_path / "b.hnm", compress=compress)
-    twin = hn.load_building(tmp_path / "b.hnm")
+    twin = hn.ext.fleet.load_building(tmp_path / "b.hnm")
     assert twin.links == scene.building.links
     for one, other in zip(scene.building.known, twin.known, strict=True):
         np.testing.assert_array_equal(one.lower, other.lower)
@@ -280,13 +286,15 @@ def test_a_model_for_another_robot_or_preset_knows_nothing_of_the_first(folder: 
     building = loaded(folder, description())
     building.prepare()
     hn.save(building, folder / "b.hnm")
-    wide = hn.load_building(folder / "b.hnm", robot_radius_m=0.3)
+    wide = hn.ext.fleet.load_building(folder / "b.hnm", robot_radius_m=0.3)
     assert wide.robot_radius_m == 0.3
     assert all(np.isnan(known.cost).all() for known in wide.known)
-    octile = hn.load_building(folder / "b.hnm", preset="octile")
+    octile = hn.ext.fleet.load_building(folder / "b.hnm", preset="octile")
     assert all(np.isnan(known.cost).all() for known in octile.known)
     start, goal = ("1", (1.2, 2.2)), ("2", (1.2, 1.2))
-    expected = hn.load_building(folder / "building.yaml", robot_radius_m=0, preset="octile")
+    expected = hn.ext.fleet.load_building(
+        folder / "building.yaml", robot_radius_m=0, preset="octile"
+    )
     assert octile.plan(start, goal).cost == expected.plan(start, goal).cost
     assert octile.plan(start, goal).metric == "octile"
 
@@ -302,18 +310,18 @@ def test_an_altered_model_is_refused(folder: Path) -> None:
         altered[at] ^= 0x40
         file.write_bytes(bytes(altered))
         try:
-            hn.load_building(file).plan(("1", (1.2, 2.2)), ("2", (1.2, 1.2)))
-        except hn.MapError as refused:
+            hn.ext.fleet.load_building(file).plan(("1", (1.2, 2.2)), ("2", (1.2, 1.2)))
+        except hn.errors.MapError as refused:
             assert "\n" not in str(refused)  # noqa: PT017 - some bytes are padding
     for length in (0, 5, 30, len(content) // 2, len(content) - 1):
         file.write_bytes(content[:length])
-        with pytest.raises(hn.MapError):
-            hn.load_building(file)
+        with pytest.raises(hn.errors.MapError):
+            hn.ext.fleet.load_building(file)
 
 
 def test_the_demonstration_loads_and_has_both_links(tmp_path: Path) -> None:
     shutil.copytree(MAPS, tmp_path / "maps")
-    building = hn.load_building(tmp_path / "maps" / "building" / "building.yaml")
+    building = hn.ext.fleet.load_building(tmp_path / "maps" / "building" / "building.yaml")
     assert [link.kind for link in building.links] == ["lift", "stairs"]
     found = building.alternatives("hall", "library", 3, max_stretch=9.0)
     assert [plan.rides[0].link.name for plan in found] == ["east stairs", "north lift"]
@@ -328,7 +336,7 @@ def test_gdc_is_a_real_building(data: Path, tmp_path: Path) -> None:
     for lift in ("south", "east", "west"):
         ends = ", ".join(f'{{floor: "{n}", room: l{n}_elev_{lift}}}' for n in ("2", "3"))
         lines.append(f"- {{name: {lift} lift, kind: lift, wait_s: 20, ends: [{ends}]}}")
-    building = hn.load_building(written(tmp_path, "\n".join(lines)), robot_radius_m=0.25)
+    building = hn.ext.fleet.load_building(written(tmp_path, "\n".join(lines)), robot_radius_m=0.25)
     plan = building.plan("l3_516", "l2_302")
     assert plan.gap == 0.0
     start, goal = (np.asarray(end) for end in (plan.results[0].start, plan.results[1].goal))

@@ -59,7 +59,7 @@ def folder(tmp_path_factory):
 @settings(max_examples=examples(60))
 def test_nav2(folder, plain):
     ids = writers.write_nav2(folder / "a.geojson", plain)
-    graph = hn.load_graph(folder / "a.geojson")
+    graph = hn.ext.graphs.load_graph(folder / "a.geojson")
     assert (graph.format, graph.frame, graph.findings, graph.lines) == ("nav2", "map", (), {})
     points = {ids[node]: point for node, point in plain.points.items()}
     assert means(graph) == (points, sorted([(ids[a], ids[b]) for a, b in plain.edges], key=str))
@@ -86,7 +86,7 @@ def test_what_is_written_is_read(folder, file, data):
     write, form, name, names = FORMATS[file]
     plain = data.draw(plain_graphs(names))
     write(folder / file, plain)
-    graph = hn.load_graph(folder / file)
+    graph = hn.ext.graphs.load_graph(folder / file)
     assert (graph.format, graph.name, graph.findings) == (form, name, ())
     assert means(graph) == expected(plain)
     nodes, edges = graph.node_facts.values(), graph.edge_facts.values()
@@ -101,12 +101,12 @@ def test_what_is_written_is_read(folder, file, data):
 @given(plain_graphs(_ANY_NAMES))
 @settings(max_examples=examples(60))
 def test_networkx_there_and_back(plain):
-    graph = hn.WaypointGraph.from_networkx(plain.directed)
+    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain.directed)
     assert means(graph) == expected(plain)
     back = graph.to_networkx()
     assert dict(back.nodes("x")) == {node: x for node, (x, _) in plain.points.items()}
     assert sorted(((a, b) for a, b in back.edges()), key=str) == expected(plain)[1]
-    assert means(hn.WaypointGraph.from_networkx(back)) == means(graph)
+    assert means(hn.ext.graphs.WaypointGraph.from_networkx(back)) == means(graph)
 
 
 @given(plain_graphs())
@@ -115,11 +115,11 @@ def test_nav2_written_again_means_the_same(folder, plain):
     writers.write_nav2(folder / "a.geojson", plain)
     if not plain.edges:
         return
-    graph = hn.load_graph(folder / "a.geojson")
-    hn.export_nav2(graph, folder / "b.geojson")
+    graph = hn.ext.graphs.load_graph(folder / "a.geojson")
+    hn.ext.graphs.export_nav2(graph, folder / "b.geojson")
     before, after = (read_lenient(folder / name) for name in ("a.geojson", "b.geojson"))
     assert before == after
-    assert means(hn.load_graph(folder / "b.geojson")) == means(graph)
+    assert means(hn.ext.graphs.load_graph(folder / "b.geojson")) == means(graph)
 
 
 def read_lenient(path):
@@ -153,8 +153,8 @@ NAV2 = (
 @pytest.mark.parametrize("name", NAV2)
 def test_nav2s_own_graphs_mean_the_same_again(data, tmp_path, name):
     file = data / "nav2" / "graphs" / name
-    graph = hn.load_graph(file)
-    hn.export_nav2(graph, tmp_path / "again.geojson")
+    graph = hn.ext.graphs.load_graph(file)
+    hn.ext.graphs.export_nav2(graph, tmp_path / "again.geojson")
     nodes, edges = read_lenient(tmp_path / "again.geojson")
     old_nodes, old_edges = read_lenient(file)
     assert nodes == old_nodes
@@ -172,8 +172,8 @@ def test_nav2s_own_graphs_mean_the_same_again(data, tmp_path, name):
 
 
 def test_nav2s_damaged_graph_ends_in_one_line(data):
-    with pytest.raises(hn.MapError, match="line 1, column 1: no JSON"):
-        hn.load_graph(data / "nav2" / "graphs" / "nav2_route_test" / "invalid.json")
+    with pytest.raises(hn.errors.MapError, match="line 1, column 1: no JSON"):
+        hn.ext.graphs.load_graph(data / "nav2" / "graphs" / "nav2_route_test" / "invalid.json")
 
 
 @pytest.mark.parametrize(
@@ -187,14 +187,14 @@ def test_nav2s_damaged_graph_ends_in_one_line(data):
 )
 def test_maps_of_strands(data, tmp_path, name, form):
     file = data / "strands" / name
-    graph = hn.load_graph(file)
+    graph = hn.ext.graphs.load_graph(file)
     assert (graph.format, graph.n_nodes, graph.n_edges) == form
     assert graph.findings == ()
     text = file.read_text()
     word = "\n  node:\n" if graph.format == "strands" else "node:"
     assert text.count(word) == graph.n_nodes
     # For Nav2, with the names and facts of STRANDS as metadata.
-    hn.export_nav2(graph, tmp_path / "strands.geojson")
+    hn.ext.graphs.export_nav2(graph, tmp_path / "strands.geojson")
     again = read_nav2(tmp_path / "strands.geojson", costs=False)
     assert [facts["name"] for facts in again.node_facts.values()] == list(graph.names)
     assert list(again.points.values()) == [tuple(point) for point in graph.points.tolist()]
@@ -235,7 +235,7 @@ def test_what_is_wrong_in_a_file_is_read_around_and_found(tmp_path):
     ]
     path = tmp_path / "bad.geojson"
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    graph = hn.load_graph(path)
+    graph = hn.ext.graphs.load_graph(path)
     assert {found.kind: found.count for found in graph.findings} == {
         "no-coordinates": 3,
         "repeated-id": 3,  # node 1, edge 10, and 5 of a node and an edge
@@ -249,10 +249,10 @@ def test_what_is_wrong_in_a_file_is_read_around_and_found(tmp_path):
     assert graph.points[graph.edges[0, 1]].tolist() == [6.0, 0.0]
     assert graph.others == (polygon,)
     assert graph.node_facts[0]["metadata"]["region"]["deep"] == {"er": "yes"}
-    hn.export_nav2(graph, path)
+    hn.ext.graphs.export_nav2(graph, path)
     again = json.loads(path.read_text())["features"]
     assert polygon in again
-    clean = hn.load_graph(path)
+    clean = hn.ext.graphs.load_graph(path)
     assert {found.kind for found in clean.findings} == {"line-elsewhere", "bad-cost"}
 
 
@@ -267,12 +267,12 @@ def test_columns_of_drawing_programs_that_are_null_are_no_facts(tmp_path):
     ]
     path = tmp_path / "columns.geojson"
     path.write_text(json.dumps({"features": features}))
-    graph = hn.load_graph(path)
+    graph = hn.ext.graphs.load_graph(path)
     assert (graph.names, graph.edges.tolist()) == ((1, 2), [[0, 1], [1, 0]])
     assert {found.kind: found.count for found in graph.findings} == {"null": 3}
-    hn.export_nav2(graph, path)
+    hn.ext.graphs.export_nav2(graph, path)
     assert len(read_nav2(path, costs=False).edges) == 2
-    assert hn.load_graph(path).findings == ()
+    assert hn.ext.graphs.load_graph(path).findings == ()
 
 
 def test_points_in_a_frame_of_their_own_are_turned_and_moved(tmp_path):
@@ -284,7 +284,7 @@ def test_points_in_a_frame_of_their_own_are_turned_and_moved(tmp_path):
     ]
     path = tmp_path / "a.tmap2"
     path.write_text(json.dumps({"transformation": place, "nodes": nodes}))  # JSON is YAML
-    graph = hn.load_graph(path)
+    graph = hn.ext.graphs.load_graph(path)
     assert graph.points[0].tolist() == pytest.approx([9.0, 23.0])
     assert graph.points[1].tolist() == [3.0, 1.0]
 
@@ -303,16 +303,19 @@ def test_points_in_a_frame_of_their_own_are_turned_and_moved(tmp_path):
 def test_attributes_that_hold_a_point(facts):
     graph: nx.Graph[Any] = nx.Graph()
     graph.add_node("a", **facts)
-    assert hn.WaypointGraph.from_networkx(graph).points.tolist() == [[1.5, -2.0]]
+    assert hn.ext.graphs.WaypointGraph.from_networkx(graph).points.tolist() == [[1.5, -2.0]]
 
 
 def test_undirected_graphs_and_loops_have_the_edges_that_they_mean(tmp_path):
     plain: nx.MultiGraph[Any] = nx.MultiGraph()
     plain.add_nodes_from([("a", {"x": 0, "y": 0}), ("b", {"x": 3, "y": 4})])
     plain.add_edges_from([("a", "b"), ("a", "b"), ("a", "a")])
-    here = hn.WaypointGraph.from_networkx(plain)
+    here = hn.ext.graphs.WaypointGraph.from_networkx(plain)
     nx.write_graphml(plain, tmp_path / "a.graphml")
     (tmp_path / "a.json").write_text(json.dumps(nx.node_link_data(plain, edges="edges")))
-    for graph in (here, *map(hn.load_graph, (tmp_path / "a.graphml", tmp_path / "a.json"))):
+    for graph in (
+        here,
+        *map(hn.ext.graphs.load_graph, (tmp_path / "a.graphml", tmp_path / "a.json")),
+    ):
         assert means(graph)[1] == [("a", "a"), *[("a", "b")] * 2, *[("b", "a")] * 2]
         assert set(graph.lengths_m.tolist()) == {0.0, 5.0}

@@ -35,8 +35,8 @@ def read(tmp_path):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         try:
-            return hn.load_graph(path)
-        except hn.MapError as error:
+            return hn.ext.graphs.load_graph(path)
+        except hn.errors.MapError as error:
             text = str(error)
         assert text.isprintable()
         assert name in text
@@ -137,10 +137,10 @@ def test_files_with_bytes_changed_and_cut(read, tmp_path, name, data):
 
 
 def test_no_file_and_a_folder(tmp_path):
-    with pytest.raises(hn.MapNotFoundError, match="no such file"):
-        hn.load_graph(tmp_path / "none.geojson")
-    with pytest.raises(hn.MapError, match="this is a directory"):
-        hn.load_graph(tmp_path)
+    with pytest.raises(hn.errors.MapNotFoundError, match="no such file"):
+        hn.ext.graphs.load_graph(tmp_path / "none.geojson")
+    with pytest.raises(hn.errors.MapError, match="this is a directory"):
+        hn.ext.graphs.load_graph(tmp_path)
 
 
 def test_a_fact_that_contains_itself_is_refused_when_it_is_written(tmp_path):
@@ -150,9 +150,9 @@ def test_a_fact_that_contains_itself_is_refused_when_it_is_written(tmp_path):
     plain.add_node(1, x=0, y=0, fact=endless)
     plain.add_node(2, x=1, y=0)
     plain.add_edge(1, 2)
-    graph = hn.WaypointGraph.from_networkx(plain)
-    with pytest.raises(hn.InvalidValueError, match="contains itself"):
-        hn.export_nav2(graph, tmp_path / "a.geojson")
+    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    with pytest.raises(hn.errors.InvalidValueError, match="contains itself"):
+        hn.ext.graphs.export_nav2(graph, tmp_path / "a.geojson")
 
 
 def test_facts_that_json_has_no_value_for_are_left_out(tmp_path):
@@ -161,7 +161,9 @@ def test_facts_that_json_has_no_value_for_are_left_out(tmp_path):
     plain.add_node(1, x=0, y=0, odd=odd)
     plain.add_node("two", x=1, y=0)
     plain.add_edge(1, "two", cost=float("inf"))
-    hn.export_nav2(hn.WaypointGraph.from_networkx(plain), tmp_path / "a.geojson")
+    hn.ext.graphs.export_nav2(
+        hn.ext.graphs.WaypointGraph.from_networkx(plain), tmp_path / "a.geojson"
+    )
     node, other, edge = json.loads((tmp_path / "a.geojson").read_text())["features"]
     assert node["properties"]["metadata"]["odd"] == {"set": "{1}", "list": [1, "b"]}
     assert other["properties"]["metadata"]["name"] == "two"
@@ -200,7 +202,7 @@ def test_a_million_edges_in_a_gigabyte(tmp_path, name):
                 for k in range(n):
                     write("node: \\n\\t%d\\n\\twaypoint:\\n\\t\\t%d,0\\n\\tedges:\\n" % (k, k))
                     write("".join("\\t\\t %d, go\\n" % (j * 7 % n) for j in range(m // n)))
-        graph = hn.load_graph({str(tmp_path / name)!r})
+        graph = hn.ext.graphs.load_graph({str(tmp_path / name)!r})
         peak = peak_kb()
         assert (graph.n_nodes, graph.n_edges) == (n, m), (graph.n_nodes, graph.n_edges)
         assert peak < 2**20, peak
@@ -266,7 +268,7 @@ def test_values_of_any_kind_at_any_place(read, tmp_path, values, more, is_mappin
         # JSON's infinities are plain words to YAML.
         graph = read(name, content)
         if not isinstance(graph, str) and graph.n_edges:
-            hn.export_nav2(graph, tmp_path / "out.geojson")
-            again = hn.load_graph(tmp_path / "out.geojson")
+            hn.ext.graphs.export_nav2(graph, tmp_path / "out.geojson")
+            again = hn.ext.graphs.load_graph(tmp_path / "out.geojson")
             assert (again.n_nodes, again.n_edges) == (graph.n_nodes, graph.n_edges)
             assert not {"null", "bad-id", "repeated-id"} & {one.kind for one in again.findings}

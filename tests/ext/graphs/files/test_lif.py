@@ -28,7 +28,7 @@ def test_a_master_control_finds_every_node_and_edge(file, building):
     joined = join_links(building)
     ids = [f"{floor.name}/{node}" for floor in joined.floors for node in range(floor.graph.n_nodes)]
     assume(len(set(ids)) == len(ids))
-    hn.export_lif(building, file, vehicle_types=["A.B", "C.D"], exported_at=NOON)
+    hn.ext.graphs.export_lif(building, file, vehicle_types=["A.B", "C.D"], exported_at=NOON)
     data = read_lif(file)
     assert data["metaInformation"]["exportTimestamp"] == "2026-03-01T12:30:15.12Z"
     for layout, floor in zip(data["layouts"], joined.floors, strict=True):
@@ -57,8 +57,8 @@ def test_a_master_control_finds_every_node_and_edge(file, building):
 @settings(max_examples=examples(150))
 def test_what_is_read_back_is_what_was_written(file, building):
     joined = join_links(building)
-    hn.export_lif(building, file, vehicle_types=["A.B"])
-    back = hn.load_building_graph(file)
+    hn.ext.graphs.export_lif(building, file, vehicle_types=["A.B"])
+    back = hn.ext.fleet.load_building_graph(file)
     assert [floor.name for floor in back.floors] == [floor.name for floor in joined.floors]
     for read, written in zip(back.floors, joined.floors, strict=True):
         assert read.graph.points == pytest.approx(written.graph.points, abs=1e-6)
@@ -82,24 +82,26 @@ def test_what_is_read_back_is_what_was_written(file, building):
 def small(tmp_path):
     path = tmp_path / "a.yaml"
     path.write_text("levels: {L1: {vertices: [[0, 0, {}], [3, 4, {}]], lanes: [[0, 1, {}]]}}")
-    return hn.load_building_graph(path)
+    return hn.ext.fleet.load_building_graph(path)
 
 
 def test_times_are_written_in_utc(small, tmp_path):
     here = NOON.astimezone(timezone(timedelta(hours=2)))
     for at in (NOON, here):
-        hn.export_lif(small, tmp_path / "a.lif", vehicle_types=["A.B"], exported_at=at)
+        hn.ext.graphs.export_lif(small, tmp_path / "a.lif", vehicle_types=["A.B"], exported_at=at)
         data = json.loads((tmp_path / "a.lif").read_text())
         assert data["metaInformation"]["exportTimestamp"] == "2026-03-01T12:30:15.12Z"
     plain = NOON.replace(tzinfo=None)
-    with pytest.raises(hn.InvalidValueError, match="expected a time with a time zone"):
-        hn.export_lif(small, tmp_path / "a.lif", vehicle_types=["A.B"], exported_at=plain)
+    with pytest.raises(hn.errors.InvalidValueError, match="expected a time with a time zone"):
+        hn.ext.graphs.export_lif(
+            small, tmp_path / "a.lif", vehicle_types=["A.B"], exported_at=plain
+        )
 
 
 @pytest.mark.parametrize("types", [[], "A.B", [""], [3]])
 def test_a_layout_needs_vehicle_types(small, tmp_path, types):
-    with pytest.raises(hn.InvalidValueError, match="expected one or more texts"):
-        hn.export_lif(small, tmp_path / "a.json", vehicle_types=types)
+    with pytest.raises(hn.errors.InvalidValueError, match="expected one or more texts"):
+        hn.ext.graphs.export_lif(small, tmp_path / "a.json", vehicle_types=types)
 
 
 @pytest.mark.parametrize(
@@ -124,11 +126,11 @@ def test_links_of_any_names_are_read(tmp_path, drawn, read):
         {"layoutLevelId": "2", "nodes": [node | {"nodeId": "b"}]},
     ]
     (tmp_path / "a.json").write_text(json.dumps({"layouts": layouts}))
-    links = hn.load_building_graph(tmp_path / "a.json").links
+    links = hn.ext.fleet.load_building_graph(tmp_path / "a.json").links
     assert [f"{link.kind} {link.name}" for link in links] == read
 
 
 def test_graphs_of_one_floor_are_graphs(small, tmp_path):
-    hn.export_lif(small, tmp_path / "a.json", vehicle_types=["A.B"])
-    graph = hn.load_graph(tmp_path / "a.json")
+    hn.ext.graphs.export_lif(small, tmp_path / "a.json", vehicle_types=["A.B"])
+    graph = hn.ext.graphs.load_graph(tmp_path / "a.json")
     assert (graph.format, graph.n_nodes, graph.n_edges) == ("lif", 2, 1)

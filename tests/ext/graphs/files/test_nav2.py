@@ -33,10 +33,10 @@ def test_edges_are_free_and_nodes_connected_exactly_where_free_space_is(folder, 
     if not (classes == hn.CellClass.FREE).any():
         return
     here = topology(classes)
-    built = hn.build_route_graph(here)
+    built = hn.ext.graphs.build_route_graph(here)
     if not built.n_edges:
         return
-    hn.export_nav2(built, folder / "any.geojson")
+    hn.ext.graphs.export_nav2(built, folder / "any.geojson")
     graph = read_nav2(folder / "any.geojson")
     for line in graph.lines.values():
         assert segment_faults(here.grid, line) == ()
@@ -80,7 +80,9 @@ def test_the_margin_of_an_image_gets_no_nodes(folder):
     classes = np.full((6, 6), hn.CellClass.FREE)
     classes[1:5, 1:5] = hn.CellClass.UNEXPLORED
     classes[2:4, 2:4] = hn.CellClass.FREE
-    hn.export_nav2(hn.build_route_graph(topology(classes)), folder / "rim.geojson")
+    hn.ext.graphs.export_nav2(
+        hn.ext.graphs.build_route_graph(topology(classes)), folder / "rim.geojson"
+    )
     points = read_nav2(folder / "rim.geojson").points.values()
     assert points
     assert all(2 < x < 4 and 2 < y < 4 for x, y in points)
@@ -99,14 +101,14 @@ def _labels_at(part_at, point):
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7, -3.0])
 def test_a_file_holds_the_graph_in_metres_of_the_map_frame(folder, yaw_rad):
     here = topology_of(HOUSE, origin_m=(-3.0, 12.5), yaw_rad=yaw_rad)
-    built = hn.build_route_graph(here)
-    hn.export_nav2(built, folder / "house.geojson", frame="floor")
+    built = hn.ext.graphs.build_route_graph(here)
+    hn.ext.graphs.export_nav2(built, folder / "house.geojson", frame="floor")
     graph = read_nav2(folder / "house.geojson")
     assert set(graph.frames.values()) == {"floor"}
     assert list(graph.points.values()) == list(map(tuple, built.points.tolist()))
     assert list(graph.edges.values()) == list(map(tuple, built.edges.tolist()))
     # Turned and moved back, the points are those of the plain map.
-    plain = hn.build_route_graph(topology_of(HOUSE)).points
+    plain = hn.ext.graphs.build_route_graph(topology_of(HOUSE)).points
     turn = np.array([[np.cos(yaw_rad), np.sin(yaw_rad)], [-np.sin(yaw_rad), np.cos(yaw_rad)]])
     points = (np.array(list(graph.points.values())) - [-3.0, 12.5]) @ turn.T
     assert np.allclose(points, plain)
@@ -118,7 +120,7 @@ def test_a_file_holds_the_graph_in_metres_of_the_map_frame(folder, yaw_rad):
 
 def test_rooms_and_doors_have_nodes_and_edges_name_the_doors_that_they_pass(folder):
     here = topology_of(HOUSE)
-    hn.export_nav2(hn.build_route_graph(here), folder / "house.geojson")
+    hn.ext.graphs.export_nav2(hn.ext.graphs.build_route_graph(here), folder / "house.geojson")
     graph = read_nav2(folder / "house.geojson")
     names = {facts.get("room") for facts in graph.node_facts.values()}
     assert set(here.rooms.names) <= names
@@ -145,7 +147,7 @@ def test_measures_beside_an_edge_are_those_of_the_walls(folder):
     cells[1:4, 1:13] = 0.0
     grid = hn.OccupancyGrid(cells, robot_radius_m=0)
     here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    hn.export_nav2(hn.build_route_graph(here), folder / "corridor.geojson")
+    hn.ext.graphs.export_nav2(hn.ext.graphs.build_route_graph(here), folder / "corridor.geojson")
     graph = read_nav2(folder / "corridor.geojson")
     eastward = 0
     for number, (tail, head) in graph.edges.items():
@@ -160,16 +162,16 @@ def test_measures_beside_an_edge_are_those_of_the_walls(folder):
 
 def test_what_nav2_would_refuse_is_refused_in_one_line(folder):
     grid = hn.OccupancyGrid(np.zeros((1, 1), dtype=np.float32), robot_radius_m=0)
-    alone = hn.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    with pytest.raises(hn.InvalidValueError, match="no edge"):
-        hn.export_nav2(alone, folder / "alone.geojson")
-    built = hn.build_route_graph(topology_of(HOUSE))
-    with pytest.raises(hn.MapError, match="geojson"):
-        hn.export_nav2(built, folder / "graph.txt")
-    with pytest.raises(hn.MapError, match="cannot write"):
-        hn.export_nav2(built, folder / "none" / "graph.geojson")
-    with pytest.raises(hn.InvalidValueError, match="frame"):
-        hn.export_nav2(built, folder / "graph.geojson", frame="")
+    alone = hn.ext.graphs.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    with pytest.raises(hn.errors.InvalidValueError, match="no edge"):
+        hn.ext.graphs.export_nav2(alone, folder / "alone.geojson")
+    built = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
+    with pytest.raises(hn.errors.MapError, match="geojson"):
+        hn.ext.graphs.export_nav2(built, folder / "graph.txt")
+    with pytest.raises(hn.errors.MapError, match="cannot write"):
+        hn.ext.graphs.export_nav2(built, folder / "none" / "graph.geojson")
+    with pytest.raises(hn.errors.InvalidValueError, match="frame"):
+        hn.ext.graphs.export_nav2(built, folder / "graph.geojson", frame="")
     assert not (folder / "alone.geojson").exists()
 
 
@@ -180,7 +182,9 @@ def test_names_of_any_text_survive(folder):
     names = (names[0], names[1].strip())
     grid = hn.OccupancyGrid(np.zeros((4, 8), dtype=np.float32), robot_radius_m=0)
     pyramid = hn.DualGraphPyramid.build(grid, rooms=hn.RoomLabels(names, label_of))
-    hn.export_nav2(hn.build_route_graph(hn.TopologicalMap(pyramid)), folder / "names.geojson")
+    hn.ext.graphs.export_nav2(
+        hn.ext.graphs.build_route_graph(hn.TopologicalMap(pyramid)), folder / "names.geojson"
+    )
     graph = read_nav2(folder / "names.geojson")
     assert {facts["room"] for facts in graph.node_facts.values()} == set(names)
     assert json.loads((folder / "names.geojson").read_bytes())["features"]
@@ -189,10 +193,10 @@ def test_names_of_any_text_survive(folder):
 @given(st.sampled_from([0, -1, math.nan, math.inf]))
 def test_bad_arguments_are_refused(value):
     here = topology_of(HOUSE)
-    with pytest.raises(hn.InvalidValueError, match="spacing_m"):
-        hn.build_route_graph(here, spacing_m=value)
+    with pytest.raises(hn.errors.InvalidValueError, match="spacing_m"):
+        hn.ext.graphs.build_route_graph(here, spacing_m=value)
     if value != math.inf:
-        with pytest.raises(hn.InvalidValueError, match="nodes"):
-            hn.build_route_graph(here, nodes=value)
-    with pytest.raises(hn.InvalidValueError, match="stretch"):
-        hn.build_route_graph(here, stretch=value)
+        with pytest.raises(hn.errors.InvalidValueError, match="nodes"):
+            hn.ext.graphs.build_route_graph(here, nodes=value)
+    with pytest.raises(hn.errors.InvalidValueError, match="stretch"):
+        hn.ext.graphs.build_route_graph(here, stretch=value)

@@ -28,9 +28,11 @@ from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.graphs.files.osm_reader import east_north, read_osm
 from tests.strategies import examples
 
-ANCHORS = st.builds(hn.Anchor, st.floats(-60, 60), st.floats(-179, 179), st.floats(-360, 360))
+ANCHORS = st.builds(
+    hn.ext.graphs.Anchor, st.floats(-60, 60), st.floats(-179, 179), st.floats(-360, 360)
+)
 NEAR = st.floats(-200, 200)
-PLACE = hn.Anchor(48.15, 11.57)
+PLACE = hn.ext.graphs.Anchor(48.15, 11.57)
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +54,8 @@ def test_degrees_are_those_of_the_plane_that_touches_the_earth(anchor, x, y):
 
 @pytest.mark.parametrize("bad", [(91, 0), (86, 0), (0, 181), (math.nan, 0), (0, 0, math.inf)])
 def test_no_place_on_the_earth(bad):
-    with pytest.raises(hn.InvalidValueError, match="an anchor has"):
-        hn.Anchor(*bad)
+    with pytest.raises(hn.errors.InvalidValueError, match="an anchor has"):
+        hn.ext.graphs.Anchor(*bad)
 
 
 def in_xml(text):
@@ -74,8 +76,8 @@ def facts_of(graph):
 @settings(max_examples=examples(150))
 def test_what_is_read_back_is_what_was_written(file, building, anchor):
     joined = join_links(building)
-    hn.export_osm(building, file, anchor=anchor)
-    back = hn.load_building_graph(file)
+    hn.ext.graphs.export_osm(building, file, anchor=anchor)
+    back = hn.ext.fleet.load_building_graph(file)
     names = [in_xml(floor.name) for floor in joined.floors]
     assert len(back.floors) == len(names)
     if len(set(names)) == len(names):
@@ -103,10 +105,10 @@ STAIRS = Link(
 @pytest.fixture(scope="module")
 def house():
     topology = topology_of(HOUSE)
-    graph = hn.build_route_graph(topology, spacing_m=6)
+    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=6)
     links = (LIFT, STAIRS)
     floors = [
-        hn.floor_graph(topology, graph, name=name, links=links, elevation_m=height)
+        hn.ext.fleet.floor_graph(topology, graph, name=name, links=links, elevation_m=height)
         for name, height in (("1", 0.0), ("2", 3.5))
     ]
     return topology, BuildingGraph(name="house", floors=tuple(floors), links=links)
@@ -114,7 +116,7 @@ def house():
 
 def test_an_area_graph_joins_the_rooms_as_their_doors_do(house, file):
     topology, building = house
-    hn.export_osm(building, file, anchor=PLACE)
+    hn.ext.graphs.export_osm(building, file, anchor=PLACE)
     found = read_osm(file)
     rooms = {(area.level, area.name): area for area in found.areas.values() if area.kind == "room"}
     assert set(rooms) == {(level, name) for level in (1, 2) for name in topology.rooms.names}
@@ -148,7 +150,7 @@ def test_an_area_graph_joins_the_rooms_as_their_doors_do(house, file):
 
 def test_foot_ways_and_links_are_one_graph_over_both_floors(house, file):
     _, building = house
-    hn.export_osm(building, file, anchor=PLACE)
+    hn.ext.graphs.export_osm(building, file, anchor=PLACE)
     found = read_osm(file)
     roads: nx.Graph[Any] = nx.Graph()
     for refs, tags in found.ways:
@@ -164,8 +166,8 @@ def test_foot_ways_and_links_are_one_graph_over_both_floors(house, file):
 
 def test_doors_and_rooms_are_read_back(house, file):
     _, building = house
-    hn.export_osm(building, file, anchor=PLACE)
-    back = hn.load_building_graph(file)
+    hn.ext.graphs.export_osm(building, file, anchor=PLACE)
+    back = hn.ext.fleet.load_building_graph(file)
     for read, written in zip(back.floors, building.floors, strict=True):
         assert read.elevation_m == written.elevation_m
         assert [(d.name, d.rooms, d.is_opening) for d in read.doors] == [
@@ -182,17 +184,17 @@ def test_doors_and_rooms_are_read_back(house, file):
 def test_without_ways_rooms_and_doors_are_the_graph(house, file):
     """As a file of osmAG has it: the edges are judged on the map."""
     topology, building = house
-    hn.export_osm(building, file, anchor=PLACE)
+    hn.ext.graphs.export_osm(building, file, anchor=PLACE)
     text = file.read_text().replace('k="highway"', 'k="was"')
     file.write_text(text)
-    back = hn.load_building_graph(file)
+    back = hn.ext.fleet.load_building_graph(file)
     assert [(link.name, link.kind) for link in back.links] == [
         ("lift", "lift"),
         ("steps", "stairs"),
     ]
     whole = to_networkx(back)
     assert nx.is_strongly_connected(nx.DiGraph(whole))
-    check = hn.check_graph(topology, back.floor("1").graph)
+    check = hn.ext.graphs.check_graph(topology, back.floor("1").graph)
     assert check.doors[0] == check.doors[1]
     assert check.rooms[0] == check.rooms[1]
 
@@ -214,7 +216,7 @@ HAND = """<osm version="0.6">
 def test_rooms_and_doors_of_simple_indoor_tagging(tmp_path):
     path = tmp_path / "hand.osm"
     path.write_text(HAND)
-    back = hn.load_building_graph(path)
+    back = hn.ext.fleet.load_building_graph(path)
     assert [floor.name for floor in back.floors] == ["EG", "1"]
     ground = back.floors[0]
     assert ground.graph.names == ("way 10", "way 11", "node 7")
@@ -226,11 +228,11 @@ def test_rooms_and_doors_of_simple_indoor_tagging(tmp_path):
     assert [end.floor for end in lift.ends] == ["EG", "1"]
     east, north = east_north((50.0, 8.0), (50.00002, 8.00002))
     assert lift.ends[0].position_m == pytest.approx((east, north), abs=1e-3)
-    with pytest.raises(hn.MapError, match="it has the floors EG, 1: choose one"):
-        hn.load_graph(path)
-    assert hn.load_graph(path, floor="EG").n_nodes == 3
-    with pytest.raises(hn.MapError, match="no floor is called 'roof': there are EG, 1"):
-        hn.load_graph(path, floor="roof")
+    with pytest.raises(hn.errors.MapError, match="it has the floors EG, 1: choose one"):
+        hn.ext.graphs.load_graph(path)
+    assert hn.ext.graphs.load_graph(path, floor="EG").n_nodes == 3
+    with pytest.raises(hn.errors.MapError, match="no floor is called 'roof': there are EG, 1"):
+        hn.ext.graphs.load_graph(path, floor="roof")
 
 
 @given(st.floats(-1, 7), st.floats(-1, 5), st.floats(-1, 7), st.floats(-1, 5))
@@ -239,11 +241,11 @@ def test_ends_of_doors_never_make_an_outline_cross_itself(file, a, b, c, d):
     outline = np.array([[0, 0], [6, 0], [6, 4], [3, 4], [3, 0.2], [2.9, 4], [0, 4.0]])
     floor = FloorGraph(
         name="0",
-        graph=hn.WaypointGraph.from_networkx(_pair()),
+        graph=hn.ext.graphs.WaypointGraph.from_networkx(_pair()),
         doors=(DoorLine("d", ((a, b), (c, d)), ("k", "h")),),
         areas=(FloorArea("k", "room", outline), FloorArea("h", "corridor", outline + 10)),
     )
-    hn.export_osm(BuildingGraph(name="b", floors=(floor,)), file, anchor=PLACE)
+    hn.ext.graphs.export_osm(BuildingGraph(name="b", floors=(floor,)), file, anchor=PLACE)
     for area in read_osm(file).areas.values():
         assert shapely.Polygon(area.outline).is_valid
         assert shapely.LinearRing(area.outline).is_ccw

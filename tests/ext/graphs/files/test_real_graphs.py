@@ -18,7 +18,7 @@ from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness.judges import judge_line, segment_faults
 from hybridnav.harness.pairs import sample_pairs
 
-ANCHOR = hn.Anchor(30.2862, -97.7366, heading_deg=12)
+ANCHOR = hn.ext.graphs.Anchor(30.2862, -97.7366, heading_deg=12)
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +28,15 @@ def gdc(data):
     for name in ("2", "3"):
         grid = hn.load_map(data / "bwi_gdc" / name / f"{name}.yaml", robot_radius_m=0.25)
         topologies[name] = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-        graphs[name] = hn.build_route_graph(topologies[name], nodes=300)
+        graphs[name] = hn.ext.graphs.build_route_graph(topologies[name], nodes=300)
         degrees = np.bincount(graphs[name].edges[:, 0], minlength=graphs[name].n_nodes)
         x, y = graphs[name].points[int(degrees.argmax())].tolist()
         at[name] = LinkEnd(name, (x + 0.02, y))
     lift = Link(name="lift", kind="lift", ends=(at["2"], at["3"]), ride_s=10, max_radius_m=0.5)
     floors = [
-        hn.floor_graph(topologies[name], graphs[name], name=name, elevation_m=height, links=[lift])
+        hn.ext.fleet.floor_graph(
+            topologies[name], graphs[name], name=name, elevation_m=height, links=[lift]
+        )
         for name, height in (("2", 5.0), ("3", 10.0))
     ]
     building = BuildingGraph(name="gdc", floors=tuple(floors), links=(lift,))
@@ -47,12 +49,12 @@ def test_two_floors_survive_and_their_edges_stay_free(gdc, tmp_path, kind):
     building = align_floors(own)
     path = tmp_path / {"rmf": "a.yaml", "osm": "a.osm", "lif": "a.json"}[kind]
     if kind == "rmf":
-        hn.export_rmf(building, path)
+        hn.ext.graphs.export_rmf(building, path)
     elif kind == "osm":
-        hn.export_osm(building, path, anchor=ANCHOR)
+        hn.ext.graphs.export_osm(building, path, anchor=ANCHOR)
     else:
-        hn.export_lif(building, path, vehicle_types=["A.B"])
-    back = hn.load_building_graph(path)
+        hn.ext.graphs.export_lif(building, path, vehicle_types=["A.B"])
+    back = hn.ext.fleet.load_building_graph(path)
     (lift,) = back.links
     assert [end.floor for end in lift.ends] == ["2", "3"]
     (x, y), (u, v) = (end.position_m for end in own.links[0].ends)
@@ -61,8 +63,8 @@ def test_two_floors_survive_and_their_edges_stay_free(gdc, tmp_path, kind):
         read = moved_floor(floor, (*shift, 0.0)).graph
         assert read.points == pytest.approx(written.graph.points, abs=1e-5)
         assert read.n_edges == written.graph.n_edges
-        check = hn.check_graph(topologies[floor.name], written.graph)
-        again = hn.check_graph(topologies[floor.name], read)
+        check = hn.ext.graphs.check_graph(topologies[floor.name], written.graph)
+        again = hn.ext.graphs.check_graph(topologies[floor.name], read)
         # Nodes at a wall may lie in it after a shift that is rounded; those of a floor that stays
         # do not.
         if floor.name == "2":
@@ -75,16 +77,16 @@ def test_two_floors_survive_and_their_edges_stay_free(gdc, tmp_path, kind):
 @pytest.mark.parametrize("kind", ["rmf", "osm", "lif"])
 def test_the_graph_of_both_floors_is_judged_as_if_no_file_lay_between(gdc, tmp_path, kind):
     topologies, own = gdc
-    floors = [hn.Floor(name, hn.HybridPlanner(topologies[name])) for name in ("2", "3")]
-    house = hn.Building(floors, own.links)
+    floors = [hn.ext.fleet.Floor(name, hn.HybridPlanner(topologies[name])) for name in ("2", "3")]
+    house = hn.ext.fleet.Building(floors, own.links)
     path = tmp_path / {"rmf": "a.yaml", "osm": "a.osm", "lif": "a.json"}[kind]
     writers = {
-        "rmf": lambda graph: hn.export_rmf(graph, path),
-        "osm": lambda graph: hn.export_osm(graph, path, anchor=ANCHOR),
-        "lif": lambda graph: hn.export_lif(graph, path, vehicle_types=["A.B"]),
+        "rmf": lambda graph: hn.ext.graphs.export_rmf(graph, path),
+        "osm": lambda graph: hn.ext.graphs.export_osm(graph, path, anchor=ANCHOR),
+        "lif": lambda graph: hn.ext.graphs.export_lif(graph, path, vehicle_types=["A.B"]),
     }
     writers[kind](align_floors(own))
-    matched = match_graph(house, hn.load_building_graph(path), align=True)
+    matched = match_graph(house, hn.ext.fleet.load_building_graph(path), align=True)
     for name, floor in matched.floors.items():
         assert np.allclose(floor.graph.points, own.floor(name).graph.points, rtol=0, atol=1e-5)
     check = check_building_graph(matched)
@@ -109,13 +111,13 @@ FITS = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 @pytest.mark.parametrize("name", FITS)
 def test_what_is_clear_and_what_routes_are_is_judged_by_exact_geometry(data, name):
-    graph = hn.load_graph(data / name)
+    graph = hn.ext.graphs.load_graph(data / name)
     grid = hn.load_map(data / FITS[name], robot_radius_m=0.2)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    found = hn.check_graph(topology, graph)
+    found = hn.ext.graphs.check_graph(topology, graph)
     points = graph.points.tolist()
     for edge, (tail, head) in enumerate(graph.edges.tolist()):
         wrong = segment_faults(grid, [points[tail], points[head]])

@@ -40,7 +40,7 @@ def lifts_apart(building):
 @settings(max_examples=examples(150))
 def test_the_fleet_adapter_sees_every_node_edge_door_and_lift(file, building):
     assume(has_edges(building) and lifts_apart(building))
-    hn.export_rmf(building, file)
+    hn.ext.graphs.export_rmf(building, file)
     found = read_rmf(file)
     joined = join_links(building)
     offset = 0
@@ -72,8 +72,8 @@ def test_the_fleet_adapter_sees_every_node_edge_door_and_lift(file, building):
 @settings(max_examples=examples(150))
 def test_what_is_read_back_is_what_was_written(file, building):
     assume(has_edges(building) and lifts_apart(building))
-    hn.export_rmf(building, file)
-    back = hn.load_building_graph(file)
+    hn.ext.graphs.export_rmf(building, file)
+    back = hn.ext.fleet.load_building_graph(file)
     joined = join_links(building)
     assert back.name == building.name
     assert [floor.name for floor in back.floors] == [floor.name for floor in joined.floors]
@@ -109,7 +109,7 @@ doors: {d: {endpoints: [[1, 0], [0, 1]], map: L1}}
 def house(tmp_path):
     path = tmp_path / "house.yaml"
     path.write_text(HOUSE)
-    return hn.load_building_graph(path)
+    return hn.ext.fleet.load_building_graph(path)
 
 
 def test_a_file_drawn_by_hand(house):
@@ -126,17 +126,17 @@ def test_lifts_that_do_not_line_up_are_refused_and_aligned(house, tmp_path):
     moved = replace(lift, ends=(lift.ends[0], LinkEnd("L2", (9.0, 4.0))))
     apart = BuildingGraph(name="house", floors=house.floors, links=(moved,))
     with pytest.raises(
-        hn.InvalidValueError, match=r"lie 6\.00 m apart, and Open-RMF allows 0\.1 m"
+        hn.errors.InvalidValueError, match=r"lie 6\.00 m apart, and Open-RMF allows 0\.1 m"
     ):
-        hn.export_rmf(apart, tmp_path / "a.yaml")
-    hn.export_rmf(align_floors(apart), tmp_path / "a.yaml")
+        hn.ext.graphs.export_rmf(apart, tmp_path / "a.yaml")
+    hn.ext.graphs.export_rmf(align_floors(apart), tmp_path / "a.yaml")
     assert read_rmf(tmp_path / "a.yaml").lifts["east"][:2] == (3.0, 4.0)
 
 
 def test_the_ends_of_a_lift_that_lie_apart_on_maps_are_joined_at_their_mean(house, tmp_path):
     (lift,) = house.links
     moved = replace(lift, ends=(lift.ends[0], LinkEnd("L2", (3.3, 4.2))))
-    notes = hn.export_rmf(replace(house, links=(moved,)), tmp_path / "a.yaml")
+    notes = hn.ext.graphs.export_rmf(replace(house, links=(moved,)), tmp_path / "a.yaml")
     assert notes == ("lift east: its own ends, 0.36 m apart: vertices lie at their mean",)
     found = read_rmf(tmp_path / "a.yaml")
     stops = [at for at, name in found.lift_of.items() if name == "east"]
@@ -146,7 +146,7 @@ def test_the_ends_of_a_lift_that_lie_apart_on_maps_are_joined_at_their_mean(hous
         (node,) = {at for at in joined if found.waypoints[at][0] == found.waypoints[stop][0]}
         assert math.dist(found.waypoints[node][1:3], (3.15, 4.1)) < 0.25
         assert any(lane[:2] == (stop, node) for lane in found.lanes)
-    back = hn.load_building_graph(tmp_path / "a.yaml")
+    back = hn.ext.fleet.load_building_graph(tmp_path / "a.yaml")
     assert back.links[0].ends == (LinkEnd("L1", (3.15, 4.1)), LinkEnd("L2", (3.15, 4.1)))
 
 
@@ -154,7 +154,7 @@ def test_what_the_format_has_no_place_for_is_said(house, tmp_path):
     (lift,) = house.links
     stairs = replace(lift, name="steps", kind="stairs")
     both = BuildingGraph(name="h", floors=house.floors, links=(replace(lift, wait_s=9.0), stairs))
-    assert hn.export_rmf(both, tmp_path / "a.yaml", doors=False) == (
+    assert hn.ext.graphs.export_rmf(both, tmp_path / "a.yaml", doors=False) == (
         "lift east: its waiting time, ride time and cost",
         "stairs steps: Open-RMF knows lifts only",
         "doors: as asked",
@@ -165,8 +165,10 @@ def test_what_the_format_has_no_place_for_is_said(house, tmp_path):
 def test_two_lifts_at_one_point_are_refused(house, tmp_path):
     twin = replace(house.links[0], name="west")
     both = replace(house, links=(*house.links, twin))
-    with pytest.raises(hn.InvalidValueError, match="the lifts 'east' and 'west' end at one node"):
-        hn.export_rmf(both, tmp_path / "a.yaml")
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="the lifts 'east' and 'west' end at one node"
+    ):
+        hn.ext.graphs.export_rmf(both, tmp_path / "a.yaml")
 
 
 COORDINATES = st.integers(0, 4000).map(lambda value: value / 100)
@@ -263,7 +265,7 @@ def test_pixels_become_the_metres_that_they_were_drawn_from(drawing, levels, ord
         "levels": {name: contents[name] for name in names},
     }
     drawing.write_text(yaml.safe_dump(data))
-    building = hn.load_building_graph(drawing)
+    building = hn.ext.fleet.load_building_graph(drawing)
     assert [floor.name for floor in building.floors] == [f"L{k}" for k in range(len(levels))]
     for number, (floor, level) in enumerate(zip(building.floors, levels, strict=True)):
         lanes = [lane for lane in level.lanes if lane[2] == 0]
@@ -324,7 +326,7 @@ def write(path, **changes):
 
 
 def test_a_lift_ends_at_the_vertices_in_its_cabin(tmp_path):
-    building = hn.load_building_graph(write(tmp_path / "a.building.yaml"))
+    building = hn.ext.fleet.load_building_graph(write(tmp_path / "a.building.yaml"))
     assert building.name == "small"
     assert [(floor.name, floor.elevation_m) for floor in building.floors] == [
         ("down", 0.0),
@@ -348,7 +350,9 @@ def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
     for x, y in rng.uniform(150, 270, (12, 2)):
         sides = {"width": 3.0, "depth": 1.4, "yaw": float(yaw)}
         facts = {"x": float(x), "y": float(y) + 80, "level_doors": {"up": [], "down": []}} | sides
-        building = hn.load_building_graph(write(tmp_path / "a.yaml", lifts={"hoist": facts}))
+        building = hn.ext.fleet.load_building_graph(
+            write(tmp_path / "a.yaml", lifts={"hoist": facts})
+        )
         box = shapely.affinity.rotate(shapely.box(-1.55, -0.75, 1.55, 0.75), yaw, use_radians=True)
         cabin = shapely.affinity.translate(box, x * 0.05, -(y + 80) * 0.05)
         assert bool(building.links) == cabin.covers(shapely.Point(10.0, -15.0))
@@ -372,8 +376,8 @@ def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_line(tmp_path, change, words):
-    with pytest.raises(hn.MapError, match=words) as caught:
-        hn.load_building_graph(write(tmp_path / "a.yaml", **change))
+    with pytest.raises(hn.errors.MapError, match=words) as caught:
+        hn.ext.fleet.load_building_graph(write(tmp_path / "a.yaml", **change))
     assert "\n" not in str(caught.value)
 
 
@@ -382,11 +386,11 @@ def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
     vertices = [[0, 0, 0, ""], [9, 0, 0, ""], [4, -5, 0, ""], [4, 5, 0, ""]]
     level = {"vertices": vertices, "lanes": [[0, 1, {}]], "doors": [[2, 3, {"name": [1, "d"]}]]}
     changes = {"coordinate_system": "cartesian_meters", "lifts": {}, "levels": {"a": level}}
-    graph = hn.load_graph(write(tmp_path / "a.yaml", **changes))
+    graph = hn.ext.graphs.load_graph(write(tmp_path / "a.yaml", **changes))
     assert graph.edge_facts[0]["door_name"] == "d"
     level["doors"].append([2, 3, {"name": [1, "e"]}])
-    with pytest.raises(hn.MapError, match="2 doors and 1 lanes, at most 1 pairs"):
-        hn.load_graph(write(tmp_path / "a.yaml", **changes))
+    with pytest.raises(hn.errors.MapError, match="2 doors and 1 lanes, at most 1 pairs"):
+        hn.ext.graphs.load_graph(write(tmp_path / "a.yaml", **changes))
 
 
 def test_a_level_without_lanes_needs_no_scale(tmp_path):
@@ -394,14 +398,14 @@ def test_a_level_without_lanes_needs_no_scale(tmp_path):
     data = yaml.safe_load(path.read_text())
     data["levels"]["roof"] = {"vertices": [[0, 0, 0, ""]], "lanes": [], "elevation": 9}
     path.write_text(yaml.safe_dump(data))
-    assert [floor.name for floor in hn.load_building_graph(path).floors] == ["down", "up"]
+    assert [floor.name for floor in hn.ext.fleet.load_building_graph(path).floors] == ["down", "up"]
     data["lifts"]["hoist"]["reference_floor_name"] = "roof"
     path.write_text(yaml.safe_dump(data))
-    with pytest.raises(hn.MapError, match="lift hoist, level roof: its scale is not known"):
-        hn.load_building_graph(path)
+    with pytest.raises(hn.errors.MapError, match="lift hoist, level roof: its scale is not known"):
+        hn.ext.fleet.load_building_graph(path)
 
 
 def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
     path = write(tmp_path / "a.yaml")
-    with pytest.raises(hn.MapError, match="no lane of graph 2; graphs with lanes: 0"):
-        hn.load_building_graph(path, graph_index=2)
+    with pytest.raises(hn.errors.MapError, match="no lane of graph 2; graphs with lanes: 0"):
+        hn.ext.fleet.load_building_graph(path, graph_index=2)

@@ -145,21 +145,23 @@ def test_each_choice_can_be_watched_and_their_number_limited() -> None:
     ],
 )
 def test_a_start_that_is_none_is_refused(start: tuple[float, float], said: str) -> None:
-    with pytest.raises(hn.InvalidValueError, match=said):
+    with pytest.raises(hn.errors.InvalidValueError, match=said):
         explore(flat(), start)
 
 
 def test_wrong_settings_are_refused() -> None:
     for wrong in (0, 10_001, 1.5, "1"):
-        with pytest.raises(hn.InvalidValueError, match="most_goals must be a whole number from 1"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="most_goals must be a whole number from 1"
+        ):
             explore(flat(), START, most_goals=wrong)  # type: ignore[arg-type]
     for wrong in (-1, 0.5, "a"):
-        with pytest.raises(hn.InvalidValueError, match="seed must be a whole number from 0"):
+        with pytest.raises(hn.errors.InvalidValueError, match="seed must be a whole number from 0"):
             explore(flat(), START, seed=wrong)  # type: ignore[arg-type]
-    with pytest.raises(hn.InvalidValueError, match="the start must be two finite metres"):
+    with pytest.raises(hn.errors.InvalidValueError, match="the start must be two finite metres"):
         explore(flat(), "door")  # type: ignore[arg-type]
     full = hn.OccupancyGrid(np.ones((4, 4), np.float32), robot_radius_m=0)
-    with pytest.raises(hn.InvalidValueError, match="is not in a free cell"):
+    with pytest.raises(hn.errors.InvalidValueError, match="is not in a free cell"):
         explore(full)
 
 
@@ -290,7 +292,7 @@ def test_a_robot_that_finishes_rooms_stays_while_goals_are_left() -> None:
     ]
     assert farther
     one_of = "by must be one of path, frontier, room, got 'luck'"
-    with pytest.raises(hn.InvalidValueError, match=one_of):
+    with pytest.raises(hn.errors.InvalidValueError, match=one_of):
         explore(flat(), START, by="luck")  # type: ignore[arg-type]
 
 

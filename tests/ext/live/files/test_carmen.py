@@ -23,11 +23,11 @@ def flaser(ranges: list[Any], pose: tuple[Any, Any, Any] = (1.0, 2.0, 0.5), time
     return f"FLASER {len(ranges)} {readings} {x} {y} {heading} 9 9 9 {time} host {time}\n"
 
 
-def log_of(folder: Path, *lines: str, packed: bool = False) -> hn.CarmenLog:
+def log_of(folder: Path, *lines: str, packed: bool = False) -> hn.ext.live.CarmenLog:
     text = "".join(lines).encode()
     path = folder / "a.log"
     path.write_bytes(gzip.compress(text) if packed else text)
-    return hn.CarmenLog(path)
+    return hn.ext.live.CarmenLog(path)
 
 
 def angles_of(scan: LaserScan) -> tuple[float, float]:
@@ -179,7 +179,7 @@ def test_a_packed_log_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) 
     whole = gzip.compress(text)
     packed = whole[: len(whole) // 2]
     path.write_bytes(packed)
-    log = hn.CarmenLog(path)
+    log = hn.ext.live.CarmenLog(path)
     n_read = len(list(log))
     there = zlib.decompressobj(31).decompress(packed)
     assert n_read == there.count(b"\n")
@@ -199,9 +199,11 @@ def test_a_packed_log_is_unpacked_no_further_than_a_limit(tmp_path: Path, conten
     with gzip.open(path, "wb", compresslevel=1) as file:
         for _ in range(200):
             file.write(block)
-    log = hn.CarmenLog(path)
+    log = hn.ext.live.CarmenLog(path)
     tracemalloc.start()
-    with pytest.raises(hn.MapError, match="unpacks to more than 64 MiB, expected at most") as error:
+    with pytest.raises(
+        hn.errors.MapError, match="unpacks to more than 64 MiB, expected at most"
+    ) as error:
         for _ in log:
             pass
     peak = tracemalloc.get_traced_memory()[1]
@@ -224,7 +226,7 @@ def test_damage_behind_the_last_scan_leaves_out_none(tmp_path: Path, cut: int) -
     packed = gzip.compress("".join(flaser(GOOD, time=k) for k in range(5)).encode())
     path = tmp_path / "a.log.gz"
     path.write_bytes(packed[:-cut] if cut > 0 else packed + b"more bytes")
-    log = hn.CarmenLog(path)
+    log = hn.ext.live.CarmenLog(path)
     assert len(list(log)) == 5
     assert log.summary() == "left out 0 of 5 scans; the rest of the file is damaged"
 
@@ -247,7 +249,7 @@ def test_any_bytes_end_in_scans_or_counts(
     content = gzip.compress(text) if packed else text
     path = tmp_path_factory.mktemp("log") / "noise.log"
     path.write_bytes(content[:at] + noise + content[at:])
-    log = hn.CarmenLog(path)
+    log = hn.ext.live.CarmenLog(path)
     mapper = Mapper(resolution_m=1.0, max_cells=10_000)
     for scan in log:
         mapper.add(scan)
@@ -266,7 +268,7 @@ def test_time_adds_up_without_long_pauses(tmp_path: Path) -> None:
 
 
 def test_a_log_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(hn.MapNotFoundError, match=r"log .*none\.log: no such file"):
-        hn.CarmenLog(tmp_path / "none.log")
-    with pytest.raises(hn.MapError, match="directory"):
-        hn.CarmenLog(tmp_path)
+    with pytest.raises(hn.errors.MapNotFoundError, match=r"log .*none\.log: no such file"):
+        hn.ext.live.CarmenLog(tmp_path / "none.log")
+    with pytest.raises(hn.errors.MapError, match="directory"):
+        hn.ext.live.CarmenLog(tmp_path)

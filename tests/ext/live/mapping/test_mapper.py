@@ -90,7 +90,7 @@ def test_every_cell_has_the_evidence_of_the_definition(
     expected = expected_evidence(given_scans, model, side_m)
     assert mapper.has_cells == bool(expected)
     if not expected:
-        with pytest.raises(hn.InvalidValueError, match="at least one scan"):
+        with pytest.raises(hn.errors.InvalidValueError, match="at least one scan"):
             mapper.to_grid()
         return
     grid = mapper.to_grid(robot_radius_m=0)
@@ -264,7 +264,7 @@ def test_a_scan_changes_cells_of_its_area_alone(
 def test_a_mapper_refuses_what_is_no_scan() -> None:
     wrong: list[Any] = [None, np.ones(3), "scan"]
     for thing in wrong:
-        with pytest.raises(hn.InvalidValueError, match="make a LaserScan") as refused:
+        with pytest.raises(hn.errors.InvalidValueError, match="make a LaserScan") as refused:
             Mapper().add(thing)
         assert "\n" not in str(refused.value)
 
@@ -364,7 +364,7 @@ BAD_SCANS: dict[str, Any] = {
 @pytest.mark.parametrize("change", BAD_SCANS.values(), ids=BAD_SCANS)
 def test_a_scan_refuses_values_that_are_none(change: dict[str, Any]) -> None:
     fine = {"ranges_m": np.ones(3), "pose": (0.0, 0.0, 0.0), "start_rad": 0.0, "step_rad": 0.1}
-    with pytest.raises(hn.InvalidValueError) as refused:
+    with pytest.raises(hn.errors.InvalidValueError) as refused:
         LaserScan(**{**fine, **change})
     assert "\n" not in str(refused.value)
 
@@ -372,7 +372,7 @@ def test_a_scan_refuses_values_that_are_none(change: dict[str, Any]) -> None:
 def test_sonars_need_one_finite_mount_each() -> None:
     wrong: list[Any] = [np.zeros((2, 3)), np.full((3, 3), np.nan), np.full((3, 3), 1e300), "ring"]
     for mounts in wrong:
-        with pytest.raises(hn.InvalidValueError, match="mounts"):
+        with pytest.raises(hn.errors.InvalidValueError, match="mounts"):
             SonarScan(np.ones(3), (0.0, 0.0, 0.0), mounts)
 
 
@@ -392,7 +392,7 @@ def test_sonars_need_one_finite_mount_each() -> None:
     ],
 )
 def test_a_laser_refuses_settings_out_of_range(values: dict[str, Any]) -> None:
-    with pytest.raises(hn.InvalidValueError):
+    with pytest.raises(hn.errors.InvalidValueError):
         LaserModel(**values)
 
 
@@ -420,7 +420,7 @@ def test_without_a_limit_all_scans_count_alike() -> None:
     evenly = corridor(*[6.0, 3.0] * 2000)
     assert evenly(least_probability=0.0) == 1.0
     for least in (-0.1, 0.5, math.nan):
-        with pytest.raises(hn.InvalidValueError, match="least_probability"):
+        with pytest.raises(hn.errors.InvalidValueError, match="least_probability"):
             Mapper(least_probability=least)
 
 
@@ -435,7 +435,7 @@ def test_without_a_limit_all_scans_count_alike() -> None:
     ],
 )
 def test_a_sonar_refuses_settings_out_of_range(values: dict[str, float]) -> None:
-    with pytest.raises(hn.InvalidValueError):
+    with pytest.raises(hn.errors.InvalidValueError):
         SonarModel(**values)
 
 
@@ -468,7 +468,7 @@ def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> 
     ],
 )
 def test_a_mapper_refuses_settings_out_of_range(values: dict[str, Any]) -> None:
-    with pytest.raises(hn.InvalidValueError):
+    with pytest.raises(hn.errors.InvalidValueError):
         Mapper(**values)
 
 
@@ -479,9 +479,11 @@ def test_a_map_of_an_area_is_cut_out_of_the_whole_one():
     rows, cols = whole.frame.cells_of(part.frame.points_of(np.argwhere(part.probability >= 0))).T
     assert part.shape == (5, 4)
     assert np.array_equal(part.probability.ravel(), whole.probability[rows, cols])
-    with pytest.raises(hn.InvalidValueError, match="at least one scan"):
+    with pytest.raises(hn.errors.InvalidValueError, match="at least one scan"):
         mapper.to_grid(area=(90.0, 90.0, 91.0, 91.0))
-    with pytest.raises(hn.InvalidValueError, match=r"expected \(x_min, y_min, x_max, y_max\)"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"expected \(x_min, y_min, x_max, y_max\)"
+    ):
         mapper.to_grid(area=(2.0, 1.0, 1.0, 2.0))
 
 

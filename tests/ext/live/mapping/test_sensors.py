@@ -167,6 +167,6 @@ def test_noise_depends_on_the_seed_alone() -> None:
     ],
 )
 def test_values_out_of_range_are_refused(make: Any) -> None:
-    with pytest.raises(hn.InvalidValueError) as refused:
+    with pytest.raises(hn.errors.InvalidValueError) as refused:
         make()
     assert "\n" not in str(refused.value)

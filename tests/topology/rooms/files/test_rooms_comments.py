@@ -165,7 +165,7 @@ def after(rooms, change):
         if kind == "split":
             line = [[4.0 + one * 2, 0.0], [4.0 + one * 2, 8.0]]
             return changed(rooms, Split(op="split", room=room, line=line, name=fresh), GRID)
-    except hn.InvalidValueError:
+    except hn.errors.InvalidValueError:
         return rooms
     if kind == "swap":
         taken = {room: second, second: room}

@@ -143,11 +143,15 @@ def test_the_tolerance_may_be_chosen(tmp_path):
         sizes[tolerance_m] = sum(line.count("[") for line in path.read_text().splitlines())
     assert sizes[None] >= sizes[0.06] > sizes[0.2] > sizes[0.5]
     for wrong in (0, -1, float("nan"), float("inf")):
-        with pytest.raises(hn.InvalidValueError, match="tolerance_m must be positive and finite"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="tolerance_m must be positive and finite"
+        ):
             hn.save_rooms(tmp_path / "x.yaml", rooms, grid, tolerance_m=wrong)
     given: Any
     for given in ((rooms.label_of, grid), (rooms, grid.classes)):
-        with pytest.raises(hn.InvalidValueError, match=r"expected an? (RoomLabels|OccupancyGrid)"):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match=r"expected an? (RoomLabels|OccupancyGrid)"
+        ):
             hn.save_rooms(tmp_path / "x.yaml", *given)
 
 
@@ -173,7 +177,9 @@ def test_two_entries_of_one_name_are_one_room(floor, path):
 def test_rooms_far_apart_are_not_joined_by_a_name(floor, path):
     grid, _ = floor
     path.write_text(re.sub("name: room-[13]", "name: office", path.read_text()))
-    with pytest.raises(hn.RoomsError, match=r"line \d+: room 'office': .* first in line \d+"):
+    with pytest.raises(
+        hn.errors.RoomsError, match=r"line \d+: room 'office': .* first in line \d+"
+    ):
         hn.load_rooms(path, grid)
 
 
@@ -209,7 +215,7 @@ def test_a_room_that_others_cover_is_refused_with_both_lines(floor, path):
     grid, _ = floor
     big = "- name: all\n  polygon: [[0, 0], [7, 0], [7, 2.5], [0, 2.5]]\n"
     path.write_text(path.read_text().replace("- name: room-3", f"{big}- name: room-3"))
-    with pytest.raises(hn.RoomsError) as error:
+    with pytest.raises(hn.errors.RoomsError) as error:
         hn.load_rooms(path, grid)
     assert re.search(
         r"line \d+: room 'room-1': holds no free cell.*line \d+: room 'all'", str(error.value)
@@ -251,7 +257,7 @@ def test_damaged_cells_end_in_one_line(floor, path, lines):
     grid, _ = floor
     text = path.read_text()
     path.write_text(text[: text.index("cells:")] + f"cells: {lines}\n")
-    with pytest.raises(hn.RoomsError, match="cells: damaged, delete the list") as error:
+    with pytest.raises(hn.errors.RoomsError, match="cells: damaged, delete the list") as error:
         hn.load_rooms(path, grid)
     assert str(error.value).isprintable()
 
@@ -271,7 +277,7 @@ def test_a_point_is_looked_up_in_one_call(floor):
     assert topology.rooms.at((0.5, 0.5)) == rooms.at((0.5, 0.5), grid) == "room-1"
     assert topology.rooms.at((6.0, 1.0)) == "room-3"
     assert topology.rooms.at((99.0, 1.0)) is None
-    with pytest.raises(hn.InvalidValueError, match="finite"):
+    with pytest.raises(hn.errors.InvalidValueError, match="finite"):
         topology.rooms.at((float("nan"), 1.0))
 
 

@@ -125,7 +125,7 @@ def map_rows(data):
     return [name for name, kind in rows if kind == "map"]
 
 
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 @pytest.mark.parametrize("name", MAPS)
 def test_rooms_of_a_real_map_are_read_as_they_were_found(data, tmp_path, name):
     grid = hn.load_map(data / name, robot_radius_m=0.25)
@@ -134,7 +134,7 @@ def test_rooms_of_a_real_map_are_read_as_they_were_found(data, tmp_path, name):
 
 
 @pytest.mark.full
-@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 def test_rooms_of_all_real_maps_are_read_as_they_were_found(data, tmp_path):
     names = map_rows(data)
     assert len(names) > 40

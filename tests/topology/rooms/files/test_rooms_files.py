@@ -98,7 +98,7 @@ def test_rings_beside_each_other_share_no_cell_and_leave_none_out():
 def test_outlines_of_a_hostile_file_are_refused_before_they_cost_much(write):
     zigzag = ", ".join(f"[{x % 7}, {6 * (x % 2)}]" for x in range(30_000))
     tall = occupancy_grid(np.ones((600, 700), dtype=np.uint8), resolution_m=0.01)
-    with pytest.raises(hn.RoomsError, match="rows of the map"):
+    with pytest.raises(hn.errors.RoomsError, match="rows of the map"):
         hn.load_rooms(write(f"rooms:\n- name: a\n  polygon: [{zigzag}]\n"), tall)
 
 
@@ -106,7 +106,7 @@ def test_outlines_that_cover_the_map_many_times_are_refused(write):
     floor = occupancy_grid(np.ones((20, 20), dtype=np.uint8))
     square = "[[0, 0], [20, 0], [20, 20], [0, 20]]"
     entries = "".join(f"- name: r{n}\n  polygon: {square}\n" for n in range(9))
-    with pytest.raises(hn.RoomsError, match=r"line 10: room 'r4': .* more than 4 times"):
+    with pytest.raises(hn.errors.RoomsError, match=r"line 10: room 'r4': .* more than 4 times"):
         hn.load_rooms(write("rooms:\n" + entries), floor)
 
 
@@ -186,7 +186,7 @@ def test_a_thousand_rooms_that_are_written_are_read_again(tmp_path):
 
 def test_more_rooms_than_can_be_read_are_not_written(tmp_path):
     grid, rooms = blocks(80)
-    with pytest.raises(hn.RoomsError, match="6400 rooms take"):
+    with pytest.raises(hn.errors.RoomsError, match="6400 rooms take"):
         hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
     assert not (tmp_path / "rooms.yaml").exists()
 
@@ -210,7 +210,7 @@ def test_whatever_is_written_is_read_again(tmp_path_factory, labels):
     path = tmp_path_factory.mktemp("any") / "rooms.yaml"
     try:
         hn.save_rooms(path, rooms, grid)
-    except hn.RoomsError:
+    except hn.errors.RoomsError:
         # Refused for a room without a cell alone.
         assert len(np.unique(labels)) < len(names)
         return
@@ -305,7 +305,7 @@ def test_flat_polygons_in_pixels_win_over_the_image(grid, tmp_path):
     ],
 )
 def test_a_file_that_is_wrong_says_so_in_one_line(grid, write, text, words):
-    with pytest.raises(hn.RoomsError) as error:
+    with pytest.raises(hn.errors.RoomsError) as error:
         hn.load_rooms(write(text), grid)
     message = str(error.value)
     assert message.isprintable()
@@ -326,15 +326,15 @@ def test_a_point_beside_a_wall_is_kept_for_robots_of_any_radius(write):
 
 
 def test_an_image_of_another_size_and_a_missing_file_are_refused(grid, tmp_path):
-    with pytest.raises(hn.RoomsError, match="5 x 4 pixels"):
+    with pytest.raises(hn.errors.RoomsError, match="5 x 4 pixels"):
         hn.load_rooms(locations(tmp_path, np.zeros((4, 5), np.uint8)), grid)
-    with pytest.raises(hn.RoomsNotFoundError, match="no such file"):
+    with pytest.raises(hn.errors.RoomsNotFoundError, match="no such file"):
         hn.load_rooms(tmp_path / "gone.yaml", grid)
 
 
 def test_rooms_that_could_not_be_read_again_are_not_written(grid, tmp_path):
     full = RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32), {"b": (0.5, 0.5)})
-    with pytest.raises(hn.RoomsError, match=r"'b'.*in an obstacle"):
+    with pytest.raises(hn.errors.RoomsError, match=r"'b'.*in an obstacle"):
         hn.save_rooms(tmp_path / "rooms.yaml", full, grid)
 
 
@@ -346,7 +346,7 @@ def test_a_disc_that_is_full_leaves_the_file_that_was_there(grid, write, tmp_pat
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
     try:
-        with pytest.raises(hn.RoomsError, match="cannot write"):
+        with pytest.raises(hn.errors.RoomsError, match="cannot write"):
             hn.save_rooms(path, rooms, grid)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -367,10 +367,10 @@ def test_a_file_that_is_replaced_keeps_its_mode_and_the_link_to_it(grid, write, 
 
 def test_rooms_without_cells_or_a_folder_are_not_written(grid, tmp_path):
     empty = RoomLabels(("a",), np.full(FLAT.shape, -1, dtype=np.int32))
-    with pytest.raises(hn.RoomsError, match="'a'"):
+    with pytest.raises(hn.errors.RoomsError, match="'a'"):
         hn.save_rooms(tmp_path / "rooms.yaml", empty, grid)
     full = RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32))
-    with pytest.raises(hn.RoomsError, match="cannot write"):
+    with pytest.raises(hn.errors.RoomsError, match="cannot write"):
         hn.save_rooms(tmp_path / "gone" / "rooms.yaml", full, grid)
 
 

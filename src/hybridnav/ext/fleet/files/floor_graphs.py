@@ -72,9 +72,11 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> from hybridnav.ext.fleet import floor_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> floor = hn.floor_graph(topology, hn.build_route_graph(topology), name="1")
+    >>> floor = floor_graph(topology, build_route_graph(topology), name="1")
     >>> floor.graph.n_nodes > 2, floor.doors
     (True, ())
     """
@@ -138,11 +140,12 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, building_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
-    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
-    >>> house = hn.Building(floors, [hn.Link(name="lift", kind="lift", ends=ends)])
-    >>> graph = hn.building_graph(house, nodes=20)
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
+    >>> graph = building_graph(house, nodes=20)
     >>> [floor.name for floor in graph.floors], [link.name for link in graph.links]
     (['1', '2'], ['lift'])
     """

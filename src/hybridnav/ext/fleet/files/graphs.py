@@ -63,10 +63,11 @@ def load_building_graph(
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import load_building_graph
     >>> from pathlib import Path
     >>> text = "levels: {L1: {vertices: [[0, 0, {name: dock}], [3, 4, {}]], lanes: [[0, 1, {}]]}}"
     >>> _ = Path("graph.yaml").write_text(text)
-    >>> building = hn.load_building_graph("graph.yaml")
+    >>> building = load_building_graph("graph.yaml")
     >>> building.floors[0].name, building.floors[0].graph.names
     ('L1', ('dock', 1))
     """

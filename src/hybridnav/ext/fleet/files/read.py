@@ -80,6 +80,7 @@ def load_building(
 
     Examples
     --------
+    >>> from hybridnav.ext.fleet import load_building
     >>> from pathlib import Path
     >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
     >>> ends = "[{floor: 1, at: [0.5, 0.5]}, {floor: 2, at: [0.5, 2.5]}]"
@@ -87,7 +88,7 @@ def load_building(
     ...     "floors: [{name: 1, map: figure1.hnm}, {name: 2, map: figure1.hnm}]\n"
     ...     f"links: [{{name: lift, kind: lift, wait_s: 20, ends: {ends}}}]\n"
     ... )
-    >>> building = hn.load_building("building.yaml")
+    >>> building = load_building("building.yaml")
     >>> round(building.plan(("1", (1.5, 0.5)), ("2", (0.5, 0.5))).length_m, 3)
     3.0
     """

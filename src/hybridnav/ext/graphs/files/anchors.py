@@ -31,7 +31,8 @@ class Anchor:
 
     Examples
     --------
-    >>> anchor = hn.Anchor(48.0, 11.0)
+    >>> from hybridnav.ext.graphs import Anchor
+    >>> anchor = Anchor(48.0, 11.0)
     >>> latitude, longitude = anchor.degrees_of((100.0, 0.0))
     >>> round(latitude, 7), round(longitude, 7)
     (48.0, 11.00134)

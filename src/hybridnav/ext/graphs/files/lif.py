@@ -256,15 +256,16 @@ def export_lif(
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph, export_lif
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
     >>> plain = nx.Graph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
     >>> plain.add_node("gate", x=3.5, y=5.0)
     >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="0", graph=hn.WaypointGraph.from_networkx(plain))
+    >>> floor = FloorGraph(name="0", graph=WaypointGraph.from_networkx(plain))
     >>> building = BuildingGraph(name="house", floors=(floor,))
-    >>> hn.export_lif(building, "house.lif.json", vehicle_types=["Maker.Carrier"])
+    >>> export_lif(building, "house.lif.json", vehicle_types=["Maker.Carrier"])
     ()
     """
     checked_type("building", building, BuildingGraph)

@@ -74,12 +74,13 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import load_graph
     >>> from pathlib import Path
     >>> nodes = [{"id": 1, "x": 0.0, "y": 0.0}, {"id": 2, "x": 3.0, "y": 4.0}]
     >>> import json
     >>> links = [{"source": 1, "target": 2}]
     >>> _ = Path("graph.json").write_text(json.dumps({"nodes": nodes, "links": links}))
-    >>> graph = hn.load_graph("graph.json")
+    >>> graph = load_graph("graph.json")
     >>> graph.format, graph.n_edges  # undirected: an edge in each direction
     ('node-link', 2)
     """

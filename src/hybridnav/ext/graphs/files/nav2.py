@@ -54,10 +54,10 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> from hybridnav.ext.graphs import build_route_graph, export_nav2
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> hn.export_nav2(build_route_graph(topology), "graph.geojson")
+    >>> export_nav2(build_route_graph(topology), "graph.geojson")
     """
     if isinstance(graph, WaypointGraph):
         name = graph.name

@@ -78,15 +78,16 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import Anchor, WaypointGraph, export_osm
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
     >>> plain = nx.Graph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
     >>> plain.add_node("gate", x=3.5, y=5.0)
     >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="0", graph=hn.WaypointGraph.from_networkx(plain))
+    >>> floor = FloorGraph(name="0", graph=WaypointGraph.from_networkx(plain))
     >>> building = BuildingGraph(name="house", floors=(floor,))
-    >>> hn.export_osm(building, "house.osm", anchor=hn.Anchor(48.15, 11.57, heading_deg=30))
+    >>> export_osm(building, "house.osm", anchor=Anchor(48.15, 11.57, heading_deg=30))
     ()
     """
     checked_type("building", building, BuildingGraph)

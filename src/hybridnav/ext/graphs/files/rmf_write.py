@@ -79,14 +79,15 @@ def export_rmf(
 
     Examples
     --------
+    >>> from hybridnav.ext.graphs import WaypointGraph, export_rmf
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
     >>> plain = nx.Graph()
     >>> plain.add_node("dock", x=0.5, y=1.0)
     >>> plain.add_node("gate", x=3.5, y=5.0)
     >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="L1", graph=hn.WaypointGraph.from_networkx(plain))
-    >>> hn.export_rmf(BuildingGraph(name="house", floors=(floor,)), "house.yaml")
+    >>> floor = FloorGraph(name="L1", graph=WaypointGraph.from_networkx(plain))
+    >>> export_rmf(BuildingGraph(name="house", floors=(floor,)), "house.yaml")
     ()
     """
     checked_type("building", building, BuildingGraph)

@@ -77,8 +77,9 @@ def load_bag_map(
 
     Examples
     --------
-    >>> hn.save_bag("office.bag", grid=hn.example_map("office"))
-    >>> hn.load_bag_map("office.bag").shape
+    >>> from hybridnav.ext.live import load_bag_map, save_bag
+    >>> save_bag("office.bag", grid=hn.example_map("office"))
+    >>> load_bag_map("office.bag").shape
     (580, 960)
     """
     checked_thresholds(free_threshold, occupied_threshold)
@@ -129,10 +130,11 @@ class BagLog(ScanLog):
 
     Examples
     --------
-    >>> hn.save_bag("plans.bag", grid=hn.example_map("figure1"))
+    >>> from hybridnav.ext.live import BagLog, save_bag
+    >>> save_bag("plans.bag", grid=hn.example_map("figure1"))
     >>> try:
-    ...     hn.BagLog("plans.bag", topic="/scan")
-    ... except hn.MapError as error:
+    ...     BagLog("plans.bag", topic="/scan")
+    ... except hn.errors.MapError as error:
     ...     print(error)
     bag plans.bag: expected topic '/scan' of sensor_msgs/LaserScan, got no topic of that type
     """
@@ -274,10 +276,11 @@ def save_bag(  # noqa: PLR0913 - the last five have defaults
 
     Examples
     --------
+    >>> from hybridnav.ext.live import load_bag_map, save_bag
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> result = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5))
-    >>> hn.save_bag("plans", [result], grid=topology.grid)
-    >>> hn.load_bag_map("plans").shape == topology.grid.shape
+    >>> save_bag("plans", [result], grid=topology.grid)
+    >>> load_bag_map("plans").shape == topology.grid.shape
     True
     """
     target = Path(path)

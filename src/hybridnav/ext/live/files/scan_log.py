@@ -189,11 +189,12 @@ class CarmenLog(ScanLog):
 
     Examples
     --------
+    >>> from hybridnav.ext.live import CarmenLog
     >>> from pathlib import Path
     >>> ranges = " ".join(["2.0"] * 181)
     >>> line = f"FLASER 181 {ranges} 0 0 0 0 0 0 {{0}} robot {{0}}\n"
     >>> _ = Path("tiny.log").write_text(line.format(0.5) + line.format(1.5) + "FLASER 181 2.0 2.")
-    >>> log = hn.CarmenLog("tiny.log")
+    >>> log = CarmenLog("tiny.log")
     >>> [scan.time_s for scan in log]
     [0.5, 1.5]
     >>> log.summary()

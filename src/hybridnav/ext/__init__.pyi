@@ -1,0 +1,9 @@
+from . import (
+    classes as classes,
+    fleet as fleet,
+    graphs as graphs,
+    live as live,
+    page as page,
+)
+
+__all__: list[str]
