@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hybridnav._base.kernels.fields import field_distances
+from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import length_in_cells
 from hybridnav.maps import CellClass
 from tests.oracle.grid import distances, move_graph

@@ -19,7 +19,7 @@ from numba.core.registry import CPUDispatcher
 from shapely import box
 
 import hybridnav as hn
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.ext.live import OnlinePyramid, OnlineRegions, OnlineRooms
 from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.dual import FaceKind
-from hybridnav.pyramid.simple import ArcGroup, report_of
+from hybridnav.pyramid.graphs import ArcGroup, FaceKind, report_of
 from tests.strategies import drawn, examples, level_of, occupancy_grid, scenes
 
 FIGURE1 = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"

@@ -19,7 +19,7 @@ import hybridnav as hn
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.kernels import base as _base_kernels
-from hybridnav.pyramid.kernels.sizes import level_sizes
+from hybridnav.pyramid.kernels.fields import level_sizes
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.pyramid import Level
-from hybridnav.pyramid.lazy_islands import LazyIslands
+from hybridnav.pyramid.islands import LazyIslands
 from hybridnav.pyramid.start import kinds_of
 from tests.oracle.checks import check_attributes, check_level, check_step
 from tests.oracle.pyramid import Base, boundaries

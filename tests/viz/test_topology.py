@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.viz import plot_dual, plot_figure1, plot_topology, save_figure, style
 from hybridnav.viz.boundaries import Boundaries, boundary_line
 from hybridnav.viz.fields import Field, Loops, distance_to_rim, smoothed

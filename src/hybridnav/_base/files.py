@@ -1,4 +1,6 @@
-"""Files that are old or new and never half, and their names in messages."""
+"""Files that are old or new and never half, their names in messages, and the endings that formats
+demand.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +10,16 @@ import re
 import shutil
 import threading
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from hybridnav.errors import MapError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
-    from pathlib import Path
+
+    from hybridnav._base.typing import PathLike
 
 MODEL_SUFFIX = ".hnm"
 """Suffix of the name of a model."""
@@ -145,3 +152,51 @@ def printable(path: str | os.PathLike[str]) -> str:
     if len(text) > _MOST_SHOWN_OF_PATH or longest > _MOST_SHOWN_OF_NAME:
         text = f"{text[:38]}...{text[-39:]}"
     return text if text.isprintable() else repr(text)
+
+
+@dataclass(frozen=True)
+class NewFile:
+    """A file that is written whole, or not at all; one that exists is replaced."""
+
+    path: Path
+    where: str
+    """What messages begin with."""
+
+    @classmethod
+    def named(cls, path: PathLike, what: str, kind: str, endings: tuple[str, ...]) -> Self:
+        """Return the file of a name.
+
+        Parameters
+        ----------
+        path
+            The name.
+        what
+            What the file is, before its name in messages.
+        kind
+            The same with its article and format, such as "a layout".
+        endings
+            How its name may end, such as ".json".
+
+        Raises
+        ------
+        MapError
+            When it ends otherwise.
+        """
+        file = Path(path)
+        where = f"{what} {printable(file)}"
+        if file.suffix.lower() not in endings:
+            raise MapError(f"{where}: {kind} must be named {' or '.join(endings)}")
+        return cls(file, where)
+
+    def write(self, content: bytes) -> None:
+        """Write it.
+
+        Raises
+        ------
+        MapError
+            When it cannot be written.
+        """
+        try:
+            replace_file(self.path, content)
+        except OSError as error:
+            raise MapError(f"{self.where}: cannot write: {error.strerror}") from None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav._base.turns import Turns
+from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset

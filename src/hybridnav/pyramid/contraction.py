@@ -1,8 +1,11 @@
-"""The levels of a decimation, one after the other, in arrays that shrink."""
+"""The levels of a decimation, one after the other, in arrays that shrink and work space that they
+share.
+"""
 
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,17 +17,82 @@ from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels
-from hybridnav.pyramid.kernels import joins as _join_kernels
 from hybridnav.pyramid.kernels.decimation import Hulls
 from hybridnav.pyramid.kernels.hulls import hulls_of_points
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
-from hybridnav.pyramid.scratch import Scratch
-from hybridnav.pyramid.start import N_CLASSES
+from hybridnav.pyramid.start import N_CLASSES, Start
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray
-    from hybridnav.pyramid.start import Start
-    from hybridnav.pyramid.steering import Steering
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, KeyArray
+    from hybridnav.pyramid.darts import Steering
+
+
+@dataclass
+class Scratch:
+    """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes."""
+
+    keys: KeyArray
+    rest: KeyArray
+    state: ByteArray
+    best: KeyArray
+    matched: IntArray
+    parent: IntArray
+    kernel_dart: IntArray
+    has_leaf: BoolArray
+
+    @classmethod
+    def of_size(cls, n_vertices: int, n_edges: int) -> Scratch:
+        """Return work space for a level of this size, which suits all levels above it."""
+        return cls(
+            np.empty(n_edges, np.uint64),
+            np.empty(n_edges, np.uint64),
+            np.empty(n_edges, np.uint8),
+            np.empty(n_vertices, np.uint64),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.bool_),
+        )
+
+    def for_level(self, n_vertices: int, n_edges: int) -> Scratch:
+        """Return views of the length of a level."""
+        return Scratch(
+            self.keys[:n_edges],
+            self.rest[:n_edges],
+            self.state[:n_edges],
+            self.best[:n_vertices],
+            self.matched[:n_vertices],
+            self.parent[:n_vertices],
+            self.kernel_dart[:n_vertices],
+            self.has_leaf[:n_vertices],
+        )
+
+    # Keys and matching are free once the stars are chosen.
+
+    @property
+    def inverse(self) -> IntArray:
+        """int32 by dart, the inverse of sigma."""
+        return self.rest.view(np.int32)
+
+    @property
+    def touched(self) -> IntArray:
+        """int32, a dart of each face that contraction has changed."""
+        return self.keys.view(np.int32)
+
+    @property
+    def new_edge(self) -> IntArray:
+        """int32 by edge, its even dart at the next level."""
+        return self.keys.view(np.int32)
+
+    @property
+    def new_vertex(self) -> IntArray:
+        """int32 by vertex, its index at the next level."""
+        return self.matched
+
+    @property
+    def shift(self) -> IntArray:
+        """int32 by vertex, scratch of `contract`."""
+        return self.best.view(np.int32)
 
 
 NO_LIMIT = 2**62
@@ -135,7 +203,7 @@ class Decimation:
         if not len(self.joins):
             return False
         darts, stars = self._darts, (scratch.parent, scratch.kernel_dart)
-        count: int = _join_kernels.select_joins(
+        count: int = _base_kernels.select_joins(
             darts.origin, darts.base_edge, self.joins, self._level, *stars
         )
         return count > 0
@@ -204,7 +272,7 @@ class Decimation:
             count = self._try_candidates()
         if self.survivors is not None:
             keys, state = self._scratch.keys[:count], self._scratch.state
-            _join_kernels.let_survive(
+            _base_kernels.let_survive(
                 self._darts.origin, keys, self._vertices.cells, self._cols, self.survivors, state
             )
         return count

@@ -1,6 +1,10 @@
-"""Contraction and removal on the darts of a plane graph, compiled."""
+"""Darts of a plane graph, contracted and removed, and the rules that decide which arcs are
+contracted above the places, and in which order.
+"""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
 
 from hybridnav.pyramid.kernels.darts import (
     CONTRACTED,
@@ -11,6 +15,12 @@ from hybridnav.pyramid.kernels.darts import (
     next_at_cell,
     simplify,
 )
+from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._base.typing import IntArray, LongArray
 
 __all__ = [
     "CONTRACTED",
@@ -21,3 +31,69 @@ __all__ = [
     "next_at_cell",
     "simplify",
 ]
+
+
+WORST_RANK: int = ATTRIBUTE_MAX
+"""Rank of the arcs that are contracted last."""
+
+
+class Resists(Protocol):
+    """A rule by which arcs resist contraction above the places."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns of the map that the rule is for."""
+
+    @property
+    def kept_apart(self) -> IntArray | None:
+        """int32 (rows, cols), labels that no place has two of, -1 for none; None for no labels."""
+
+    def steering(self, field_of: IntArray, n_vertices: int) -> Steering:
+        """Return the steering from a level on.
+
+        Parameters
+        ----------
+        field_of
+            int32 (n_cells,), the vertex of each cell at that level, -1 for none.
+        n_vertices
+            Vertices of that level.
+        """
+
+
+class Steering(Protocol):
+    """A value of each arc of the level that is being contracted."""
+
+    def candidates(
+        self, field_of: Callable[[], IntArray], darts: Darts, vertices: Vertices
+    ) -> tuple[LongArray, LongArray]:
+        """Return the arcs that may be contracted at this level, and the rank of each.
+
+        Parameters
+        ----------
+        field_of
+            Returns the vertex of each flat cell, int32 (n_cells,), -1 for none: a pass over the
+            map.
+        darts, vertices
+            Those of the level.
+
+        Returns
+        -------
+        LongArray
+            int64 (n,), arcs, ascending.
+        LongArray
+            int64 (n,), from 0 to `WORST_RANK`, the least first.
+        """
+
+    def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
+        """Undo joins of stars that pass one by one, but not together; see `select_stars`."""
+
+    def merge(self, merged_into: IntArray, n_vertices: int) -> None:
+        """Go on to the next level.
+
+        Parameters
+        ----------
+        merged_into
+            int32, the vertex of the next level that each vertex becomes part of.
+        n_vertices
+            Vertices of the next level.
+        """

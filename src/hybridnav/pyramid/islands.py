@@ -1,17 +1,20 @@
-"""Obstacles and components of a grid, and their nesting, which the graph does not hold."""
+"""Obstacles and components of a grid, and their nesting, which the graph does not hold: found on
+first use.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
 
 from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import ByteArray, IntArray, LongArray
+    from hybridnav.maps import OccupancyGrid
 
 RIM = 0
 """Label of the occupied ring round the map and of every obstacle that touches it."""
@@ -41,6 +44,8 @@ class Islands:
     @classmethod
     def of_classes(cls, classes: ByteArray) -> Islands:
         """Find the islands of a grid of `CellClass`, shape (rows, cols)."""
+        from scipy import ndimage  # noqa: PLC0415 - most plans need no islands
+
         occupied = classes == CellClass.OCCUPIED
         padded = np.pad(occupied, 1, constant_values=True)
         label, n_obstacles = ndimage.label(padded, structure=np.ones((3, 3)))
@@ -86,3 +91,19 @@ def _first_cells(labels: IntArray, count: int) -> LongArray:
     first = np.full(count, -1, dtype=np.int64)
     first[found[found >= 0]] = at[found >= 0]
     return first
+
+
+class LazyIslands:
+    """The islands of a grid, on first use.
+
+    Levels hold this and not their pyramid: without a cycle of references, memory is free as soon as
+    a pyramid is not used any more.
+    """
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self._grid = grid
+
+    @cached_property
+    def found(self) -> Islands:
+        """Obstacles and components, with their nesting."""
+        return Islands.of_classes(self._grid.classes)

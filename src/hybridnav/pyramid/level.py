@@ -1,35 +1,59 @@
-"""One level of a dual graph pyramid, rebuilt from the record on demand."""
+"""One level of a dual graph pyramid, rebuilt from the record on demand, and its arcs as
+arguments.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
-from hybridnav._base.kernels.fields import field_distances
+from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import STRAIGHT, length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.certainty import Certainty, certainty_of
 from hybridnav.pyramid.cracks import boundaries_of, cell_pairs, endpoints_of, middles_of, sides_of
-from hybridnav.pyramid.dual import DualGraph, FaceKind
-from hybridnav.pyramid.export import multigraph, vertices_with_attributes
+from hybridnav.pyramid.graphs import (
+    DualGraph,
+    FaceKind,
+    SimpleGraph,
+    multigraph,
+    simple_graph,
+    vertices_with_attributes,
+)
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels
-from hybridnav.pyramid.record import SURVIVES
-from hybridnav.pyramid.simple import SimpleGraph, simple_graph
-
-_SOUTH = 3
+from hybridnav.pyramid.record import SURVIVES, Record
 
 if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.pyramid.lazy_islands import LazyIslands
-    from hybridnav.pyramid.record import Record
+    from hybridnav.pyramid.islands import LazyIslands
+
+
+@dataclass(frozen=True, order=True)
+class LevelArc:
+    """An arc together with its level: at another level, the same index is another arc.
+
+    Examples
+    --------
+    >>> hn.LevelArc(0, 7)
+    LevelArc(level=0, index=7)
+    """
+
+    level: int
+    """Index of the level in its pyramid."""
+    index: int
+    """Dense index of the arc at that level."""
+
+
+_SOUTH = 3
 
 
 @copies_alike

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.lazy_islands import LazyIslands
+from hybridnav.pyramid.islands import LazyIslands
 from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import (
     check_fit,
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.pyramid.darts import Resists
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Linkage, Record
-    from hybridnav.pyramid.steering import Resists
 
 
 @dataclass(frozen=True, eq=False)

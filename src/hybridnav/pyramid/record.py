@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.pyramid.kernels.sizes import level_sizes
+from hybridnav.pyramid.kernels.fields import level_sizes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import ByteArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.pyramid.steering import Resists
+    from hybridnav.pyramid.darts import Resists
 
 
 Linkage = Literal["survivor", "radius", "diameter"]

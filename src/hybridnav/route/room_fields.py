@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._base.kernels.fields import field_distances
+from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import DIAGONAL, STRAIGHT
 from hybridnav.maps import CellClass
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import BUCKET_FULL, legal_moves, trace_cells
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.search.kernels import astar as _kernels
 from hybridnav.search.kernels import weighted as _weighted
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.graphs import FaceKind
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, IntArray, LongArray

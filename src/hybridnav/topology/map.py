@@ -298,7 +298,7 @@ class TopologicalMap:
     def parallel_arcs(self) -> int:
         """Return the number of arcs beyond the first between the same two places: doors that a
         simple graph loses."""
-        from hybridnav.pyramid.simple import report_of  # noqa: PLC0415 - most maps are never asked
+        from hybridnav.pyramid.graphs import report_of  # noqa: PLC0415 - most maps are never asked
 
         return report_of(self.arcs, self.n_places).n_parallel_dropped
 

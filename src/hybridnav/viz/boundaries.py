@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from hybridnav._base.moves import STEPS
 from hybridnav.maps import CellClass
-from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.viz.fields import Field, WalkTree, distance_to_rim, rounded, smoothed
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.viz import style
 from hybridnav.viz.boundaries import Boundaries
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
-from hybridnav.pyramid.simple import report_of
+from hybridnav.pyramid.graphs import report_of
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view

@@ -17,7 +17,7 @@ from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAs
 from hybridnav.harness.baselines.regions import joined_regions
 from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid, first_arcs
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.pyramid.simple import report_of
+from hybridnav.pyramid.graphs import report_of
 from hybridnav.route import MaxDistanceSearch
 from hybridnav.route.arc_search import ArcSearch
 from hybridnav.search.grid_search import GridSearch

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy import ndimage, sparse
 
-from hybridnav._base.kernels.fields import field_distances
+from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.classes.classes import HomotopyClasses

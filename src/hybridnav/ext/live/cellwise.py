@@ -14,14 +14,14 @@ from hybridnav.ext.live.kernels.rings import box_groups
 from hybridnav.ext.live.state import PLACE, State
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.maps.islands import unique_rows
+from hybridnav.pyramid.decimation import contract_alone
 from hybridnav.pyramid.record import SURVIVES
-from hybridnav.pyramid.window import contract_alone
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from hybridnav._base.typing import AnyArray, ByteArray, LongArray
-    from hybridnav.pyramid.window import Criterion
+    from hybridnav.pyramid.decimation import Criterion
 
 _SMALL_CELLS = 512 * 512
 """Cells of a window below which it takes longer to divide it than to look at all of it."""

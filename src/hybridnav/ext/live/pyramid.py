@@ -20,8 +20,8 @@ from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area, class_reach, class_rules
 from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.decimation import Criterion, contract_places
 from hybridnav.pyramid.record import SURVIVES
-from hybridnav.pyramid.window import Criterion, contract_places
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

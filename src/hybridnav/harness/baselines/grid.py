@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.moves import legal_moves, length_in_cells, path_length_in_cells, trace
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines.kernels import weighted as _weighted_kernels
 from hybridnav.harness.baselines.regions import Cell, CostClaim, MethodResult, array_bytes

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import STRAIGHT, legal_moves
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines.kernels import hpa as _hpa_kernels
 from hybridnav.harness.baselines.kernels.hpa import AbstractGraph

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import yaml
 
-from hybridnav._base.files import printable, replace_file
-from hybridnav._base.new_file import NewFile
+from hybridnav._base.files import NewFile, printable, replace_file
 from hybridnav.errors import MapError
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav._base.turns import Turns
+from hybridnav._base.threads import Turns
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, on_cells, round_closed
 from hybridnav.search.found import Method, PlanStats
 from hybridnav.search.overlay import OverlaySearch, PathsTooLongError, prepare_overlay

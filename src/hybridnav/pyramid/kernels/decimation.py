@@ -1,6 +1,5 @@
-"""Kernels of the decimation: stars of a maximal independent edge set, the next vertices.
-
-Distances are squared integers between cell centres, in cells.
+"""Kernels of the decimation: stars of a maximal independent edge set, the leaves that they may
+keep, the next vertices.
 """
 
 from __future__ import annotations
@@ -409,3 +408,20 @@ def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vert
             classes[w] = classes[v]
             whole_at[w] = whole_at[v]
     return count
+
+
+@njit(cache=True, nogil=True)
+def refuse_large_leaves(leaves, parent, kernel_dart, areas, most_cells):
+    """Keep a leaf only if the star as merged so far has room for it.
+
+    `leaves` are in the order of falling rating; `areas`, int64 (n_vertices,), in cells. The first
+    leaf of a star always stays: its arc was a candidate.
+    """
+    area = areas.copy()
+    for v in leaves:
+        p = parent[v]
+        if area[v] + area[p] > most_cells:
+            parent[v] = v
+            kernel_dart[v] = -1
+        else:
+            area[p] += area[v]

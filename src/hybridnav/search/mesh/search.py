@@ -13,8 +13,8 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav._base.pool import Pool
 from hybridnav._base.progress import no_progress
+from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.corner_graph import (
     CornerHierarchy,
     add_landmarks,

@@ -13,7 +13,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.search.octile.kernels import patch as _patch_kernels
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import COLUMN_BITS, KIND_BITS, arcs_of, legs_that_follow

@@ -15,7 +15,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import legal_moves
 from hybridnav._base.progress import no_progress
-from hybridnav._base.turns import Turns
+from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs.checks import UNIT_BITS
 from hybridnav.search.overlay.changes import (

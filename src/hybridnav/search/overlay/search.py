@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.pool import Pool
+from hybridnav._base.threads import Pool
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.search.overlay.kernels import queries as kernels
 from hybridnav.search.overlay.kernels.lanes import FAR, NO_PATH

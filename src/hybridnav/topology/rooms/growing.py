@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.steering import WORST_RANK
+from hybridnav.pyramid.darts import WORST_RANK
 from hybridnav.topology.rooms.kernels import merging as _merging_kernels
 
 if TYPE_CHECKING:

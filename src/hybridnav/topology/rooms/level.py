@@ -11,8 +11,8 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
-from hybridnav.pyramid.arc import LevelArc
 from hybridnav.pyramid.cracks import endpoints_of
+from hybridnav.pyramid.level import LevelArc
 from hybridnav.topology.rooms.doors import (
     LEAST_DOOR_M,
     MOST_DOOR_M,

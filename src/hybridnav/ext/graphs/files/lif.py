@@ -8,7 +8,7 @@ from collections import Counter
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._base.new_file import NewFile
+from hybridnav._base.files import NewFile
 from hybridnav._version import __version__
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links

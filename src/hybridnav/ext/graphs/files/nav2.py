@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.new_file import NewFile
+from hybridnav._base.files import NewFile
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs import RouteGraph, WaypointGraph
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID

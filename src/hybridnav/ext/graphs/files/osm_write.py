@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import shapely
 
-from hybridnav._base.new_file import NewFile
+from hybridnav._base.files import NewFile
 from hybridnav.ext.fleet import BuildingGraph, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
 from hybridnav.ext.graphs.files.anchors import Anchor

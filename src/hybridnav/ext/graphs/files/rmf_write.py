@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._base.new_file import NewFile
+from hybridnav._base.files import NewFile
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import BuildingGraph, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
