@@ -23,7 +23,7 @@ from benchmarks.common import DATA, OFFICE, matches, option, read
 from hybridnav.ext.graphs.checked_components import components_of
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.tables import to_markdown
-from hybridnav.maps.lines import walks_clear
+from hybridnav.maps.geometry import walks_clear
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -20,12 +20,11 @@ import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option
 from benchmarks.subjects._rooms_boost import Boosting, Examples, averaged, boost
 from benchmarks.subjects._rooms_buildings import SITES, Building
-from hybridnav.topology.rooms import judging
+from hybridnav.topology.rooms import merging
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
 from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, outside_of
 from hybridnav.topology.rooms.growing import Likely, Small, contract
-from hybridnav.topology.rooms.judging import EVIDENCE, Forest, JudgedSegments
-from hybridnav.topology.rooms.merging import least_cells
+from hybridnav.topology.rooms.merging import EVIDENCE, Forest, JudgedSegments, least_cells
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -175,7 +174,7 @@ class Training:
 
 OPTIONS = [
     NEEDED_DATA,
-    option("-o", "--out", default=Path(judging.__file__).with_name(judging.TABLE), type=Path),
+    option("-o", "--out", default=Path(merging.__file__).with_name(merging.TABLE), type=Path),
 ]
 
 

@@ -14,7 +14,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import OccupancyGrid
-from hybridnav.maps.limits import MAX_CELLS
+from hybridnav.maps.cells import MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import ByteArray, PathLike

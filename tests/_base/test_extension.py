@@ -9,7 +9,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav._base import extension
-from hybridnav.maps.files import load as loading
+from hybridnav.maps.files import formats as loading
 
 
 def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:

@@ -111,9 +111,9 @@ except BaseException as error: raise ImportError('half') from error
 def test_ctrl_c_is_not_lost_where_exceptions_are(moment: str) -> None:
     body = moment.replace("\n", "\n    ")
     script = (
-        "import hybridnav.maps.files.load\n"
+        "import hybridnav.maps.files.formats\n"
         f"def load_map(*_, **__):\n    {body}\n    raise SystemExit(7)\n"
-        "hybridnav.maps.files.load.load_map = load_map\n"
+        "hybridnav.maps.files.formats.load_map = load_map\n"
         "from hybridnav.cli import main\n"
         "main()\n"
     )

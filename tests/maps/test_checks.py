@@ -13,8 +13,8 @@ import hybridnav as hn
 from benchmarks.worlds import figure1_world
 from hybridnav.ext.live import OnlinePyramid, carry_costs
 from hybridnav.harness.judges import CheapestCost
+from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.maps.files import load_movingai_map, load_ros_map
-from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.search.overlay import OverlayOptions, prepare_overlay
 from tests.layers import layer_of
 

@@ -14,8 +14,8 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.areas import box_of_area
-from hybridnav.maps.centres import centres, position_of
 from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.geometry import centres, position_of
 from hybridnav.maps.islands import in_runs, unique_rows
 from tests.strategies import examples
 

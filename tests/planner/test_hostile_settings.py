@@ -186,7 +186,7 @@ def test_what_cannot_be_written_is_told_before_the_work(capsys, monkeypatch, tmp
     def refuse(*_arguments, **_options):
         raise PermissionError(13, "Permission denied")
 
-    home = "hybridnav.maps.files.load.load_map"
+    home = "hybridnav.maps.files.formats.load_map"
     monkeypatch.setattr(home, lambda *_, **__: pytest.fail("the map was read"))
     # Tests may run as root, who may write everywhere.
     monkeypatch.setattr(Path, "touch", refuse)

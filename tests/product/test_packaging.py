@@ -167,12 +167,12 @@ def test_a_result_that_cannot_be_written_is_one_line():
 
 def test_ctrl_c_during_the_work():
     script = (
-        "import os, signal, time, hybridnav.maps.files.load\n"
+        "import os, signal, time, hybridnav.maps.files.formats\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def load_map(*_, **__):\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    time.sleep(60)\n"
-        "hybridnav.maps.files.load.load_map = load_map\n"
+        "hybridnav.maps.files.formats.load_map = load_map\n"
         "from hybridnav.cli import main\n"
         "main()\n"
     )

@@ -18,7 +18,7 @@ import numpy as np
 import hybridnav
 from hybridnav._base.moves import STEPS
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.limits import MAX_CELLS
+from hybridnav.maps.cells import MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import LongArray

@@ -36,8 +36,8 @@ from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.maps.files.movingai import read_scenarios
-from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

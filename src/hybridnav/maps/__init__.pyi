@@ -1,11 +1,11 @@
-from .classes import CellClass as CellClass
-from .islands import DroppedIslands as DroppedIslands
-from .frame import Frame as Frame
-from .limits import (
+from .cells import (
     DEFAULT_MAX_CELLS as DEFAULT_MAX_CELLS,
     DEFAULT_ROBOT_RADIUS_M as DEFAULT_ROBOT_RADIUS_M,
     MAX_CELLS as MAX_CELLS,
+    CellClass as CellClass,
 )
+from .islands import DroppedIslands as DroppedIslands
+from .frame import Frame as Frame
 from .occupancy import OccupancyGrid as OccupancyGrid, drop_islands as drop_islands
 from .room_labels import MAX_ROOMS as MAX_ROOMS, NO_ROOM as NO_ROOM, RoomLabels as RoomLabels
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.maps.classes import CellClass
+from hybridnav.maps.cells import CellClass
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray

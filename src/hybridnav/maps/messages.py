@@ -15,9 +15,8 @@ from hybridnav._base.messages import (
     value_of,
 )
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.classes import CellClass
+from hybridnav.maps.cells import MAX_CELLS, CellClass
 from hybridnav.maps.frame import Frame
-from hybridnav.maps.limits import MAX_CELLS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

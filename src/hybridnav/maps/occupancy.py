@@ -10,12 +10,11 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M, MAX_CELLS, CellClass
 from hybridnav.maps.checks import checked_radius, checked_thresholds
-from hybridnav.maps.classes import CellClass
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.islands import DroppedIslands, without_islands
-from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M, MAX_CELLS
 from hybridnav.maps.messages import grid_message, percentages, read_probability
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer, cost_along
-from hybridnav.maps.costs.checks import joined_cells
-from hybridnav.maps.lines import polyline_length
+from hybridnav.maps.costs.factors import joined_cells
+from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path
 from hybridnav.refine import CostLine
 from hybridnav.search.found import ClosedCells

@@ -12,14 +12,14 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.lines import polyline_length
+from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path, PlanResult, PlanStatus
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import CostFinish
 from hybridnav.planner.endpoints import cells_of_endpoints, check_at, no_places, read_end, refusal
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
-from hybridnav.route.route_finder import RouteFinder, RouteOfCells
+from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, Query
 
 if TYPE_CHECKING:

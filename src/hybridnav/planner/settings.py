@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
+from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.refine.ompl.settings import OmplSettings
 
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")

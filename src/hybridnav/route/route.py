@@ -1,8 +1,22 @@
-"""Routes: the topological answer to a query."""
+"""Routes, the topological answer to a query: the places and arcs that a cell path passes, and the
+corridor of receptive fields in which a refiner may stand.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.rooms import Rooms
 
 
 @dataclass(frozen=True)
@@ -22,3 +36,163 @@ class Route:
     arcs: tuple[int, ...]
     """Ids of the arcs, one fewer than places; -1 for a step between two occupied cells, if corners
     may be cut."""
+
+
+@copies_alike
+class RouteFinder:
+    """The places and arcs that paths pass.
+
+    Parameters
+    ----------
+    topology
+        The map, or its rooms; where its arcs cross is computed at the first path.
+
+    Examples
+    --------
+    >>> from hybridnav.route import RouteFinder
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> finder = RouteFinder(hn.TopologicalMap(pyramid))
+    >>> finder.of(np.array([[0, col] for col in range(30)]))
+    ([0, 1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
+    """
+
+    def __init__(self, topology: TopologicalMap | Rooms) -> None:
+        self._cols = topology.grid.shape[1]
+        self._level = topology.level
+
+    @cached_property
+    def _place_of(self) -> IntArray:
+        return self._level.field_of.ravel()
+
+    @cached_property
+    def _table(self) -> tuple[LongArray, LongArray]:
+        """Return the base edges between different places, ascending, and the arc of each."""
+        edges, arcs = self._level.boundary_table
+        plain = ~self._level.is_self_loop[arcs]
+        order = np.argsort(edges[plain], kind="stable")
+        return edges[plain][order], arcs[plain][order]
+
+    def of(self, cells: LongArray) -> tuple[list[int], list[int]]:
+        """Return places and arcs of a path, as dense indices; one arc fewer than places.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), legal moves. A diagonal between two places passes one of its side cells:
+            one that lies in either place if there is one. Where corners may be cut and both side
+            cells are occupied, it crosses no boundary: its arc is -1.
+        """
+        places, arcs, _ = self.crossings(cells)
+        return places, arcs
+
+    def crossings(self, cells: LongArray) -> tuple[list[int], list[int], list[int]]:
+        """Return the result of `of`, and the step that crosses each arc: from `cells[step]` to the
+        next cell."""
+        steps: list[int] = []
+        flat = cells[:, 0] * self._cols + cells[:, 1]
+        place = self._place_of[flat]
+        places, arcs = [int(place[0])], []
+        for step in np.flatnonzero(place[1:] != place[:-1]).tolist():
+            flat_cells = [int(flat[step]), int(flat[step + 1])]
+            side_cell = self._side_cell(cells[step].tolist(), cells[step + 1].tolist())
+            if side_cell is not None:
+                flat_cells.insert(1, side_cell)
+            for tail, head in itertools.pairwise(flat_cells):
+                if self._place_of[tail] != self._place_of[head]:
+                    arcs.append(self._arc_between(tail, head))
+                    places.append(int(self._place_of[head]))
+                    steps.append(step)
+        return places, arcs, steps
+
+    def _arc_between(self, tail: int, head: int) -> int:
+        """Return the arc whose boundary lies between two neighbours; -1 if they meet at a
+        corner."""
+        (row, col), (to_row, to_col) = divmod(tail, self._cols), divmod(head, self._cols)
+        if row != to_row and col != to_col:
+            return -1
+        edge = 2 * min(tail, head) + (row != to_row)
+        edges, arcs = self._table
+        return int(arcs[np.searchsorted(edges, edge)])
+
+    def _side_cell(self, tail: list[int], head: list[int]) -> int | None:
+        """Return the side cell that a diagonal passes; None if both are occupied, and for a step
+        along a side."""
+        if tail[0] == head[0] or tail[1] == head[1]:
+            return None
+        endpoints = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}
+        side_cells = tail[0] * self._cols + head[1], head[0] * self._cols + tail[1]
+        passable = [side_cell for side_cell in side_cells if self._place_of[side_cell] >= 0]
+        own = (side_cell for side_cell in passable if int(self._place_of[side_cell]) in endpoints)
+        return next(own, passable[0] if passable else None)
+
+
+@dataclass(frozen=True, eq=False)
+class RouteOfCells:
+    """The route of one cell path, which is found when somebody reads it."""
+
+    topology: TopologicalMap
+    finder: RouteFinder
+    cells: LongArray
+    """int64 (n, 2), legal moves."""
+
+    def route(self) -> Route:
+        """Return the ids of the places and arcs that the path passes."""
+        places, arcs = self.finder.of(self.cells)
+        place_ids, arc_ids = self.topology.place_ids, self.topology.arc_ids
+        passed = [int(arc_ids[arc]) if arc >= 0 else -1 for arc in arcs]
+        return Route(tuple(place_ids[places].tolist()), tuple(passed))
+
+
+@dataclass(frozen=True, eq=False)
+class Corridor:
+    """Union of the receptive fields of some places. Moves are judged on the whole grid: a corridor
+    limits only the cells stood on."""
+
+    field_of: IntArray
+    """int32 (rows, cols), the place of each cell."""
+    places: BoolArray
+    """bool (n_places,), those in the corridor."""
+    n_cells: int
+    """Number of cells in the corridor."""
+
+    def mask(self) -> BoolArray:
+        """Return the cells in the corridor, bool (rows, cols)."""
+        inside: BoolArray = (self.field_of >= 0) & self.places[self.field_of]
+        return inside
+
+
+def corridor_of(
+    topology: TopologicalMap, places: LongArray, *, neighbours: BoolArray | None = None
+) -> Corridor:
+    """Return the receptive fields of the places of a route.
+
+    Parameters
+    ----------
+    topology
+        The map of the route.
+    places
+        Dense indices of the route's places.
+    neighbours
+        bool (n_places,), places to include too where an arc joins them to the route; None for
+        the route alone.
+
+    Returns
+    -------
+    Corridor
+        The places, and the number of their cells.
+
+    Examples
+    --------
+    >>> from hybridnav.route import corridor_of
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> corridor_of(hn.TopologicalMap(pyramid), np.array([0, 1])).n_cells
+    10
+    """
+    inside = np.zeros(topology.n_places, dtype=np.bool_)
+    inside[places] = True
+    if neighbours is not None:
+        touched = inside[topology.arcs].any(axis=1)
+        beside = np.zeros_like(inside)
+        beside[topology.arcs[touched].ravel()] = True
+        inside |= beside & neighbours
+    return Corridor(topology.level.field_of, inside, int(topology.level.areas[inside].sum()))

@@ -1,8 +1,11 @@
-"""The topological map: places and the boundaries between them."""
+"""The topological map: places, the boundaries between them, and the local map of each place in a
+frame of its own (the source paper's section 2).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,8 +13,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
-from hybridnav.topology import local
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,10 +21,64 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.topology.inclusion import Enclosed, Inclusion
     from hybridnav.topology.rooms.level import Rooms
+
+Pose = tuple[float, float, float]
+"""`(x, y, yaw)` of one frame in another, in metres and radians."""
+
+
+def local_grid(level: Level, vertex: int) -> OccupancyGrid:
+    """Return the map of one field in a frame with its origin at the surviving cell.
+
+    Cells that belong to no field are kept as far as they can decide on the classes of its own.
+    """
+    grid, side_m = level.grid, level.grid.resolution_m
+    reach = math.ceil(grid.robot_radius_m / side_m)
+    low_row, low_col, high_row, high_col = level.boxes[vertex].tolist()
+    kept = _window(grid.shape, (low_row, low_col, high_row, high_col), 1 + reach)
+    # Obstacles so far away decide on the cells near the rim of what is kept.
+    window = _window(grid.shape, (low_row, low_col, high_row, high_col), 1 + 2 * reach)
+    field_of = level.field_of[window]
+    obstacle = grid.measured[window] == CellClass.OCCUPIED
+    near = np.zeros(grid.shape, dtype=np.bool_)
+    near[kept] = True
+    own = (field_of == vertex) | obstacle | (near[window] & (field_of < 0))
+    row, col = level.cells[vertex].tolist()
+    first_row, first_col = window[0].start, window[1].start
+    origin_m = ((first_col - col - 0.5) * side_m, (first_row - row - 0.5) * side_m)
+    return replace(
+        grid,
+        probability=np.where(own, grid.probability[window], np.float32(np.nan)),
+        frame=Frame(side_m, origin_m),
+        name=f"{grid.name}, place {vertex}",
+        least_island_m2=0.0,
+    )
+
+
+def _window(
+    shape: tuple[int, int], box: tuple[int, int, int, int], margin: int
+) -> tuple[slice, slice]:
+    """Return the rows and columns of a box of cells with a margin, cut to the grid."""
+    rows, cols = shape
+    return (
+        slice(max(box[0] - margin, 0), min(box[2] + 1 + margin, rows)),
+        slice(max(box[1] - margin, 0), min(box[3] + 1 + margin, cols)),
+    )
+
+
+def local_pose(level: Level, vertex: int) -> Pose:
+    """Return the pose of a field's own frame in the map frame."""
+    x, y = level.grid.frame.points_of(level.cells[vertex]).tolist()
+    return x, y, level.grid.frame.yaw_rad
+
+
+def transform_of(level: Level, arc: int) -> Pose:
+    """Return the pose of the frame of an arc's second field in that of the first."""
+    one, other = level.cells[level.arcs[arc]]
+    x, y = ((other - one)[::-1] * level.grid.resolution_m).tolist()
+    return x, y, 0.0
 
 
 @dataclass(frozen=True)
@@ -152,9 +208,9 @@ class TopologicalMap:
         ((19, 27), True)
         """
         self._check_places([place])
-        return local.local_grid(self.level, place)
+        return local_grid(self.level, place)
 
-    def local_pose(self, place: int) -> local.Pose:
+    def local_pose(self, place: int) -> Pose:
         """Return the pose of the frame of a place in the map frame, `(x, y, yaw)` in metres and
         radians.
 
@@ -169,9 +225,9 @@ class TopologicalMap:
             When there is no such place.
         """
         self._check_places([place])
-        return local.local_pose(self.level, place)
+        return local_pose(self.level, place)
 
-    def transform(self, arc: int) -> local.Pose:
+    def transform(self, arc: int) -> Pose:
         """Return the pose of the frame of an arc's second place in the frame of the first.
 
         `(x, y, yaw)` in metres and radians: a point p of the second frame is R(yaw) p + (x, y) in
@@ -195,7 +251,7 @@ class TopologicalMap:
         (0.8, -0.4, 0.0)
         """
         _check_index("arc", arc, self.n_arcs)
-        return local.transform_of(self.level, arc)
+        return transform_of(self.level, arc)
 
     @cached_property
     def inclusion(self) -> Inclusion:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.limits import TOLERANCE
+from hybridnav.maps.cells import TOLERANCE
 from hybridnav.viz import style
 from hybridnav.viz.canvas import new_figure
 from hybridnav.viz.style import Sizes

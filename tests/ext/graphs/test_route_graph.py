@@ -20,7 +20,7 @@ from hybridnav.ext.graphs import route_messages
 from hybridnav.ext.graphs.attach import Network
 from hybridnav.ext.graphs.bends import Corners, is_among
 from hybridnav.ext.graphs.judge import FreeSpace
-from hybridnav.maps.lines import walks_clear
+from hybridnav.maps.geometry import walks_clear
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.layers import grid_of
 from tests.nav2_reader import read_nav2

@@ -19,7 +19,7 @@ from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid, first_a
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.pyramid.graphs import report_of
 from hybridnav.route import MaxDistanceSearch
-from hybridnav.route.arc_search import ArcSearch
+from hybridnav.route.coarse import ArcSearch
 from hybridnav.search.grid_search import GridSearch
 from tests.harness.small_runs import free_pairs
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted

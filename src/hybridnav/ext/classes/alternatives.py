@@ -14,12 +14,12 @@ from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.classes import alternative_search
 from hybridnav.ext.classes.search import MOST_STATES, TIME_LIMIT_S, check_limits
-from hybridnav.maps.lines import cells_of_line, polyline_length
+from hybridnav.maps.geometry import cells_of_line, polyline_length
 from hybridnav.planner import Path
 from hybridnav.planner.by_doors import Chosen, Track, admissible
 from hybridnav.planner.tour import tour_of
 from hybridnav.refine import LineOfSight
-from hybridnav.route.route_finder import RouteFinder, RouteOfCells
+from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:

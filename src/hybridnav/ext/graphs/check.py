@@ -16,8 +16,8 @@ from hybridnav.ext.graphs.lanes import DoorsPassed
 from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
+from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.maps.islands import unique_rows
-from hybridnav.maps.lines import cells_of_line, walks_clear
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
 

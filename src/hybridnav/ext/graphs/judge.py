@@ -11,7 +11,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps.checks import checked_between, checked_type
-from hybridnav.maps.lines import cells_of_line, walks_clear
+from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.refine import Sight
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.search import rounded_into

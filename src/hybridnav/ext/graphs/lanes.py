@@ -13,8 +13,8 @@ from hybridnav.ext.graphs.kernels.widths import least_along, least_widths
 from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.maps.geometry import cells_of_line
 from hybridnav.maps.islands import unique_rows
-from hybridnav.maps.lines import cells_of_line
 from hybridnav.topology import TopologicalMap
 from hybridnav.topology.rooms.doors import measured_clearance_m
 

@@ -14,8 +14,7 @@ from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.areas import box_of_mask
 from hybridnav.maps.clearance import within_radius
-from hybridnav.topology.rooms.find import WALL_REACH_M, reaching
-from hybridnav.topology.rooms.renewal import LEFT_OUT, renewed_rooms
+from hybridnav.topology.rooms.find import LEFT_OUT, WALL_REACH_M, reaching, renewed_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Collection

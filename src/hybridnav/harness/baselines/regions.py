@@ -19,7 +19,7 @@ from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.route.arc_search import ArcSearch
+    from hybridnav.route.coarse import ArcSearch
     from hybridnav.topology import TopologicalMap
 
 

@@ -11,7 +11,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.harness.baselines.regions import CUT_CORNERS, RegionPlanner, free_fields
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
-from hybridnav.route.arc_search import ArcSearch
+from hybridnav.route.coarse import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray, LongArray

@@ -12,7 +12,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines.kernels import thrun as kernels
 from hybridnav.harness.baselines.regions import RegionPlanner, joined_regions
 from hybridnav.maps import CellClass
-from hybridnav.route.arc_search import ArcSearch
+from hybridnav.route.coarse import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray

@@ -15,7 +15,7 @@ from hybridnav.harness.judges.judge import (
     segment_faults,
 )
 from hybridnav.maps.checks import checked_points
-from hybridnav.maps.lines import cells_of_line
+from hybridnav.maps.geometry import cells_of_line
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

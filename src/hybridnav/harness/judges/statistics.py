@@ -11,7 +11,7 @@ import numpy as np
 from scipy import stats
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.limits import TOLERANCE
+from hybridnav.maps.cells import TOLERANCE
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

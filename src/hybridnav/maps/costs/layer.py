@@ -14,22 +14,27 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.maps.clearance import within_radius
-from hybridnav.maps.costs import masks
-from hybridnav.maps.costs.checks import (
+from hybridnav.maps.costs.factors import (
     HIGHEST,
     MOST_FACTOR,
     UNIT_BITS,
     changed_cells,
+    changed_source,
     checked_box,
     checked_cells,
     checked_factors,
     checked_multiplier,
     checked_setting,
+    checked_speeds,
+    checked_values,
+    holding_centres,
     inflated_costs,
     joined_cells,
+    joined_source,
+    keepout_costs,
+    mask_on_map,
     rounded,
 )
-from hybridnav.maps.costs.masks import changed_source, joined_source
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -201,9 +206,9 @@ class CostLayer:
         >>> hn.CostLayer.speed_mask(grid, [[0, 50, 75]]).factors
         array([[1., 2., 4.]], dtype=float32)
         """
-        limits = masks.checked_speeds(base, multiplier, unit, full_speed_mps)
+        limits = checked_speeds(base, multiplier, unit, full_speed_mps)
         factor_of = rounded(limits.factors(MOST_FACTOR))
-        on_map = masks.on_map(grid, masks.checked_values(values), frame)
+        on_map = mask_on_map(grid, checked_values(values), frame)
         return cls(factor_of[on_map], source={"kind": "speed mask", **limits.source})
 
     @classmethod
@@ -246,12 +251,12 @@ class CostLayer:
         (array([[1.  , 2.01, 1.  ]], dtype=float32), array([[False, False,  True]]))
         """
         value = checked_multiplier(checked_setting("multiplier", multiplier))
-        costs = masks.keepout_costs()
+        costs = keepout_costs()
         factor_of = rounded(1 + np.where(costs > HIGHEST, 0, value / HIGHEST * costs))
-        given = masks.checked_values(values)
-        on_map = masks.on_map(grid, given, frame)
+        given = checked_values(values)
+        on_map = mask_on_map(grid, given, frame)
         closed = (costs > HIGHEST)[on_map]
-        closed |= masks.holding_centres(grid, (costs > HIGHEST)[given], frame)
+        closed |= holding_centres(grid, (costs > HIGHEST)[given], frame)
         source = {"kind": "keepout mask", "multiplier": value}
         return cls(factor_of[on_map], source=source, keepout=closed)
 

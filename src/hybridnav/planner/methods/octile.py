@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav.maps.centres import centres
+from hybridnav.maps.geometry import centres
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpPatch, JumpSearch, build_jump_graph, contract_graph

@@ -15,7 +15,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import Motion
 from hybridnav._base.trig import directions
-from hybridnav.maps.lines import cells_of_line
+from hybridnav.maps.geometry import cells_of_line
 from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve

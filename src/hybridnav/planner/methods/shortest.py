@@ -14,7 +14,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.lines import cells_of_line, polyline_length, polyline_lengths
+from hybridnav.maps.geometry import cells_of_line, polyline_length, polyline_lengths
 from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats

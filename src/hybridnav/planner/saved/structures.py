@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable
 from hybridnav.errors import ModelError
-from hybridnav.maps.limits import MAX_CELLS
+from hybridnav.maps.cells import MAX_CELLS
 from hybridnav.planner.saved.container import Part
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from hybridnav._base.moves import legal_moves
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.costs.checks import UNIT_BITS
+from hybridnav.maps.costs.factors import UNIT_BITS
 from hybridnav.search.overlay.changes import (
     ONE,
     PathsTooLongError,

@@ -12,7 +12,7 @@ from scipy import ndimage
 from hybridnav._base.moves import legal_moves
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.costs.checks import MOST_FACTOR, UNIT_BITS
+from hybridnav.maps.costs.factors import MOST_FACTOR, UNIT_BITS
 from hybridnav.search.overlay.kernels import gates as _gate_kernels
 from hybridnav.search.overlay.kernels import tables as _table_kernels
 from hybridnav.search.overlay.kernels.lanes import FAR

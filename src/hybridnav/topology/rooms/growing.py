@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.pyramid.darts import Darts
-    from hybridnav.topology.rooms.judging import JudgedSegments
+    from hybridnav.topology.rooms.merging import JudgedSegments
 
     Judge = Callable[[LongArray, FloatArray], FloatArray]
 

@@ -1,9 +1,14 @@
-"""Merging of segments of free space to rooms: convex segments, and segments that are too small."""
+"""Segments of free space, and which of them are one room: those that are convex together, those
+that are too small, and those between which a forest sees no boundary.
+"""
 
 from __future__ import annotations
 
 import heapq
 import math
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +16,13 @@ from scipy import ndimage
 from scipy.spatial import ConvexHull, QhullError
 
 from hybridnav.maps.islands import unique_rows
+from hybridnav.topology.rooms.kernels import merging as _merging_kernels
+from hybridnav.topology.rooms.kernels import segmentation as _evidence_kernels
+from hybridnav.topology.rooms.kernels.merging import SegmentState
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, IntArray
+    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.topology.rooms.cutting import Ground
 
 _REACH_M = 0.25
 """How far segments reach into what is not free: walls between two segments are about half as
@@ -218,3 +227,190 @@ def _hull(points: FloatArray) -> tuple[FloatArray, float]:
         spans = points.max(axis=0) - points.min(axis=0)
         return points, float(spans[0] * spans[1])
     return points[hull.vertices], float(hull.volume)
+
+
+EVIDENCE = (
+    *("open_m", "span_m", "covered", "deviation_m", "bent", "jamb_low", "jamb_high", "walled"),
+    *("passage_m", "mean_passage_m", "passage_of_lower", "passage_of_higher"),
+    *("open_share", "open_of_small_rim", "open_of_large_rim"),
+    *("opened_small", "opened_large", "opened_both"),
+    *("solid_small", "solid_large", "solid_both", "solid_gain"),
+    *("peak_small_m", "peak_large_m", "broad_small_m", "broad_large_m"),
+    *("long_small", "long_large", "long_both", "open_of_small_breadth", "open_of_large_breadth"),
+    *("axes_alike", "square_to_small", "square_to_large", "n_small", "n_large"),
+    *("open_of_passage", "n_openings", "longest_m", "flush_low", "flush_high", "flush_mean"),
+)
+"""What is measured of each boundary between a smaller segment and a larger one."""
+_EVIDENCE_REACH_M = 0.25
+"""How far segments reach into what is not free: walls between two segments are about half as
+thick."""
+_JAMB_M = 2.0
+"""Length of wall on either side of an opening that is looked at."""
+TABLE = "room_judge.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class Forest:
+    """Complete trees of one depth, level by level: right is what lies above a threshold."""
+
+    features: LongArray
+    """int64 (n_trees, 2^depth - 1), index into `EVIDENCE`."""
+    thresholds: FloatArray
+    """float64 (n_trees, 2^depth - 1), infinite where all goes left."""
+    leaves: FloatArray
+    """float64 (n_trees, 2^depth), added log odds."""
+    base: float
+    """Log odds without evidence."""
+
+    @classmethod
+    @cache
+    def shipped(cls) -> Forest:
+        """Read the forest of the package; `python -m benchmarks train_rooms` makes it."""
+        with (resources.files("hybridnav.topology.rooms") / TABLE).open("rb") as file:
+            table = np.load(file)
+            return cls(
+                table["features"].astype(np.int64),
+                table["thresholds"].astype(np.float64),
+                table["leaves"].astype(np.float64),
+                float(table["base"]),
+            )
+
+    def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
+        """Return the probability that two segments belong to one room, float64 (n,)."""
+        found: FloatArray = _evidence_kernels.probabilities(
+            evidence, self.features, self.thresholds, self.leaves, self.base
+        )
+        return found
+
+
+class JudgedSegments:
+    """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
+
+    Parameters
+    ----------
+    label_of
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
+    ground
+        What counts as free and as wall.
+    """
+
+    def __init__(self, label_of: IntArray, ground: Ground) -> None:
+        is_used = np.bincount(label_of[label_of >= 0]) > 0
+        dense = np.append(np.cumsum(is_used) - 1, -1)  # sorting all cells would take longer
+        self._label_of: IntArray = dense[np.maximum(label_of, -1)].astype(np.int32)
+        self.n_segments = int(np.count_nonzero(is_used))
+        self._resolution_m = ground.resolution_m
+        self.state = _state(self._label_of, self.n_segments, ground)
+        self.owner_of = np.arange(self.n_segments)
+        """int64 (n_segments,), the segment that each one is part of by now."""
+
+    @property
+    def label_of(self) -> IntArray:
+        """int32 (rows, cols), the segments as they are now; numbers have gaps."""
+        labels: IntArray = np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
+        return labels
+
+    def evidence(self, pairs: LongArray) -> FloatArray:
+        """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
+        found = np.zeros((len(pairs), len(EVIDENCE)))
+        _evidence_kernels.fill_evidence(
+            self.state,
+            pairs,
+            self._resolution_m,
+            _EVIDENCE_REACH_M / self._resolution_m,
+            max(1, round(_JAMB_M / self._resolution_m)),
+            found,
+        )
+        return found
+
+    def pair_of(self, segment: int, other: int) -> int:
+        """Return the pair of two segments, -1 if they do not touch."""
+        pairs = _merging_kernels.pairs_of(self.state, segment)
+        found = pairs[(self.state.endpoints[pairs] == other).any(axis=1)]
+        return int(found[0]) if len(found) else -1
+
+    def merge(self, pair: int) -> int:
+        """Merge the two segments of a pair, and return the one that is left."""
+        sizes = self.state.hull_sizes[self.state.endpoints[pair]].sum()
+        if self.state.hulls_used[0] + sizes > len(self.state.hulls):
+            hulls = np.concatenate([self.state.hulls, np.empty_like(self.state.hulls)])
+            self.state = self.state._replace(hulls=hulls)
+        kept, gone = _merging_kernels.merge_pair(self.state, pair)
+        self.owner_of[self.owner_of == gone] = kept
+        return int(kept)
+
+
+def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
+    """Measure segments and the pairs that touch."""
+    reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
+    free, peaks, moments, rims, begins, sizes, areas, diameters, corners = (
+        _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
+    )
+    pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
+    order, opened, run_begins, run_ends = _runs(pairs, n)
+    _, border, border_begins, border_ends = _runs(
+        _merging_kernels.sides_between(reaching, ground.clearance)[0], n
+    )
+    keys = np.union1d(opened, border)
+    at, count = np.searchsorted(keys, opened), len(keys)
+    endpoints = np.stack([keys // max(1, n), keys % max(1, n)], axis=1)
+    open_sides, border_sides, widest, clearances = (np.zeros(count) for _ in range(4))
+    head, begin, end = np.full(count, -1), np.zeros(count, np.int64), np.zeros(count, np.int64)
+    open_sides[at], head[at], begin[at], end[at] = run_ends - run_begins, at, run_begins, run_ends
+    border_sides[np.searchsorted(keys, border)] = border_ends - border_begins
+    if len(opened):
+        widest[at] = np.maximum.reduceat(clear[order], run_begins)
+        clearances[at] = np.add.reduceat(clear[order], run_begins)
+    hulls = np.empty((2 * len(corners) + 16, 2))
+    hulls[: len(corners)] = corners
+    first_half, next_half = _halves(endpoints, n)
+    return SegmentState(
+        free=free,
+        moments=moments,
+        rims=rims,
+        peaks=peaks,
+        opened=np.bincount(endpoints.ravel(), np.repeat(open_sides, 2), n),
+        hull_areas=areas,
+        diameters=diameters,
+        hull_begins=begins,
+        hull_sizes=sizes,
+        degrees=np.bincount(endpoints.ravel(), minlength=n),
+        first_half=first_half,
+        versions=np.zeros(n, np.int64),
+        endpoints=endpoints,
+        open_sides=open_sides,
+        border_sides=border_sides,
+        widest=widest,
+        clearances=clearances,
+        head=head,
+        tail=head.copy(),
+        next_half=next_half,
+        next_run=np.full(count, -1),
+        run_begins=begin,
+        run_ends=end,
+        sides=sides[order],
+        wall=ndimage.binary_dilation(ground.wall, np.ones((3, 3), dtype=np.bool_)),
+        hulls=hulls,
+        hulls_used=np.array([len(corners)]),
+        mark=np.full(n, -1),
+    )
+
+
+def _runs(pairs: LongArray, n: int) -> tuple[LongArray, LongArray, LongArray, LongArray]:
+    """Return the order of sides by pair, each pair's key, and where its sides begin and end."""
+    keys = pairs[:, 0] * n + pairs[:, 1]
+    order = np.argsort(keys, kind="stable")
+    found, begins, counts = np.unique(keys[order], return_index=True, return_counts=True)
+    return order, found, begins, begins + counts
+
+
+def _halves(endpoints: LongArray, n: int) -> tuple[LongArray, LongArray]:
+    """Return linked lists of the half pairs of each segment."""
+    first, following = np.full(n, -1), np.full(2 * len(endpoints), -1)
+    order = np.argsort(endpoints.ravel(), kind="stable")
+    of = endpoints.ravel()[order]
+    last = np.append(of[1:] != of[:-1], True) if len(of) else np.zeros(0, bool)
+    following[order[:-1][~last[:-1]]] = order[1:][~last[:-1]]
+    begins = np.flatnonzero(np.diff(of, prepend=-1))
+    first[of[begins]] = order[begins]
+    return first, following

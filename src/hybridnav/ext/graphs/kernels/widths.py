@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.maps.lines import passed_cells
+from hybridnav.maps.geometry import passed_cells
 
 _STEP_CELLS = 0.5
 """Distance between the points of an edge at which its width is measured."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hybridnav._base.jit import njit
-from hybridnav.maps.centres import position_of
+from hybridnav.maps.geometry import position_of
 
 _STEP = 0.5
 """Greatest distance between samples, in cells."""

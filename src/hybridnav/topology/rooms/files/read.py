@@ -20,15 +20,16 @@ from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
 from hybridnav.maps.files.image import read_raster
 from hybridnav.maps.names import check_names
 from hybridnav.maps.occupancy import extent
-from hybridnav.topology.rooms.files.cells import fingerprint, unpacked
 from hybridnav.topology.rooms.files.entries import (
     LIMITS,
     Outline,
     Read,
     checked_rings,
+    fingerprint,
     list_of,
     number_of,
     read_entries,
+    unpacked,
 )
 from hybridnav.topology.rooms.files.paint import cells_inside, painted, without_slivers
 

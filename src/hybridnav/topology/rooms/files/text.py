@@ -16,8 +16,7 @@ from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import read_marked
 from hybridnav.errors import HybridNavError, RoomsError
 from hybridnav.maps import CellClass
-from hybridnav.topology.rooms.files.cells import unpacked
-from hybridnav.topology.rooms.files.entries import LIMITS, Outline, Read, read_entries
+from hybridnav.topology.rooms.files.entries import LIMITS, Outline, Read, read_entries, unpacked
 from hybridnav.topology.rooms.files.read import rooms_of
 
 if TYPE_CHECKING:

@@ -14,8 +14,14 @@ from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
-from hybridnav.topology.rooms.files.cells import fingerprint, packed
-from hybridnav.topology.rooms.files.entries import LIMITS, Outline, Read, in_cells
+from hybridnav.topology.rooms.files.entries import (
+    LIMITS,
+    Outline,
+    Read,
+    fingerprint,
+    in_cells,
+    packed,
+)
 from hybridnav.topology.rooms.files.outlines import Outlines, decimals_of
 from hybridnav.topology.rooms.files.paint import apart, by_rule, outlined
 from hybridnav.topology.rooms.files.read import check_points, check_rooms, labels_of

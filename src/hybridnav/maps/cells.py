@@ -1,6 +1,23 @@
-"""Limits and defaults of grids and paths, known without numpy."""
+"""Classes of cells, and the limits and defaults of grids and paths, known without numpy."""
 
 from __future__ import annotations
+
+from enum import IntEnum
+
+
+class CellClass(IntEnum):
+    """Class of a cell for planners; occupied cells are not vertices of any graph.
+
+    Examples
+    --------
+    >>> [kind.name for kind in hn.CellClass]
+    ['OCCUPIED', 'FREE', 'UNEXPLORED']
+    """
+
+    OCCUPIED = 0
+    FREE = 1
+    UNEXPLORED = 2
+
 
 MAX_CELLS = 178_956_970
 """Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""

@@ -1,4 +1,6 @@
-"""Cells that a polyline passes."""
+"""Positions and polylines on the cells of a grid, compiled: for kernels, and for few cells, where
+numpy is slower.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +8,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.maps.kernels.lines import (
+from hybridnav.maps.kernels.geometry import (
+    centres,
     passed_cells,
     polyline_length,
     polyline_lengths,
+    position_of,
     walks_clear,
 )
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
-__all__ = ["cells_of_line", "passed_cells", "polyline_length", "polyline_lengths", "walks_clear"]
+__all__ = [
+    "cells_of_line",
+    "centres",
+    "passed_cells",
+    "polyline_length",
+    "polyline_lengths",
+    "position_of",
+    "walks_clear",
+]
 
 
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
