@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hybridnav.search.mesh import ConvexMesh, MeshSearch
-from hybridnav.search.mesh.corner_graph import find_edges
+from hybridnav.search.mesh.build import find_edges
 
 KINDS = "intervals", "landmarks", "hierarchy"
 """What a search of a mesh may search."""
@@ -20,7 +20,7 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
         return search
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "hybridnav.search.mesh.corner_graph._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
+            "hybridnav.search.mesh.build._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
         )
         search.prepare()
     return search

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.refine import MotionCheck
-from hybridnav.refine.differential import driven
+from hybridnav.refine.curves import driven
 from hybridnav.refine.footprint import Footprint
 from tests.oracle.motions import ShapelyRobot, drive_phases, turning_poses
 from tests.strategies import examples

@@ -18,9 +18,9 @@ class TroubledQuery(OmplQuery):
     def __getattribute__(self, name: str) -> Any:
         # Nobody but the fork asks for the corridors.
         if name == "corridors":
-            from hybridnav.refine.ompl import attempts, chain
+            from hybridnav.refine.ompl import answer, attempts
 
-            where, function = (attempts, "simplify") if self.after_path else (chain, "attempt")
+            where, function = (attempts, "simplify") if self.after_path else (answer, "attempt")
             setattr(where, function, lambda *_args, **_named: _trouble(self.trouble))
         return super().__getattribute__(name)
 

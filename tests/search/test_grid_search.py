@@ -18,9 +18,8 @@ import hybridnav as hn
 from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
 from hybridnav.maps import CellClass
 from hybridnav.maps.files.movingai import Scenario, read_scenarios
-from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.kernels import weighted as kernels
-from hybridnav.search.waypoints import cheapest_waypoints
+from hybridnav.search.grid_search import GridSearch, cheapest_waypoints
+from hybridnav.search.kernels import grid_search as kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import class_grids, drawn, examples
 
@@ -141,7 +140,7 @@ def test_searches_that_start_anew_forget_the_first_ones() -> None:
     units = random_units(enterable.shape, rng)
     search, graph = GridSearch(enterable, units=units), weighted(move_graph(enterable), units / ONE)
     with search._works.lent() as work:
-        work.generation = kernels.GENERATIONS - 3
+        work.generation = kernels.WIDE_GENERATIONS - 3
     free = np.argwhere(enterable)
     for _ in range(8):
         start, goal = (tuple(free[rng.integers(len(free))].tolist()) for _ in range(2))

@@ -21,7 +21,7 @@ from hybridnav._base.moves import (
 )
 from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch, move_tables
-from hybridnav.search.kernels import astar as _astar_kernels
+from hybridnav.search.kernels import grid_search as _astar_kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import block_labels, class_grids, drawn, examples
 

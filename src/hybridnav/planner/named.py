@@ -14,8 +14,7 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.names import did_you_mean
 from hybridnav.planner.endpoints import check_at
-from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.waypoints import cheapest_waypoints
+from hybridnav.search.grid_search import GridSearch, cheapest_waypoints
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

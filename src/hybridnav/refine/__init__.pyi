@@ -1,7 +1,10 @@
 from .cost_line import CostLine as CostLine
-from .grid import GridRefiner as GridRefiner, Refiner as Refiner
-from .line_of_sight import LineOfSight as LineOfSight
+from .grid import (
+    GridRefiner as GridRefiner,
+    LineOfSight as LineOfSight,
+    Refiner as Refiner,
+    Sight as Sight,
+)
 from .motions import MotionCheck as MotionCheck
-from .sight import Sight as Sight
 
 __all__: list[str]

@@ -10,9 +10,9 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import wrapped
 from hybridnav._base.trig import directions
+from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
-from hybridnav.refine.line_of_sight import open_cells
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray

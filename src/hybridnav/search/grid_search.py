@@ -1,10 +1,11 @@
-"""Optimal paths on the octile grid: A* with integer costs, buckets and pruned successors.
+"""Optimal paths on the octile grid: A* with integer costs, buckets and pruned successors; and the
+cheapest waypoints, one cell from each of several sets that are visited in order.
 
 P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determination of minimum
 cost paths, 1968. The open list is that of E. A. Dinic, 1978, by f in place of g. Successors are
 pruned by the direction of arrival as D. Harabor and A. Grastien do (Online graph pruning for
-pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin call that canonical
-A* (Canonical orderings on grids, 2016). With factors in the cells all moves ahead are successors.
+pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin call that canonical A*
+(Canonical orderings on grids, 2016). With factors in the cells all moves ahead are successors.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import BUCKET_FULL, legal_moves, trace_cells
 from hybridnav._base.threads import Pool
-from hybridnav.search.kernels import astar as _kernels
-from hybridnav.search.kernels import weighted as _weighted
+from hybridnav.search.kernels import grid_search as _kernels
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
@@ -53,7 +55,7 @@ class _Work:
         n_buckets = _kernels.BUCKETS if weights is None else weights.n_buckets
         self.waiting = np.empty(n_buckets * _ROOM, dtype=np.int32)
         self.generation = 0
-        self._last = _weighted.GENERATIONS if weighted else _kernels.GENERATIONS
+        self._last = _kernels.WIDE_GENERATIONS if weighted else _kernels.GENERATIONS
 
     def next_generation(self) -> int:
         """Return the number of the next search; its records hold nothing of earlier ones."""
@@ -83,8 +85,8 @@ class _Weights:
         of_enterable = units[enterable]
         least = int(of_enterable.min(initial=_MOST_UNITS))
         most = int(of_enterable.max(initial=least))
-        self.scales = 2 * least, _weighted.bucket_shift(least)
-        self.n_buckets = _weighted.n_buckets(least, most)
+        self.scales = 2 * least, _kernels.bucket_shift(least)
+        self.n_buckets = _kernels.n_buckets(least, most)
 
 
 class GridSearch:
@@ -190,7 +192,7 @@ class GridSearch:
                         moves, self._cols, endpoints, limit, *tables, *of_work
                     )
                 else:
-                    cost, expanded = _weighted.weighted_astar(
+                    cost, expanded = _kernels.weighted_astar(
                         moves,
                         self._weights.units,
                         self._cols,
@@ -295,3 +297,77 @@ def _after_turn(
 def _put_first(lists: NDArray[np.uint32], where: BoolArray, k: int) -> None:
     """Put a move before the others of some lists."""
     lists[where] = lists[where] << 4 | 8 | k
+
+
+def cheapest_waypoints(
+    enterable: BoolArray,
+    sets: Sequence[LongArray],
+    *,
+    corner_cutting: bool = False,
+    units: IntArray | None = None,
+) -> list[int] | None:
+    """Choose a cell from each set so that the path through them, in order, is cheapest.
+
+    Dijkstra's algorithm runs from set to set: the search for the next set begins with the costs of
+    the cells of the last one.
+
+    Parameters
+    ----------
+    enterable
+        bool (rows, cols), cells that the path may use. Moves go to the 8 neighbours; a diagonal
+        needs both side cells, unless corners may be cut.
+    sets
+        Two or more sets, int64 (n,), of flat enterable cells.
+    corner_cutting
+        Whether a diagonal needs no side cell.
+    units
+        int32 (rows, cols), the factor of each cell in units; None makes costs lengths.
+
+    Returns
+    -------
+    list of int | None
+        A flat cell of each set; None if one of them cannot be reached.
+    """
+    moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+    weights = None if units is None else np.ascontiguousarray(units).ravel()
+    sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)
+    origins: list[LongArray] = []
+    for number, goals in enumerate(sets[1:], start=2):
+        is_target = np.zeros(moves.size, dtype=np.bool_)
+        is_target[goals] = True
+        cost, came = _kernels.spread(
+            moves, weights, enterable.shape[1], sources, costs, is_target, number < len(sets)
+        )
+        reached = goals[cost[goals] >= 0]
+        if len(reached) == 0:
+            return None
+        origins.append(np.stack([reached, sources[came[reached]]], axis=1))
+        sources, costs = reached, cost[reached]
+    waypoints = [int(sources[np.argmin(costs)])]
+    for pairs in reversed(origins):
+        waypoints.append(int(pairs[np.argmax(pairs[:, 0] == waypoints[-1]), 1]))
+    return waypoints[::-1]
+
+
+def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> LongArray:
+    """Return the octile costs of shortest paths from a cell, int64 (rows * cols,), -1 where
+    unsettled.
+
+    Parameters
+    ----------
+    moves
+        uint8 (rows, cols), legal moves of each cell.
+    cell
+        Where the search starts, (row, col).
+    targets
+        int64 (n,), flat cells: the search ends once all that can be reached are settled.
+    """
+    cols = moves.shape[1]
+    is_target = np.zeros(moves.size, dtype=np.bool_)
+    is_target[targets] = True
+    source = np.array([cell[0] * cols + cell[1]])
+    start_cost = np.zeros(1, dtype=np.int64)
+    costs: LongArray = _kernels.spread(
+        moves.ravel(), None, cols, source, start_cost, is_target, True
+    )[0]
+    return costs

@@ -95,7 +95,7 @@ def test_a_planner_comes_back_bit_by_bit(preset: str, tmp_path: Path, *, compres
 def test_a_graph_that_took_too_long_to_contract_comes_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hybridnav.search.mesh.corner_graph._MOST_LOOKED", 0)
+    monkeypatch.setattr("hybridnav.search.mesh.build._MOST_LOOKED", 0)
     saved = hn.HybridPlanner(topology())
     saved.prepare()
     came_back = loaded(saved, tmp_path / "m.hnm").planner()

@@ -196,7 +196,7 @@ def test_a_search_with_a_budget_does_not_prepare_itself(monkeypatch: pytest.Monk
 
 
 def test_too_many_edges_leave_the_search_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridnav.search.mesh.corner_graph._MOST_EDGES", 1)
+    monkeypatch.setattr("hybridnav.search.mesh.build._MOST_EDGES", 1)
     search = MeshSearch(build_mesh(scattered()))
     before = between(search, (0, 0), (39, 39))
     search.prepare()

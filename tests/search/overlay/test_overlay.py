@@ -22,7 +22,7 @@ from hybridnav.search.overlay.kernels.exits import reach_over_exits
 from hybridnav.search.overlay.kernels.fields import search_near
 from hybridnav.search.overlay.kernels.lanes import FAR, NO_PATH
 from hybridnav.search.overlay.layout import slots_of
-from hybridnav.search.overlay.prepare import overlay_fields
+from hybridnav.search.overlay.search import overlay_fields
 from tests.search.overlay.judge import UNITS, WeightedJudge
 from tests.strategies import examples
 

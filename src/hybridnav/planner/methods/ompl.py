@@ -18,8 +18,7 @@ from hybridnav._base.trig import directions
 from hybridnav.maps.geometry import cells_of_line
 from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.refine import LineOfSight, MotionCheck
-from hybridnav.refine.curves import shortest_curve
-from hybridnav.refine.differential import driven
+from hybridnav.refine.curves import driven, shortest_curve
 from hybridnav.refine.ompl import Clearance, OmplQuery, Setup, Worker
 from hybridnav.search.found import Query
 

@@ -13,7 +13,7 @@ from ompl import base, geometric
 
 from hybridnav.refine.ompl.client import Reply, Search
 from hybridnav.refine.ompl.settings import ROADMAPS
-from hybridnav.refine.ompl.spaces import StateSpace
+from hybridnav.refine.ompl.solve import StateSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -60,8 +60,7 @@ def serve(connection: Connection) -> None:
 def _warm_up(base: Base) -> None:
     """Load modules and kernels before the first fork, and let OMPL check the parameters."""
     import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
-    from hybridnav.refine.ompl.solve import make  # noqa: PLC0415
-    from hybridnav.refine.ompl.spaces import StateSpace  # noqa: PLC0415
+    from hybridnav.refine.ompl.solve import StateSpace, make  # noqa: PLC0415
 
     inside = np.ones(base.setup.grid.shape, dtype=np.bool_)
     check = base.check.confined(inside=inside, closed=np.empty(0, dtype=np.int64))

@@ -1,5 +1,9 @@
-from .build import ConvexMesh as ConvexMesh, build_mesh as build_mesh
-from .corner_graph import CornerGraph as CornerGraph, CornerHierarchy as CornerHierarchy
+from .build import (
+    ConvexMesh as ConvexMesh,
+    CornerGraph as CornerGraph,
+    CornerHierarchy as CornerHierarchy,
+    build_mesh as build_mesh,
+)
 from .cut import (
     DetourSearch as DetourSearch,
     MeshPaths as MeshPaths,

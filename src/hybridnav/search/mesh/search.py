@@ -15,12 +15,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
-from hybridnav.search.mesh.corner_graph import (
-    CornerHierarchy,
-    add_landmarks,
-    contract_corners,
-    find_edges,
-)
+from hybridnav.search.mesh.build import CornerHierarchy, add_landmarks, contract_corners, find_edges
 from hybridnav.search.mesh.kernels import polyanya
 from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.queries import query, query_hierarchy
@@ -28,8 +23,7 @@ from hybridnav.search.mesh.kernels.queries import query, query_hierarchy
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.search.mesh.build import ConvexMesh
-    from hybridnav.search.mesh.corner_graph import CornerGraph
+    from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
 
 KERNEL = query
 """The kernel whose compiled form shows that a search was run before."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav.maps import CellClass
-from hybridnav.search.waypoints import costs_from
+from hybridnav.search.grid_search import costs_from
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray

@@ -33,7 +33,7 @@ from hybridnav.ext.live.mapping.sensors import in_sight
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.search.waypoints import costs_from
+from hybridnav.search.grid_search import costs_from
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:

@@ -20,7 +20,6 @@ from hybridnav.search.mesh.kernels.corner_search import (
     polygons_of_endpoints,
     query_corners,
 )
-from hybridnav.search.mesh.kernels.hierarchy import UNITS, class_of, cost_of
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
     DONE,
@@ -40,7 +39,7 @@ from hybridnav.search.mesh.kernels.polyanya import (
     put_corner,
     seed,
 )
-from hybridnav.search.mesh.kernels.views import distance
+from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, distance
 
 _OPENED, _SEEDED = 1, 2
 """Stages of a query: its blocks are opened; its first nodes are written."""

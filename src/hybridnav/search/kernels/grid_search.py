@@ -1,0 +1,443 @@
+"""Kernels of searches on cells: A* by lengths, A* by lengths times factors of cells, and the spread
+from sets of cells to sets of cells.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.moves import (
+    BUCKET_FULL,
+    COL_STEP,
+    DIAGONAL,
+    ROW_STEP,
+    STRAIGHT,
+    full_cost,
+    is_no_gain,
+    octile_cost,
+    put,
+)
+
+# --- A* by lengths, in records of 32 bits ---------------------------------------------------------
+
+# A record: generation, cost modulo 2^19, direction of arrival; see `_base.kernels.moves`. The width
+# of a bucket and two diagonals are below 2^18.
+_DIRECTION_BITS = 3
+_COST_BITS = 19
+_GENERATION_SHIFT = _DIRECTION_BITS + _COST_BITS
+_COST_MASK = (1 << _COST_BITS) - 1
+_SAME_GENERATION = 1 << _GENERATION_SHIFT
+GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
+"""Number of searches after which the array of records must be filled with zeros again."""
+
+# Width of a bucket of the open list, 0.41 of a straight step; a quarter and an eighth of that are
+# equal within noise. A move raises f by less than 2 * DIAGONAL, 7 buckets: 8 take turns.
+_BUCKET_SHIFT = 15
+BUCKETS = 8
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def forbid(moves, cols, blocked, corner_cutting):
+    """Remove all moves into, out of and past the corners of some flat cells from the masks.
+
+    Return the flat cells whose masks may have changed, and their former masks.
+    """
+    rows = moves.size // cols
+    touched = np.empty(9 * blocked.size, np.int64)
+    n_touched = 0
+    for cell in blocked:
+        row, col = cell // cols, cell % cols
+        for to_row in range(max(row - 1, 0), min(row + 2, rows)):
+            for to_col in range(max(col - 1, 0), min(col + 2, cols)):
+                touched[n_touched] = to_row * cols + to_col
+                n_touched += 1
+    touched = touched[:n_touched]
+    masks = moves[touched]
+    for cell in blocked:
+        moves[cell] = 0
+        row, col = cell // cols, cell % cols
+        for k in range(8):
+            to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
+            if to_row < 0 or to_row >= rows or to_col < 0 or to_col >= cols:
+                continue
+            gone = 1 << (k + 4 & 7)
+            if not (k & 1 or corner_cutting):
+                gone |= 1 << (k + 3 & 7) | 1 << (k + 5 & 7)
+            moves[to_row * cols + to_col] &= 255 - gone
+    return touched, masks
+
+
+@njit(cache=True, nogil=True)
+def _with_detours(todo, spared, k, cell, cols, field_of, in_corridor):
+    """Return successors with those detours that stand on a cell outside the corridor.
+
+    Parameters
+    ----------
+    todo, spared
+        Successors and detours, see `grid_search.move_tables`.
+    k, cell, cols
+        Direction of arrival, the flat cell, and the columns of the grid.
+    field_of, in_corridor
+        See `astar`.
+    """
+    while spared != 0:
+        pruned = spared & 7
+        spared >>= 4
+        via = pruned + (1 if pruned - k & 7 < 4 else -1) & 7
+        if not in_corridor[field_of[cell + ROW_STEP[via] * cols + COL_STEP[via]]]:
+            todo = todo << 4 | 8 | pruned
+    return todo
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def astar(
+    moves,
+    cols,
+    endpoints,
+    limit,
+    successors,
+    detours,
+    field_of,
+    in_corridor,
+    records,
+    generation,
+    waiting,
+):
+    """Return the cost of the optimal path between two flat cells in a corridor, and the expansions.
+
+    The cost is -1 if there is no path below `limit`, `BUCKET_FULL` if a bucket is full.
+
+    A successor in the current bucket is expanded next without a stay in its bucket, as the newest
+    one would be. A cell can be expanded again within a bucket; the search ends when no entry below
+    the goal's cost is left, so the cost is optimal.
+
+    No array grows here: with arrays that may be replaced in the loop, numba's code took 50 %
+    longer. Indices are unsigned because a test for negative ones took 15 % of the time.
+
+    Parameters
+    ----------
+    moves, cols
+        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
+    endpoints, limit
+        Flat cells of start and goal, and the integer cost that a path must stay below.
+    successors, detours
+        Those of `grid_search.move_tables`.
+    field_of
+        int16 or int32 (n_cells,), a label for each cell; None makes the whole map the corridor (the
+        kernel is compiled for both).
+    in_corridor
+        bool by label, whether such a cell may be stood on.
+    records, waiting
+        uint32 (n_cells,), and the open list; see `_base.kernels.moves`.
+    generation
+        Number of this search, below `GENERATIONS`.
+    """
+    start, goal = endpoints
+    stamp = np.int64(generation) << _GENERATION_SHIFT
+    goal_row, goal_col = goal // cols, goal % cols
+    count = np.zeros(BUCKETS, np.int64)
+    room = waiting.size // BUCKETS
+    left = 0
+    bucket = slot = np.int64(0)
+    cell, cost, k = np.int64(start), np.int64(0), np.int64(8)
+    row, col = cell // cols, cell % cols
+    origin = octile_cost(row - goal_row, col - goal_col)
+    per_col = 1.0 / cols
+    records[start] = stamp
+    bound = np.int64(limit)
+    if start == goal:
+        bound = np.int64(0)
+    expanded = 0
+    while cell >= 0:
+        expanded += 1
+        index = k << 8 | np.int64(moves[np.uint64(cell)])
+        todo = np.int64(successors[np.uint64(index)])
+        if field_of is not None:
+            spared = np.int64(detours[np.uint64(index)])
+            todo = _with_detours(todo, spared, k, cell, cols, field_of, in_corridor)
+        following = np.int64(-1)
+        following_row = following_col = following_cost = following_k = np.int64(0)
+        while todo != 0:
+            k = todo & 7
+            todo >>= 4
+            row_step, col_step = ROW_STEP[np.uint64(k)], COL_STEP[np.uint64(k)]
+            to = cell + row_step * cols + col_step
+            if field_of is not None and not in_corridor[field_of[to]]:
+                continue
+            new_cost = cost + STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
+            known = np.int64(records[np.uint64(to)]) ^ stamp
+            if known < _SAME_GENERATION and is_no_gain(
+                known, _DIRECTION_BITS, _COST_MASK, new_cost
+            ):
+                continue
+            to_row, to_col = row + row_step, col + col_step
+            estimate = new_cost + octile_cost(to_row - goal_row, to_col - goal_col)
+            if estimate >= bound:
+                continue
+            records[np.uint64(to)] = stamp | (new_cost & _COST_MASK) << _DIRECTION_BITS | k
+            if to == goal:
+                bound = new_cost
+                continue
+            into = estimate - origin >> _BUCKET_SHIFT
+            entry = to
+            if into == bucket:
+                entry = following
+                following, following_cost, following_k = to, new_cost, k
+                following_row, following_col = to_row, to_col
+                if entry < 0:
+                    continue
+            if not put(waiting, count, room, into & BUCKETS - 1, entry):
+                return BUCKET_FULL, expanded
+            left += 1
+        if following >= 0:
+            cell, cost, k = following, following_cost, following_k
+            row, col = following_row, following_col
+            continue
+        cell = np.int64(-1)
+        while left > 0:
+            if count[np.uint64(slot)] == 0:
+                bucket += 1
+                slot = bucket & BUCKETS - 1
+                if origin + (bucket << _BUCKET_SHIFT) >= bound:
+                    break
+                continue
+            count[np.uint64(slot)] -= 1
+            left -= 1
+            waits = np.int64(waiting[np.uint64(slot * room + count[np.uint64(slot)])])
+            record = np.int64(records[np.uint64(waits)])
+            # Exact: half a cell off any multiple, and far fewer than 2^50 cells.
+            row = np.int64((waits + 0.5) * per_col)
+            col = waits - row * cols
+            estimate = octile_cost(row - goal_row, col - goal_col)
+            least = origin + (bucket << _BUCKET_SHIFT) - estimate
+            cost = full_cost(record, _DIRECTION_BITS, _COST_MASK, least)
+            if cost - least >> _BUCKET_SHIFT == 0 and cost + estimate < bound:
+                cell, k = waits, record & 7
+                break
+    return (bound if bound < limit else -1), expanded
+
+
+# --- A* by lengths times factors, in records of 64 bits -------------------------------------------
+
+# A record: generation, cost modulo 2^48, whether expanded, direction of arrival; see
+# `_base.kernels.moves`.
+_EXPANDED = 8
+_WIDE_LOW_BITS = 4
+_WIDE_COST_BITS = 48
+_WIDE_GENERATION_SHIFT = _WIDE_LOW_BITS + _WIDE_COST_BITS
+_WIDE_COST_MASK = (1 << _WIDE_COST_BITS) - 1
+_WIDE_SAME_GENERATION = 1 << _WIDE_GENERATION_SHIFT
+WIDE_GENERATIONS = (1 << (63 - _WIDE_GENERATION_SHIFT)) - 1
+"""Number of searches after which the array of records must be filled with zeros again."""
+
+_WIDE_BUCKET_SHIFT = 15
+"""Exponent of the width of a bucket, for a factor of one unit."""
+
+
+def bucket_shift(least_units: int) -> int:
+    """Return the exponent of the width of a bucket: 0.4 to 0.8 of the cheapest straight move."""
+    return _WIDE_BUCKET_SHIFT + (2 * least_units).bit_length() - 1
+
+
+def n_buckets(least_units: int, most_units: int) -> int:
+    """Return the number of buckets that take turns, a power of 2."""
+    # A move raises f by less than its cost and the change of the estimate.
+    most = 2 * DIAGONAL * (least_units + most_units)
+    return 1 << ((most >> bucket_shift(least_units)) + 1).bit_length()
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def weighted_astar(
+    moves,
+    units,
+    cols,
+    endpoints,
+    limit,
+    scales,
+    successors,
+    field_of,
+    in_corridor,
+    records,
+    generation,
+    waiting,
+    n_buckets,
+):
+    """Return the cost of the cheapest path between two flat cells in a corridor, and the
+    expansions.
+
+    The cost is -1 if there is no path below `limit`, `BUCKET_FULL` if a bucket is full. The search
+    is that of `astar`, but all moves ahead and to the sides are tried. Those that turn by 135
+    degrees or more are not: the cell before is a neighbour of such a successor, and the move from
+    there costs less.
+
+    Parameters
+    ----------
+    moves, units, cols
+        uint8 (n_cells,), the legal moves of each flat cell; int32 (n_cells,), its factor in units;
+        the columns of the grid.
+    endpoints, limit
+        Flat cells of start and goal, and the integer cost that a path must stay below.
+    scales
+        Twice the least number of units of a cell, by which the octile distance is a lower bound,
+        and the exponent of the width of a bucket.
+    successors
+        Those of `grid_search.moves_ahead`.
+    field_of, in_corridor
+        As in `astar`.
+    records, generation
+        int64 (n_cells,), and the number of this search, below `WIDE_GENERATIONS`.
+    waiting, n_buckets
+        The open list, see `_base.kernels.moves`, and the number of its buckets.
+    """
+    start, goal = endpoints
+    scale, shift = scales
+    stamp = np.int64(generation) << _WIDE_GENERATION_SHIFT
+    goal_row, goal_col = goal // cols, goal % cols
+    count = np.zeros(n_buckets, np.int64)
+    room = waiting.size // n_buckets
+    left = 0
+    bucket = slot = np.int64(0)
+    cell, cost, k = np.int64(start), np.int64(0), np.int64(8)
+    row, col = cell // cols, cell % cols
+    origin = octile_cost(row - goal_row, col - goal_col) * scale
+    per_col = 1.0 / cols
+    records[start] = stamp
+    bound = np.int64(limit)
+    if start == goal:
+        bound = np.int64(0)
+    expanded = 0
+    while cell >= 0:
+        expanded += 1
+        records[np.uint64(cell)] |= _EXPANDED
+        todo = np.int64(successors[np.uint64(k << 8 | np.int64(moves[np.uint64(cell)]))])
+        own = np.int64(units[np.uint64(cell)])
+        following = np.int64(-1)
+        following_row = following_col = following_cost = following_k = np.int64(0)
+        while todo != 0:
+            k = todo & 7
+            todo >>= 4
+            row_step, col_step = ROW_STEP[np.uint64(k)], COL_STEP[np.uint64(k)]
+            to = cell + row_step * cols + col_step
+            if field_of is not None and not in_corridor[field_of[to]]:
+                continue
+            length = STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
+            new_cost = cost + length * (own + np.int64(units[np.uint64(to)]))
+            known = records[np.uint64(to)] ^ stamp
+            if known < _WIDE_SAME_GENERATION and is_no_gain(
+                known, _WIDE_LOW_BITS, _WIDE_COST_MASK, new_cost
+            ):
+                continue
+            to_row, to_col = row + row_step, col + col_step
+            estimate = new_cost + octile_cost(to_row - goal_row, to_col - goal_col) * scale
+            if estimate >= bound:
+                continue
+            records[np.uint64(to)] = stamp | (new_cost & _WIDE_COST_MASK) << _WIDE_LOW_BITS | k
+            if to == goal:
+                bound = new_cost
+                continue
+            into = estimate - origin >> shift
+            entry = to
+            if into == bucket:
+                entry = following
+                following, following_cost, following_k = to, new_cost, k
+                following_row, following_col = to_row, to_col
+                if entry < 0:
+                    continue
+            if not put(waiting, count, room, into & n_buckets - 1, entry):
+                return BUCKET_FULL, expanded
+            left += 1
+        if following >= 0:
+            cell, cost, k = following, following_cost, following_k
+            row, col = following_row, following_col
+            continue
+        cell = np.int64(-1)
+        while left > 0:
+            if count[np.uint64(slot)] == 0:
+                bucket += 1
+                slot = bucket & n_buckets - 1
+                if origin + (bucket << shift) >= bound:
+                    break
+                continue
+            count[np.uint64(slot)] -= 1
+            left -= 1
+            waits = np.int64(waiting[np.uint64(slot * room + count[np.uint64(slot)])])
+            record = np.int64(records[np.uint64(waits)])
+            if record & _EXPANDED != 0:
+                continue
+            # Exact: half a cell off any multiple, and far fewer than 2^50 cells.
+            row = np.int64((waits + 0.5) * per_col)
+            col = waits - row * cols
+            estimate = octile_cost(row - goal_row, col - goal_col) * scale
+            least = origin + (bucket << shift) - estimate
+            cost = full_cost(record, _WIDE_LOW_BITS, _WIDE_COST_MASK, least)
+            if cost - least >> shift == 0 and cost + estimate < bound:
+                cell, k = waits, record & 7
+                break
+    return (bound if bound < limit else -1), expanded
+
+
+# --- distances from sets of cells to sets of cells ------------------------------------------------
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def spread(moves, units, cols, sources, costs, is_target, all_targets):
+    """Run Dijkstra's algorithm from cells with costs of their own.
+
+    Return the cost of each cell, -1 if it was not settled, and its source (an index into
+    `sources`). The search ends at the first settled target, or at the last one with `all_targets`.
+
+    Parameters
+    ----------
+    moves, cols
+        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
+    units
+        int32 (n_cells,), the factor of each cell in units, or None: then costs are lengths (the
+        kernel is compiled for both).
+    sources, costs
+        int64 (n,) each, flat cells and what they cost.
+    is_target, all_targets
+        bool (n_cells,), and whether all of these are to be settled.
+    """
+    cost = np.full(moves.size, np.int64(-1), np.int64)
+    came = np.full(moves.size, np.int32(-1), np.int32)
+    best = np.full(moves.size, np.int64(1) << 62, np.int64)
+    heap = [(np.int64(0), np.int64(0)) for _ in range(0)]
+    left = 0
+    for cell in range(moves.size):
+        left += is_target[cell]
+    for i in range(sources.size):
+        if costs[i] < best[sources[i]]:
+            best[sources[i]] = costs[i]
+            came[sources[i]] = i
+    for i in range(sources.size):
+        if came[sources[i]] == i:
+            heapq.heappush(heap, (np.int64(costs[i]), np.int64(sources[i])))
+    while len(heap) > 0:
+        at, cell = heapq.heappop(heap)
+        if cost[cell] >= 0:
+            continue
+        cost[cell] = at
+        if is_target[cell]:
+            left -= 1
+            if left == 0 or not all_targets:
+                break
+        for k in range(8):
+            if moves[cell] >> k & 1 == 0:
+                continue
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
+            step = DIAGONAL if k & 1 else STRAIGHT
+            if units is not None:
+                step *= np.int64(units[cell]) + units[to]
+            further = at + step
+            if cost[to] < 0 and further < best[to]:
+                best[to] = further
+                came[to] = came[cell]
+                heapq.heappush(heap, (further, to))
+    return cost, came
