@@ -12,13 +12,12 @@ from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
 from hybridnav._base.files import printable
-from hybridnav.errors import brief
+from hybridnav.errors import HybridNavError, brief
 
 if TYPE_CHECKING:
     from yaml.nodes import MappingNode, Node
 
     from hybridnav._base.typing import PathLike
-    from hybridnav.errors import HybridNavError
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import frozen
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import greatest_within
 from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.pyramid.kernels.certainty import grow_cores
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 _FOREST = np.int64, np.uint8, np.float64, np.int64, np.uint8
 """Types of the arrays of a forest of cells."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 
 @copies_alike

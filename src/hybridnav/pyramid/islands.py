@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import ByteArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 RIM = 0
 """Label of the occupied ring round the map and of every obstacle that touches it."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass, Frame
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.refine.kernels import motions as kernels
 from hybridnav.refine.kernels.sweep import look_ahead
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.refine.footprint import Footprint
 
 _FARTHEST_CELLS = 5000

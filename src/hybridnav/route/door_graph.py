@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hybridnav._base.moves import STRAIGHT, length_in_cells
-from hybridnav.maps.costs import UNIT_BITS
+from hybridnav.maps.costs import UNIT_BITS, CostLayer
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
 from hybridnav.route.room_fields import RoomFields
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps.costs import CostLayer
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
 

@@ -1,7 +1,5 @@
 """Kernels of a heap of four branches: arrays (n, 2) of keys and values."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

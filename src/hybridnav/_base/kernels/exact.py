@@ -1,7 +1,5 @@
 """Kernels of predicates that rounding cannot change."""
 
-from __future__ import annotations
-
 from hybridnav._base.jit import njit
 
 

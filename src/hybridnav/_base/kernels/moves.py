@@ -2,8 +2,6 @@
 inside fields by them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

@@ -2,8 +2,6 @@
 polyline passes.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -2,8 +2,6 @@
 the levels at which their cells join as they do elsewhere, or survive.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -1,7 +1,5 @@
 """Kernels that grow the fields of places cell by cell, the most certain cells first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

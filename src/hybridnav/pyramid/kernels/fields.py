@@ -6,8 +6,6 @@ surviving cell it was contracted into) and `edge_end` (0: no edge, 255: alive at
 twice the level at which the edge goes, plus one where it is removed and not contracted).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

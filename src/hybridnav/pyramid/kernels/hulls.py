@@ -1,7 +1,5 @@
 """Kernels of convex hulls of receptive fields, as cells, and of distances between fields."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

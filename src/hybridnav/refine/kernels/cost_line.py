@@ -5,8 +5,6 @@ the part of a path, before each of its points; and `at`, int64 (n,), where on th
 point lies.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

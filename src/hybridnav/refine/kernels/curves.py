@@ -7,8 +7,6 @@ turning radii and phi in radians; `sine` and `cosine` are those of phi. The func
 whether to mirror the word and to flip its direction.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Positions are those of `_taut_kernels`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ in a metre. `marks` is uint8 (rows, cols), one of `BLOCKED`, `OPEN` and `STAND`.
 `_sweep_kernels`.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

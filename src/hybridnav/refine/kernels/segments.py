@@ -3,8 +3,6 @@
 Positions are those of `_taut_kernels`: (row, col) in grid units, rounded to 2^-24 of a cell.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ the line of one of its sides. So one heading between each two consecutive critic
 all. Only the cells in the hull of two near headings are tested.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

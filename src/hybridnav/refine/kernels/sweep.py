@@ -16,8 +16,6 @@ free, and not free if its middle state collides. Otherwise it is halved, until m
 than the rounding of positions. Every state in between is covered.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ are rounded to 2^-24 of a cell. Differences of such numbers fit a float64 on any
 cells across, and products are compared with their rounding errors: every turn is decided exactly.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base, geometric
 
-from hybridnav.refine.ompl.client import Reply, Search
+from hybridnav.refine.ompl.client import OmplQuery, Reply, Search
 from hybridnav.refine.ompl.settings import ROADMAPS
 from hybridnav.refine.ompl.solve import StateSpace
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.refine.ompl import OmplSettings
-    from hybridnav.refine.ompl.client import OmplQuery
     from hybridnav.refine.ompl.problem import Base, Clearance, SearchArea
 
 

@@ -1,7 +1,5 @@
 """Kernel of cheapest walks on the arcs of a graph."""
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np

@@ -12,8 +12,6 @@ A *class* groups arcs by the way they leave a corner, and a table states which t
 shortest path may join there: a bend to the wrong side is never on one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

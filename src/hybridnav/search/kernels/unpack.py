@@ -1,7 +1,5 @@
 """Kernels that unpack a path from the records of a search of a contracted graph."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

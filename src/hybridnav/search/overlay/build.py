@@ -14,13 +14,15 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import legal_moves
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs.factors import UNIT_BITS
 from hybridnav.search.overlay.changes import (
     ONE,
+    Change,
     PathsTooLongError,
+    Window,
     are_whole,
     box_within,
     change_in,
@@ -32,20 +34,16 @@ from hybridnav.search.overlay.changes import (
     numbers_of,
     units_of,
 )
-from hybridnav.search.overlay.growth import grow
+from hybridnav.search.overlay.growth import Grown, grow
 from hybridnav.search.overlay.kernels import costs as kernels
 from hybridnav.search.overlay.kernels.gates import gates_of
-from hybridnav.search.overlay.layout import lay_out, slots_of
+from hybridnav.search.overlay.layout import CellCosts, Levels, Top, lay_out, slots_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from contextlib import AbstractContextManager
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.search.overlay.changes import Change, Window
-    from hybridnav.search.overlay.growth import Grown
-    from hybridnav.search.overlay.layout import CellCosts, Levels, Top
 
 TOP_BYTES_PER_CELL = 10.0
 """Most bytes for each cell of the distances over the last level, unless asked otherwise."""

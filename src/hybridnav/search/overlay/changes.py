@@ -10,25 +10,22 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.moves import legal_moves
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs.factors import MOST_FACTOR, UNIT_BITS
 from hybridnav.search.overlay.kernels import gates as _gate_kernels
 from hybridnav.search.overlay.kernels import tables as _table_kernels
 from hybridnav.search.overlay.kernels.lanes import FAR
-from hybridnav.search.overlay.layout import Top, slots_of
+from hybridnav.search.overlay.layout import CellCosts, Levels, Top, slots_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray
-    from hybridnav.search.overlay.layout import CellCosts, Levels
 
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import ByteArray, IntArray
-    from hybridnav.search.overlay.layout import CellCosts, Levels
 
     Window = tuple[slice, slice]
 

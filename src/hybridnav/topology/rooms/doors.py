@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.trig import cos, sin, sines_and_cosines
-from hybridnav.maps import CellClass, RoomLabels
+from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.room_labels import Point
 
 LEAST_DOOR_M = 0.3

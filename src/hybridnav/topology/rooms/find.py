@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.names import Segmentation
 from hybridnav.maps.room_labels import MAX_ROOMS
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 

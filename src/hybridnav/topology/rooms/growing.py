@@ -10,14 +10,13 @@ import numpy as np
 
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.darts import WORST_RANK
+from hybridnav.pyramid.darts import WORST_RANK, Darts
 from hybridnav.topology.rooms.kernels import merging as _merging_kernels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.pyramid.darts import Darts
     from hybridnav.topology.rooms.merging import JudgedSegments
 
     Judge = Callable[[LongArray, FloatArray], FloatArray]

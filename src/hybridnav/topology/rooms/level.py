@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.pyramid.level import LevelArc
 from hybridnav.topology.rooms.doors import (
@@ -24,7 +24,6 @@ from hybridnav.topology.rooms.listing import Listing
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
 
 

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import RoomLabels
     from hybridnav.pyramid import Level
 
 LEAST_WIDTH_M = 1.0

@@ -10,13 +10,12 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.trig import atan2, cos, exp, sin
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray
-    from hybridnav.maps import OccupancyGrid
 
 _PERSISTENCE = 0.8
 """A passage parts two segments when its clearance is below this share of that of either segment."""

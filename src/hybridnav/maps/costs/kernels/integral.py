@@ -4,8 +4,6 @@ Positions are (row, col) in grid units, rounded to 2^-24 of a cell, so that test
 exact.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernel of the clearance objective: length weighted by the crossed cells."""
 
-from __future__ import annotations
-
 import math
 
 from hybridnav._base.jit import njit

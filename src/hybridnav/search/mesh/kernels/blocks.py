@@ -4,8 +4,6 @@ A shortest path passes no convex polygon twice, so it stays in the blocks betwee
 part of the map behind a single polygon is entered only towards an end.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -5,8 +5,6 @@ query are rounded so that every side test is exact (see `turn_of`). Floats choos
 cells, with a margin; side tests alone decide whether a segment meets a cell.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph
 (landmarks). S. Oh, H. W. Leong: Edge N-level sparse visibility graphs, 2017 (taut edges).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Points are (row, col) in grid units: cell (r, c) spans [r, r + 1] x [c, c + 1], 
 numbers.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -6,8 +6,6 @@ on a side is never computed: it is the part of the side between two rays from it
 root and a corner that limits the view, or the mirror image of a root in a corner.
 """
 
-from __future__ import annotations
-
 import math
 
 from hybridnav._base.jit import njit

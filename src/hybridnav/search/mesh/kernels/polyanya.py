@@ -3,8 +3,6 @@
 M. L. Cui, D. D. Harabor, A. Grastien: Compromise-free pathfinding on a navigation mesh, 2017.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

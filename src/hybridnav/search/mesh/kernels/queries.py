@@ -1,7 +1,5 @@
 """Kernels of one query on a mesh: the polygons of its endpoints, the search, and its clean-up."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -9,8 +9,6 @@ Costs of arcs are whole numbers, distances in 1 / `UNITS` cells, rounded down: s
 exact and never exceed the distance.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

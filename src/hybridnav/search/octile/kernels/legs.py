@@ -4,8 +4,6 @@ A leg has moves along one diagonal and along one side next to it, in any order. 
 2 * k where all its moves go in direction k, 2 * k + 1 where they go in k and in k + 1.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -4,8 +4,6 @@ Cells of *dirty* tiles, squares of `SIDE` cells of the framed grid, have codes o
 distances that end with the tile; the tables hold for all others. A ray hops from tile to tile.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

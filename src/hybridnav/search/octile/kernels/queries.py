@@ -1,7 +1,5 @@
 """Kernels of queries on a jump-point graph: the search, and the cells of the path that it finds."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

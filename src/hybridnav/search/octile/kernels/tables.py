@@ -5,8 +5,6 @@ Directions are those of `search.moves`: 0 east (column + 1), 1 north-east, count
 cell is its place in the framed grid.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

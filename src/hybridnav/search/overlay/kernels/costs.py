@@ -1,7 +1,5 @@
 """Kernels of the costs of moves, integers, and of the cells of a field with their moves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

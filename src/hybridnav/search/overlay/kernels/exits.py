@@ -13,8 +13,6 @@ Stored for a field with n nodes, k children, and m nodes of children, in one arr
   distances between exits and the node.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

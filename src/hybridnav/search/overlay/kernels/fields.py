@@ -3,8 +3,6 @@
 The work array `distance`, int32 (rows * cols,), is FAR everywhere before and after each query.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -4,8 +4,6 @@ Each move between fields of the last level leads from or to a gate. They are mos
 side of each border: half of them, with a quarter of the distances.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

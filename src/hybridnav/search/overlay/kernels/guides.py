@@ -1,7 +1,5 @@
 """Kernels of lower bounds on the distances from nodes to a goal, by which searches are guided."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

@@ -5,8 +5,6 @@ A row holds the distances of one cell or node from each source, `distance[LANES 
 vectors by itself: the two steps are written as vector instructions.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from llvmlite import ir

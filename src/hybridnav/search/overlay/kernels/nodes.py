@@ -1,7 +1,5 @@
 """Kernels of searches among nodes: up the levels from a cell, over the top, and over cliques."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

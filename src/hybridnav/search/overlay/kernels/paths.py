@@ -1,7 +1,5 @@
 """Kernels of the nodes of a path, from those of the highest level that it passes downwards."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

@@ -1,7 +1,5 @@
 """Kernel of a query on a multilevel overlay: up the levels, across, and down."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -1,7 +1,5 @@
 """Kernels of the distances inside fields of upper levels, over the cliques of the level below."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -17,7 +17,7 @@ import shapely
 
 from hybridnav._base.yaml_file import Limits, Marked
 from hybridnav.errors import InvalidValueError, RoomsError, brief
-from hybridnav.maps import NO_ROOM
+from hybridnav.maps import NO_ROOM, OccupancyGrid
 from hybridnav.maps.names import check_number
 from hybridnav.maps.occupancy import extent
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 # --- cells that outlines miss ---------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from hybridnav.maps import NO_ROOM, CellClass
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
 from hybridnav.maps.clearance import closing
 from hybridnav.maps.islands import unique_rows
 from hybridnav.topology.rooms.files.straight import straightened
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 
 _SLACK = 1.02

@@ -8,16 +8,14 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.errors import RoomsError
-from hybridnav.maps import NO_ROOM, CellClass
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
 from hybridnav.maps.islands import in_runs, unique_rows
-from hybridnav.topology.rooms.files.entries import NAMELESS
+from hybridnav.topology.rooms.files.entries import NAMELESS, Missed, Outline, Read, Runs
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology.rooms.files.entries import Missed, Outline, Read, Runs
 
 _MOST_PAINTED = 4
 """Most times that outlines may cover the map."""

@@ -16,7 +16,7 @@ from hybridnav.errors import (
     RoomsNotFoundError,
     brief,
 )
-from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.files.image import read_raster
 from hybridnav.maps.names import check_names
 from hybridnav.maps.occupancy import extent
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from hybridnav._base.typing import IntArray, PathLike
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.room_labels import Point
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import yaml
 
 from hybridnav._base.files import printable
-from hybridnav._base.yaml_file import read_marked
+from hybridnav._base.yaml_file import Marked, read_marked
 from hybridnav.errors import HybridNavError, RoomsError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.topology.rooms.files.entries import LIMITS, Outline, Read, read_entries, unpacked
 from hybridnav.topology.rooms.files.read import rooms_of
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from hybridnav._base.typing import PathLike
-    from hybridnav._base.yaml_file import Marked
-    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.room_labels import Point
 
 

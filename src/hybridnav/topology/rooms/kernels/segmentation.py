@@ -2,8 +2,6 @@
 boundary between two segments with the forest that judges it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
