@@ -11,8 +11,15 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output, check_picture, stage, timings
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
+    UsageError,
+    answer,
+    check_output,
+    check_picture,
+    stage,
+    timings,
+)
 from hybridnav.cli.options import (
     GraphFloorOption,
     JsonOption,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hybridnav._base.files import printable, replace_file
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

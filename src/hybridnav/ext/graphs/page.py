@@ -147,7 +147,7 @@ def _rows(report: BuildingGraphReport) -> list[list[str]]:
 def _picture(check: GraphCheck, title: str | None) -> str:
     """Return the picture of a check as the address of an image."""
     from hybridnav.ext.graphs import plot_graph_check  # noqa: PLC0415 - loads matplotlib
-    from hybridnav.viz.save import picture_bytes  # noqa: PLC0415
+    from hybridnav.viz.canvas import picture_bytes  # noqa: PLC0415
 
     axes = plot_graph_check(check, width_in=_WIDTH_IN, title=title)
     drawn = picture_bytes(axes, ".png", dpi=_DPI)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,8 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_writable, extent_line, progress_bar
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
 from hybridnav.cli.options import JsonOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError

@@ -10,10 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Self
 import typer
 
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output
-from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
-from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import BesideRoomsOption, MapOrBuildingArgument
+from hybridnav.cli.common import UsageError, answer, check_output
+from hybridnav.cli.options import (
+    PRESET,
+    BesideRoomsOption,
+    CostsOption,
+    MapOrBuildingArgument,
+    parsed_costs,
+)
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import hybridnav as hn
-    from hybridnav.cli.costs import Costs
+    from hybridnav.cli.options import Costs
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
     from hybridnav.ext.page.rooms_file import RoomsFile
