@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, overload
 
 from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.network import START
+from hybridnav.ext.fleet.links import START
 from hybridnav.ext.fleet.plan import BuildingPlan, Ride, cost_of, stats_of
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.guide import FloorChange, Instruction, Space
@@ -17,7 +17,7 @@ from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
 
 if TYPE_CHECKING:
     from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.network import LinkNetwork, Part
+    from hybridnav.ext.fleet.links import LinkNetwork, Part
     from hybridnav.ext.fleet.search import Endpoint, LinkSearch
     from hybridnav.planner import Path, PlanResult, PlanStats
     from hybridnav.planner.guide.itinerary import Guide

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.network import GOAL, START, ChosenParts
+from hybridnav.ext.fleet.links import GOAL, START, ChosenParts
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.result import PlanDraft
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, IntArray
     from hybridnav.ext.fleet.floors import FloorTable
-    from hybridnav.ext.fleet.network import LinkNetwork, Part
+    from hybridnav.ext.fleet.links import LinkNetwork, Part
     from hybridnav.planner import HybridPlanner
     from hybridnav.planner.named import At
     from hybridnav.search.found import ClosedCells

@@ -12,8 +12,8 @@ from hybridnav.pyramid.cracks import endpoints_of, find_cracks
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from hybridnav.ext.live.identities import Flips
     from hybridnav.ext.live.replay import ReplayStep
-    from hybridnav.ext.live.shift import Flips
     from hybridnav.pyramid import Level
 
 _EVENTS = ("born", "died", "merged", "split")

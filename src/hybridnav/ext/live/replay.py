@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live.identities import Flips, Numbered, flips_between, shift_of
 from hybridnav.ext.live.pyramid import OnlinePyramid
 from hybridnav.ext.live.regions import OnlineRegions
 from hybridnav.ext.live.room_versions import OnlineRooms
-from hybridnav.ext.live.shift import Flips, Numbered, flips_between, shift_of
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.pyramid import DualGraphPyramid

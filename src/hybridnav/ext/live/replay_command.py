@@ -22,7 +22,7 @@ from hybridnav.cli.common import (
 from hybridnav.cli.options import JsonOption, MaxCellsOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
-from hybridnav.ext.live.log_options import open_log
+from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.options import Costs
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
-    from hybridnav.ext.page.rooms_file import RoomsFile
+    from hybridnav.ext.page.session import RoomsFile
 
 
 _ROOMS = "rooms.yaml"
@@ -149,7 +149,7 @@ class MapPage:
         """Read a map, and its rooms."""
         # These load numba, which help and wrong usage can do without.
         import hybridnav as hn  # noqa: PLC0415
-        from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415
+        from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415
 
         preset = PRESET if costs else None
         settings = reading.settings(file, preset=preset, overrides=costs.overrides)
@@ -243,7 +243,7 @@ class BuildingPage:
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
     """Return the files of rooms that a description names in its folder, by floor."""
-    from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415 - loads numpy
+    from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415 - loads numpy
 
     found = {}
     for entry in floors:

@@ -11,8 +11,7 @@ import numpy as np
 from hybridnav._base.files import printable
 from hybridnav.errors import InvalidValueError, MapError, ModelError
 from hybridnav.ext.fleet import Building, Floor
-from hybridnav.ext.fleet.floors import Known
-from hybridnav.ext.fleet.saved import BuildingValues
+from hybridnav.ext.fleet.floors import BuildingValues, Known
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.planner import load_preset

@@ -13,10 +13,16 @@ import numpy as np
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.anchors import Anchor
 from hybridnav.ext.graphs.files.osm_areas import add_area_graph
 from hybridnav.ext.graphs.files.osm_write import ALONE
-from hybridnav.ext.graphs.files.osm_xml import OsmData, OsmWay, Tags, levels_of, read_osm_xml
+from hybridnav.ext.graphs.files.osm_xml import (
+    Anchor,
+    OsmData,
+    OsmWay,
+    Tags,
+    levels_of,
+    read_osm_xml,
+)
 from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count
 from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, shown
 
