@@ -20,7 +20,7 @@ from hybridnav.cli.common import (
     complain,
     exit_code,
 )
-from hybridnav.cli.compiling import notice_of_compiling
+from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.errors import HybridNavError
 
 _HOME_OF = {

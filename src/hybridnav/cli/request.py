@@ -10,9 +10,9 @@ import typer
 
 import hybridnav as hn
 from hybridnav.cli.common import UsageError, complain, islands_figures, stage
-from hybridnav.cli.compiling import compiling_beside
 from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
+from hybridnav.cli.warm import compiling_beside
 
 if TYPE_CHECKING:
     from pathlib import Path

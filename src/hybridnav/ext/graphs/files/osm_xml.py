@@ -9,12 +9,16 @@ from functools import cached_property
 from typing import Any
 from xml.parsers import expat
 
+import numpy as np
+
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.graphs.gather import number_of, shown
+from hybridnav.ext.graphs.gather import number_of, pair_of, shown
 
 # From metres to latitude and longitude, and back.
 
+_DECIMALS = 5
+_INDOOR = ("room", "corridor", "area")
 _EQUATOR_M = 6378137.0
 _SQUARED_ECCENTRICITY = 6.69437999014e-3
 """WGS 84."""
@@ -291,3 +295,51 @@ def levels_of(tags: Tags) -> list[float]:
         if len(found) > _MOST_LEVELS:
             break
     return sorted(level for level in found if not math.isnan(level))
+
+
+def part_of(element: OsmWay) -> str:
+    """Return the list of a floor that an element belongs to, empty for none."""
+    kind = element.tags.get("osmAG:type")
+    if kind == "passage":
+        return "passages"
+    if element.is_closed and (kind == "area" or element.tags.get("indoor") in _INDOOR):
+        return "areas"
+    is_route = (
+        "highway" in element.tags and not element.is_closed and "hybridnav:link" not in element.tags
+    )
+    return "routes" if is_route else ""
+
+
+def title_of(data: OsmData, name: str) -> str:
+    """Return the name of the building that a file has, else `name`."""
+    return next(
+        (t["hybridnav:building"] for t in data.tags.values() if "hybridnav:building" in t), name
+    )
+
+
+def anchor_of(data: OsmData) -> Anchor:
+    """Return the anchor of a file: its root, or the corner of its nodes."""
+    for node, tags in data.tags.items():
+        if tags.get("name") == "root" and node in data.places:
+            heading = number_of(tags.get("hybridnav:heading_deg", 0.0))
+            latitude, longitude = data.places[node]
+            return _clipped(latitude, longitude, 0.0 if math.isnan(heading) else heading)
+    latitude, longitude = np.array(list(data.places.values())).min(axis=0).tolist()
+    return _clipped(latitude, longitude, 0.0)
+
+
+def _clipped(latitude: float, longitude: float, heading: float) -> Anchor:
+    return Anchor(min(max(latitude, -85.0), 85.0), longitude, heading)
+
+
+def points_of(data: OsmData, anchor: Anchor) -> dict[int, tuple[float, float] | None]:
+    """Return the points of the nodes in metres, rounded.
+
+    Else nodes at a wall would lie in it after a round trip, by less than the last decimal of
+    degrees.
+    """
+    points: dict[int, tuple[float, float] | None] = {}
+    for node, place in data.places.items():
+        x, y = anchor.point_of(*place)
+        points[node] = pair_of((round(x, _DECIMALS), round(y, _DECIMALS)))
+    return points
