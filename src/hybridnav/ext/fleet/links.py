@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -179,6 +179,42 @@ class Link:
             When it does not stop at one of the floors.
         """
         return self.cost_m + speed_m_s * self.seconds(from_floor, to_floor)
+
+
+@dataclass(frozen=True)
+class Ride:
+    """One use of a link, from the floor where it is entered to the one where it is left.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Link, LinkEnd, Ride
+    >>> ends = LinkEnd("1", (0.0, 4.0)), LinkEnd("2", (0.5, 4.0))
+    >>> lift = Link(name="west lift", kind="lift", ends=ends, wait_s=20, ride_s=5)
+    >>> Ride(lift, "1", "2", charge_m=12.5).seconds
+    25.0
+    """
+
+    link: Link
+    from_floor: str
+    to_floor: str
+    charge_m: float
+    """What it costs, in metres."""
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of the wait and of the ride."""
+        return self.link.seconds(self.from_floor, self.to_floor)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "link": self.link.name,
+            "kind": self.link.kind,
+            "from_floor": self.from_floor,
+            "to_floor": self.to_floor,
+            "seconds": self.seconds,
+            "charge_m": self.charge_m,
+        }
 
 
 # The ends of links, the rides between them, and the cheapest ways over them.

@@ -1,4 +1,4 @@
-from .figures import ReplayFigures as ReplayFigures
+from .replay import ReplayFigures as ReplayFigures
 from .plot import ReplayAnimation as ReplayAnimation
 from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
 from .regions import OnlineRegions as OnlineRegions, RegionsUpdate as RegionsUpdate

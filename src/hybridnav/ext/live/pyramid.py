@@ -358,3 +358,20 @@ def _joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteA
             first = tiles.parent_of(first)
         joins[edge] = level
     return joins
+
+
+def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
+    """Return bool (rows, cols) of the newer grid, the cells of the older one whose class differs.
+
+    Cells by which the map grew are left out, as updates look at them anyway.
+
+    Raises
+    ------
+    InvalidValueError
+        When the newer grid does not cover the older one, cell on cell.
+    """
+    rows, cols = shift_of(before, after, otherwise="begin a new replay")
+    changed = np.zeros(after.shape, np.bool_)
+    inside = np.s_[rows : rows + before.shape[0], cols : cols + before.shape[1]]
+    changed[inside] = after.classes[inside] != before.classes
+    return changed

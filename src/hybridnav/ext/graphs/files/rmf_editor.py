@@ -1,4 +1,8 @@
-"""Reader of the building maps of Open-RMF's traffic editor, `*.building.yaml`."""
+"""Reader of the building maps of Open-RMF's traffic editor, `*.building.yaml`.
+
+Coordinates and the choice of lanes follow open-rmf/rmf_traffic_editor,
+`rmf_building_map_tools/building_map`: `building.py`, `level.py`, `lift.py`, `transform.py`.
+"""
 
 from __future__ import annotations
 
