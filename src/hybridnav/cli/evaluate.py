@@ -10,10 +10,8 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, complain, progress_bar
-from hybridnav.cli.costs import parsed_costs
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
-from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
+from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, answer, complain, progress_bar
+from hybridnav.cli.options import GraphFloorOption, MaxCellsOption, parsed_costs
 from hybridnav.cli.reading import read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
