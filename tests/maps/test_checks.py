@@ -27,7 +27,7 @@ JUDGES: Any = CheapestCost
 OPTIONS: Any = OverlayOptions
 PREPARE: Any = prepare_overlay
 PLANNERS: Any = hn.HybridPlanner
-BUILD: Any = hn
+BUILD: Any = hn.ext.graphs
 CARRY: Any = carry_costs
 GRAPH = hn.ext.graphs.build_route_graph(TOPOLOGY)
 
