@@ -20,7 +20,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, matches, option, read
-from hybridnav.ext.graphs.checked_components import components_of
+from hybridnav.ext.graphs.waypoint_graph import components_of
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.tables import to_markdown
 from hybridnav.maps.geometry import walks_clear

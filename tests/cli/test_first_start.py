@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hybridnav.cli import compiling
-from hybridnav.cli.compiling import notice_of_compiling
+from hybridnav.cli import warm
+from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.planner import load_preset
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
@@ -99,16 +99,16 @@ def test_a_second_process_compiles_what_a_first_plan_searches_with(
     monkeypatch: pytest.MonkeyPatch, preset: str, processors: int, start: str, jobs: list[str]
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(compiling, "processors", lambda: processors)
-    monkeypatch.setattr(compiling, "_is_kept", lambda _: start == "warm")
-    monkeypatch.setattr(compiling, "start", begun.append)
-    with compiling.compiling_beside(load_preset(preset)) as compiled:
+    monkeypatch.setattr(warm, "processors", lambda: processors)
+    monkeypatch.setattr(warm, "_is_kept", lambda _: start == "warm")
+    monkeypatch.setattr(warm, "start", begun.append)
+    with warm.compiling_beside(load_preset(preset)) as compiled:
         compiled()
     assert begun == jobs
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
-@pytest.mark.skipif(compiling.processors() == 1, reason="one processor compiles alone")
+@pytest.mark.skipif(warm.processors() == 1, reason="one processor compiles alone")
 def test_ctrl_c_ends_the_process_that_compiles(tmp_path: Path) -> None:
     with started(tmp_path) as process:
         wait_until(lambda: compilers(tmp_path))

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridnav.cli.common import check_writable
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError, check_writable
 
 MAPS = Path(__file__).parents[2] / "maps"
 FIGURE = MAPS / "figure1" / "figure1.yaml"

@@ -12,9 +12,15 @@ from typer.core import TyperGroup
 
 import hybridnav as hn
 from hybridnav._base.extension import extension, extensions
-from hybridnav.cli.common import answer, complain
-from hybridnav.cli.compiling import notice_of_compiling
-from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
+from hybridnav.cli.common import (
+    EXIT_SOLVED,
+    EXIT_UNREADABLE,
+    EXIT_USAGE,
+    answer,
+    complain,
+    exit_code,
+)
+from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.errors import HybridNavError
 
 _HOME_OF = {
@@ -24,7 +30,7 @@ _HOME_OF = {
     "rooms": "rooms",
     "evaluate": "evaluate",
     "compare": "evaluate",
-    "preset": "presets",
+    "preset": "show",
 }
 """The module of each command of this package, in the order of the help; others are registered."""
 

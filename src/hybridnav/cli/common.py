@@ -1,4 +1,4 @@
-"""Shared parts of commands: reading settings and maps, and talking to the user."""
+"""Shared parts of commands: exit codes, errors of a command line, and talking to the user."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import hybridnav as hn
 from hybridnav._base.files import check_replaceable, printable, without_controls
 from hybridnav._base.progress import no_progress
-from hybridnav.cli.errors import UsageError
+from hybridnav.errors import HybridNavError, MapError, PresetError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,6 +21,24 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._base.progress import Progress
+
+EXIT_SOLVED = 0
+EXIT_NOT_SOLVED = 1
+EXIT_USAGE = 2
+EXIT_UNREADABLE = 3
+
+
+class UsageError(HybridNavError):
+    """The command line itself asks for something impossible."""
+
+
+def exit_code(error: HybridNavError) -> int:
+    """Return the exit code of a command that ended in this error."""
+    return EXIT_UNREADABLE if isinstance(error, (MapError, PresetError)) else EXIT_USAGE
+
+
+# What a command writes, and checks of where it writes.
+
 
 _SMOOTH = ("none", "line-of-sight", "arcs")
 _PICTURES = (".pdf", ".png", ".svg")

@@ -10,10 +10,8 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, complain, progress_bar
-from hybridnav.cli.costs import parsed_costs
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
-from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
+from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, answer, complain, progress_bar
+from hybridnav.cli.options import GraphFloorOption, MaxCellsOption, parsed_costs
 from hybridnav.cli.reading import read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
@@ -180,7 +178,7 @@ def evaluate(
         raise UsageError(
             "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
         )
-    from hybridnav.harness.names import read_methods  # noqa: PLC0415
+    from hybridnav.harness.names import load_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -204,7 +202,7 @@ def evaluate(
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
         graphs=tuple(_graph(file, floor) for file in graph or ()),
-        methods=() if methods is None else read_methods(methods),
+        methods=() if methods is None else load_methods(methods),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,

@@ -1,9 +1,22 @@
-"""Arguments and options that several commands take."""
+"""Arguments and options that several commands take, with what `--costs` and `--blocked` mean."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from hybridnav._base.files import printable
+from hybridnav.cli.common import UsageError
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    import hybridnav as hn
+    from hybridnav.maps.costs.files import CostSpec
 
 MapArgument = Annotated[
     Path,
@@ -105,3 +118,173 @@ BesideRoomsOption = Annotated[
         "--rooms", metavar="FILE", help="Rooms as YAML; else rooms.yaml beside the map, if there."
     ),
 ]
+
+# The option `--costs`: clearance, and masks of Nav2.
+
+
+CostsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--costs",
+        metavar="WHAT",
+        help="Plan the cheapest path, by clearance[:KEY=VALUE,...], speed:FILE[,KEY=VALUE,...] or "
+        "keepout:FILE[,KEY=VALUE,...] (masks of Nav2); may be repeated.",
+    ),
+]
+
+PRESET = "grid-astar"
+"""The preset that plans by costs unless another is named."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What a command line states about costs."""
+
+    overrides: tuple[str, ...] = ()
+    """Settings of the preset."""
+    masks: tuple[CostSpec, ...] = ()
+    """Masks."""
+
+    def __bool__(self) -> bool:
+        """Return whether there are any."""
+        return bool(self.overrides or self.masks)
+
+    def read(self, grid: hn.OccupancyGrid) -> hn.CostLayer | None:
+        """Read the masks, on the cells of a map; None for no masks."""
+        layers = [mask.layer(grid) for mask in self.masks]
+        return reduce(or_, layers) if layers else None
+
+
+def parsed_costs(specs: list[str] | None) -> Costs:
+    """Return what the options `--costs` state.
+
+    Raises
+    ------
+    UsageError
+        When one of them has another form.
+    """
+    from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
+
+    try:
+        found = parse_costs(specs or ())
+    except InvalidValueError as error:
+        raise UsageError(f"--{error}") from None
+    overrides: list[str] = []
+    for spec in found:
+        if spec.kind == "clearance":
+            overrides.append("planner.costs.clearance={}")
+            overrides += [
+                f"planner.costs.clearance.{key}={spec.settings[key]!r}" for key in spec.settings
+            ]
+    return Costs(tuple(overrides), tuple(spec for spec in found if spec.kind != "clearance"))
+
+
+# The option `--blocked`: closed doors and rooms, obstacles and keepout zones.
+
+
+BlockedOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--blocked",
+        metavar="WHAT",
+        help="Close door:N, room:NAME, or the areas of a GeoJSON FILE or mask: obstacles, off "
+        "which the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre "
+        "alone, as Nav2 takes its masks. May be repeated.",
+    ),
+]
+
+
+_KINDS = frozenset({"door", "room", "keepout"})
+
+
+@dataclass(frozen=True)
+class Closing:
+    """The closures of a command line."""
+
+    given: tuple[str, ...] = ()
+    """As it was given, printable."""
+    doors: tuple[int, ...] = ()
+    rooms: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    masks: tuple[CostSpec, ...] = ()
+    """Files of zones for the centre of the robot."""
+
+    @property
+    def needs_rooms(self) -> bool:
+        """Whether the closures make sense only on a map with rooms."""
+        return bool(self.doors or self.rooms)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the closures as plain values for JSON: null for none."""
+        return {"blocked": list(self.given) or None}
+
+    def read(self, grid: hn.OccupancyGrid) -> hn.Blocked | None:
+        """Read the files and join all closures; return None for none."""
+        if not self.given:
+            return None
+        # They load shapely.
+        from hybridnav.planner import Blocked, load_blocked  # noqa: PLC0415
+
+        closed = Blocked(doors=self.doors, rooms=self.rooms)
+        for path in self.files:
+            closed |= load_blocked(path, grid)
+        for mask in self.masks:
+            closed |= load_blocked(mask.file, grid, keepout=True, pose=mask.pose)
+        return closed
+
+
+def closing_lines(figures: dict[str, Any]) -> list[str]:
+    """Return the line of a summary about closures, if there are any."""
+    closed = figures.get("blocked")
+    return [f"blocked    {', '.join(closed)}"] if closed else []
+
+
+def parsed_closing(texts: list[str] | None) -> Closing:
+    """Read the values of the option.
+
+    Raises
+    ------
+    UsageError
+        When a door has no number, a room or a file no name, or a mask other settings.
+    """
+    doors, rooms, files, masks = [], [], [], []
+    for text in texts or ():
+        kind, colon, name = text.partition(":")
+        if not text or (colon and kind in _KINDS and not name.strip()):
+            kinds = "door:N, room:NAME, keepout:FILE"
+            raise UsageError(f"--blocked must be {kinds} or a file, got {text!r:.80}")
+        if colon and kind == "door":
+            doors.append(_number(name))
+        elif colon and kind == "room":
+            rooms.append(name)
+        elif colon and kind == "keepout":
+            masks.append(_mask(text))
+        else:
+            files.append(Path(text))
+    given = tuple(map(printable, texts or ()))
+    return Closing(given, tuple(doors), tuple(rooms), tuple(files), tuple(masks))
+
+
+def _mask(text: str) -> CostSpec:
+    from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
+
+    try:
+        (mask,) = parse_costs([text])
+    except InvalidValueError as error:
+        raise UsageError(f"--blocked: {str(error).removeprefix('costs ')}") from None
+    if "multiplier" in mask.settings:
+        raise UsageError(
+            "--blocked keepout takes x, y and yaw, as closed cells have no cost, got multiplier: "
+            "leave it out, or plan by --costs"
+        )
+    return mask
+
+
+def _number(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise UsageError(
+            f"--blocked door: expected the number of a door, as hybridnav rooms MAP --plot draws "
+            f"it, got {text!r:.80}"
+        ) from None

@@ -9,30 +9,32 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hybridnav._base.extension import extension
-from hybridnav.cli.alternatives import (
+from hybridnav.cli.build import KeepInOption, KeepOption, Source
+from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_output, check_picture
+from hybridnav.cli.options import (
+    PRESET,
+    BesideRoomsOption,
+    BlockedOption,
+    CostsOption,
+    JsonOption,
+    MapOrBuildingArgument,
+    PlotOption,
+    SmoothOption,
+    parsed_closing,
+    parsed_costs,
+)
+from hybridnav.cli.reading import MapOptions, with_map
+from hybridnav.cli.request import (
     AlternativesOption,
     ByOption,
     InsideOption,
     LeastHoleOption,
     OverlapOption,
+    Request,
     StretchOption,
     check_refiner,
     wanted_of,
 )
-from hybridnav.cli.blocked import BlockedOption, parsed_closing
-from hybridnav.cli.common import check_new, check_output, check_picture
-from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
-from hybridnav.cli.keep import KeepInOption, KeepOption, Source
-from hybridnav.cli.options import (
-    BesideRoomsOption,
-    JsonOption,
-    MapOrBuildingArgument,
-    PlotOption,
-    SmoothOption,
-)
-from hybridnav.cli.reading import MapOptions, with_map
-from hybridnav.cli.request import Request
 from hybridnav.errors import brief
 from hybridnav.maps.names import read_point
 from hybridnav.planner.guide import check_language, languages

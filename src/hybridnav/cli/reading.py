@@ -14,8 +14,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import MODEL_SUFFIX, printable
-from hybridnav.cli.common import check_writable, complain, stage
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError, check_writable, complain, stage
 from hybridnav.cli.options import (
     FreeOption,
     LeastIslandOption,
@@ -31,7 +30,7 @@ from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from hybridnav.cli.blocked import Closing
+    from hybridnav.cli.options import Closing
     from hybridnav.planner import Preset
 
 _SMOOTH = ("none", "line-of-sight", "arcs")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.blocked import closing_lines
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
+from hybridnav.cli.options import closing_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

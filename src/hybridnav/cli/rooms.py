@@ -11,8 +11,17 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output, check_picture, islands_line, stage, timings
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
+from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
+    EXIT_SOLVED,
+    UsageError,
+    answer,
+    check_output,
+    check_picture,
+    islands_line,
+    stage,
+    timings,
+)
 from hybridnav.cli.options import JsonOption, MapArgument, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass

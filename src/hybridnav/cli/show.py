@@ -1,4 +1,4 @@
-"""`hybridnav show`: the parts of a map and of its pyramid."""
+"""Commands that print what there is: the parts of a map and of its pyramid, and presets."""
 
 from __future__ import annotations
 
@@ -8,10 +8,16 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_picture, extent_line, islands_line, timings
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import (
+    UsageError,
+    answer,
+    check_picture,
+    extent_line,
+    islands_line,
+    timings,
+)
 from hybridnav.cli.options import MapArgument, PlotOption
-from hybridnav.cli.reading import MapOptions, grow_topology, load_model, with_map
+from hybridnav.cli.reading import MapOptions, grow_topology, load_model, read_preset, with_map
 
 LevelOption = Annotated[
     int | None,
@@ -152,3 +158,39 @@ def _describe_guesses(level: hn.Level, guess_below: float | None) -> str:
         f"\ncertainty  {guesses:,} of {level.n_arcs:,} arcs are guesses: "
         f"a threshold moved by less than {guess_below:g} ends them"
     )
+
+
+# `hybridnav preset`: list, print and check presets.
+
+
+preset = typer.Typer(
+    name="preset",
+    help="List, print and check presets.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+PresetArgument = Annotated[
+    str, typer.Argument(metavar="NAME|FILE", help="A preset's name or its YAML file.")
+]
+
+
+@preset.command("list")
+def list_presets() -> None:
+    """List the presets that come with the package."""
+    names = hn.preset_names()
+    width = max(map(len, names), default=0)
+    answer("".join(f"{name:<{width}}  {hn.load_preset(name).description}\n" for name in names))
+
+
+@preset.command("show")
+def show_preset(source: PresetArgument) -> None:
+    """Print a preset in full, every key present."""
+    answer(read_preset(source).to_yaml())
+
+
+@preset.command("check")
+def check_preset(source: PresetArgument) -> None:
+    """Check a preset; an error names the key."""
+    answer(f"{read_preset(source).name}: valid\n")

@@ -19,7 +19,7 @@ from jinja2 import Environment, StrictUndefined
 from PIL import Image
 
 from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
-from hybridnav.viz.save import picture_bytes
+from hybridnav.viz.canvas import picture_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -1,25 +1,33 @@
-"""Levels of a pyramid side by side: fields that grow, and the graph over them."""
+"""Pictures of how a pyramid grows.
+
+Its levels side by side, and the arcs that are contracted and removed in one step.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
-from hybridnav.viz.layout import add_title, frame_axes, wrapped
+from hybridnav.viz.layout import add_title, finish, frame_axes, wrapped
 from hybridnav.viz.places import Places
-from hybridnav.viz.topology import Graph, draw_graph, draw_ground
+from hybridnav.viz.topology import Graph, draw_graph, draw_ground, drawable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.viz.layout import Entry
 
 GRAPH_UP_TO = 150
 """Most vertices of a panel with a graph: more would cover their own fields."""
@@ -120,3 +128,135 @@ def _panels(levels: Sequence[Level], columns: int, width_in: float) -> list[Axes
         box = left_in / width_in, bottom_in / height_in, panel_in / width_in, tall_in / height_in
         axes.append(figure.add_axes(box))
     return axes
+
+
+# One step of a pyramid: contracted and removed arcs.
+
+
+_CLEARANCE = 2.4  # points on a picture of full width
+_CONTRACTED, _REMOVED, _KEPT = "contraction kernel", "removal kernel", "arc of the next level"
+_STROKES = {
+    _KEPT: (style.RIM_ARC, 0.8, "solid"),
+    _REMOVED: (style.HOLE, 1.3, (0, (2.2, 1.4))),
+    _CONTRACTED: (style.INK, 2.4, "solid"),
+}
+_DOTS = {"surviving": (5.6, style.INK), "not surviving": (4.4, style.FREE)}
+
+
+def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
+    pyramid: DualGraphPyramid,
+    level: int,
+    *,
+    ax: Axes | None = None,
+    removed: bool = True,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the step from a level to the next one: the paper's Fig. 2 for any map.
+
+    Thick lines are contracted arcs: each is a spoke of a star, whose centre, a black dot, survives.
+    Dashed arcs are redundant after that, and removed; thin ones are the arcs of the next level.
+    Each colour is the field of one vertex of the next level, a reduction window.
+
+    Parameters
+    ----------
+    pyramid
+        The pyramid.
+    level
+        Index of the lower of the two levels; negative ones count from the apex.
+    ax
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
+    removed
+        Whether to draw the removed arcs.
+    title
+        Title instead of the counts; empty for none.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    IndexError
+        When there is no such level, or none above it.
+    InvalidValueError
+        When the level has more than 20,000 vertices.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_kernels
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> plot_kernels(pyramid, 2, title="level 2 to 3").get_title()
+    'level 2 to 3'
+    """
+    lower = drawable(pyramid[level])
+    upper = pyramid[lower.index + 1]
+    canvas = Canvas.opened(ax, width_in, known_view(lower.grid))
+    draw_ground(canvas, lower.grid, upper.field_of, Places(upper).colours(), style.PALE * 2)
+    graph = Graph(lower, 0.0)
+    kinds = _kinds(pyramid, lower.index, lower.n_arcs)
+    if not removed:
+        kinds[_REMOVED][:] = False
+    curves = graph.curves(_CLEARANCE * canvas.sizes.line / canvas.sizes.points_per_metre)
+    for label, (colour, width, dashes) in _STROKES.items():
+        arcs = np.flatnonzero(kinds[label]).tolist()
+        canvas.add_lines(
+            [curves[arc] for arc in arcs if arc in curves],
+            colors=colour,
+            linewidths=width * canvas.sizes.line,
+            linestyles=[dashes],
+            zorder=3,
+            gid=label.replace(" ", "-"),
+        )
+    cols = lower.grid.shape[1]
+    survives = np.isin(lower.cells @ [cols, 1], upper.cells @ [cols, 1])
+    _draw_dots(canvas, graph.positions, survives, lower.classes == CellClass.FREE)
+    n_gone, n_removed = (int(kinds[label].sum()) for label in (_CONTRACTED, _REMOVED))
+    words = [
+        f"level {lower.index} to {upper.index}: {lower.n_vertices} to {upper.n_vertices} vertices",
+        f"{n_gone} arcs contracted",
+        *([f"{n_removed} removed"] if removed else []),
+    ]
+    entries = _entries(canvas, kinds, survives)
+    return finish(canvas, entries, words if title is None else [title], framed=True)
+
+
+def _kinds(pyramid: DualGraphPyramid, level: int, n_arcs: int) -> dict[str, BoolArray]:
+    """Return the masks of the arcs of a level: contracted, removed, kept."""
+    masks = {label: np.zeros(n_arcs, dtype=np.bool_) for label in _STROKES}
+    masks[_CONTRACTED][pyramid.contraction_kernel(level)] = True
+    masks[_REMOVED][pyramid.removal_kernel(level)] = True
+    masks[_KEPT] = ~masks[_CONTRACTED] & ~masks[_REMOVED]
+    return masks
+
+
+def _draw_dots(canvas: Canvas, at: FloatArray, survives: BoolArray, free: BoolArray) -> None:
+    for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
+        edges = [style.INK if is_free else style.UNEXPLORED_NODE for is_free in free[mask]]
+        fill = edges if label == "surviving" else face
+        canvas.ax.scatter(
+            at[mask, 0],
+            at[mask, 1],
+            s=(size * canvas.sizes.line) ** 2,
+            c=fill,
+            edgecolors=edges,
+            linewidths=0.9 * canvas.sizes.line,
+            zorder=4,
+            gid=label.replace(" ", "-"),
+        )
+
+
+def _entries(canvas: Canvas, kinds: dict[str, BoolArray], survives: BoolArray) -> list[Entry]:
+    line = canvas.sizes.line
+    entries: list[Entry] = []
+    for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
+        if mask.any():
+            dot = Line2D([], [], ls="", marker="o", ms=size * line, mfc=face, mec=style.INK)
+            entries.append((dot, f"{label} vertex"))
+    for label, (colour, width, dashes) in reversed(_STROKES.items()):
+        if kinds[label].any():
+            entries.append((Line2D([], [], color=colour, lw=width * line, ls=dashes), label))
+    return entries

@@ -1,25 +1,43 @@
-"""Pictures of maps and of the levels of their pyramids."""
+"""Pictures of maps, of the levels of their pyramids, and of the costs of their cells."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
+from hybridnav.maps.checks import checked_points
+from hybridnav.planner.blocked import as_blocked
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import finish_with_axes
+from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
+from hybridnav.viz.layout import (
+    LABELS,
+    add_legend,
+    add_title,
+    finish_with_axes,
+    fit_height,
+    label_axes,
+)
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
+    from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner.blocked import Closable
     from hybridnav.pyramid import Level
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes
@@ -203,3 +221,208 @@ def arc_handle(sizes: Sizes) -> Line2D:
     """Return the legend handle for an arc between two positions."""
     line = 0.9 * sizes.line
     return Line2D([], [], color=style.ARC, lw=line, marker="o", ms=3 * sizes.line, mfc=style.INK)
+
+
+# Pictures of costs: the factor of each cell.
+
+
+_LEVELS = 254
+"""Colours of factors; two more are those of closed and unexplored cells."""
+_DECADE = 10.0
+"""Factor beyond which colours follow the logarithm."""
+_CLOSED = "#7b3294"
+_SHADES = (0.1, 0.33, 0.6, 0.85)
+"""Parts of the colour map that follow white: its darkest end would look like a wall."""
+_PALE = 0.55
+"""Part of white in these colours where paths are drawn over them."""
+_LEAST_SHADE, _CLOSED_ALPHA = 0.1, 190
+"""Opacity of the least cost above 1, as a share, and of closed cells, of 255."""
+_LEAST_CLOSED_POINTS = 3.0
+"""Least breadth of what is closed, in points."""
+_BAR, _BAR_HEIGHT = 3.0, 0.8
+"""Heights of the colour bar with its labels and of the bar itself, in font sizes."""
+_TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+_BAR_LEFT, _BAR_WIDTH = 0.3, 0.4
+"""Place of the bar below the map, in widths of the map."""
+_PATHS = ("#0b3c8c", "#007f5f", *style.ROUTES[2:])
+"""Colours of paths: the red of other pictures would vanish on costs."""
+
+
+def draw_query(
+    canvas: Canvas, topology: TopologicalMap, costs: CostLayer | None, blocked: Closable | None
+) -> list[Entry]:
+    """Draw what a query was planned with over the cells: costs as shades, closed cells.
+
+    Parameters
+    ----------
+    canvas
+        Canvas on which the cells are drawn.
+    topology
+        The map.
+    costs
+        Costs of its cells; the more a metre costs, the less of the cell shows through.
+    blocked
+        Closures of the query.
+
+    Returns
+    -------
+    list of Entry
+        Entries of the legend.
+    """
+    grid = topology.grid
+    entries: list[Entry] = []
+    is_open = grid.classes != CellClass.OCCUPIED
+    is_closed = np.zeros(grid.shape, dtype=np.bool_)
+    if costs is not None:
+        costs.check_fits(grid)
+        scale = _scale_of(grid, costs)
+        at = np.where(
+            grid.classes == CellClass.FREE, np.asarray(scale(costs.factors)).clip(0, 1), 0.0
+        )
+        table = np.round(colormaps["YlOrRd"](np.linspace(0.2, _SHADES[-1], _LEVELS)) * 255)
+        shades = table.astype(np.uint8)[np.round(at * (_LEVELS - 1)).astype(np.intp)]
+        shades[..., 3] = np.where(at > 0, 255 * (_LEAST_SHADE + (1 - _LEAST_SHADE) * at), 0)
+        draw_shades(canvas, grid, shades, gid="costs")
+        text = f"a metre costs up to {scale.vmax:.3g}"
+        entries.append((Patch(fc=colormaps["YlOrRd"](_SHADES[-1])), text))
+        is_closed.flat[costs.inflated(grid).closed_flat] = True
+    if blocked is not None:
+        is_closed.ravel()[as_blocked(blocked).cells_of(topology)] = True
+    is_closed &= is_open
+    if is_closed.any():
+        # A closed door may be a single cell: everything closed is seen on the page.
+        cell_points = grid.resolution_m * canvas.sizes.points_per_metre
+        is_closed = _wider(is_closed, int(_LEAST_CLOSED_POINTS / cell_points / 2)) & is_open
+        shades = np.zeros((*grid.shape, 4), dtype=np.uint8)
+        shades[is_closed] = (*style.rgb(_CLOSED)[0].tolist(), _CLOSED_ALPHA)
+        draw_shades(canvas, grid, shades, gid="closed")
+        entries.append((Patch(fc=_CLOSED), "closed"))
+    return entries
+
+
+def _wider(cells: BoolArray, steps: int) -> BoolArray:
+    """Return cells with those at most some steps away from them."""
+    from scipy import ndimage  # noqa: PLC0415 - most pictures show nothing that is closed
+
+    if not steps:
+        return cells
+    wider: BoolArray = ndimage.binary_dilation(cells, iterations=steps)
+    return wider
+
+
+def _scale_of(grid: OccupancyGrid, layer: CostLayer) -> Normalize:
+    """Return the scale of factors: logarithmic beyond 10."""
+    most = float(layer.factors[grid.classes == CellClass.FREE].max(initial=1.0))
+    most = max(most, 1.0 + 1e-3)
+    return LogNorm(1.0, most) if most > _DECADE else Normalize(1.0, most)
+
+
+def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
+    grid: OccupancyGrid,
+    layer: CostLayer,
+    *,
+    paths: Mapping[str, ArrayLike] | None = None,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the factors of the free cells as colours with a bar, over the walls of a map.
+
+    Parameters
+    ----------
+    grid
+        The map. The picture is cropped to its known part; its axes are metres of the map frame.
+    layer
+        Costs of its cells. White is the factor 1; closed cells have a colour of their own. If a
+        factor is above 10, colours follow the logarithm. They are paler below paths.
+    paths
+        Paths to draw by their labels, `(x, y)` in metres, shape (n, 2) each, at most 5; None for
+        none.
+    ax
+        Axes to draw on; by default new ones in a new figure.
+    title
+        Title instead of the map's name and the range of factors; empty for none.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When the layer is one of another map, or a path is no finite array of shape (n, 2).
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_costs
+    >>> grid = hn.example_map("figure1")
+    >>> ax = plot_costs(grid, hn.CostLayer.clearance(grid), title="clearance")
+    >>> ax.get_title()
+    'clearance'
+    """
+    layer.check_fits(grid)
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    scale = _scale_of(grid, layer)
+    strong = colormaps["YlOrRd"](_SHADES)[:, :3]
+    colours_of_costs = [style.FREE, *(_PALE + (1 - _PALE) * strong if paths else strong)]
+    shades = LinearSegmentedColormap.from_list("factors", colours_of_costs)
+    drawn = np.round(scale(layer.factors).clip(0, 1) * (_LEVELS - 1)).astype(np.uint8)
+    drawn[grid.classes == CellClass.UNEXPLORED] = _LEVELS
+    drawn.flat[layer.closed_flat] = _LEVELS + 1
+    levels = np.round(shades(np.linspace(0, 1, _LEVELS))[:, :3] * 255).astype(np.uint8)
+    colours = np.concatenate([levels, style.rgb(style.UNEXPLORED, _CLOSED)])
+    draw_cells(canvas, grid, drawn, colours)
+    entries = ground_entries(grid)
+    if (grid.classes == CellClass.UNEXPLORED).any():
+        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
+    if len(layer.closed_flat):
+        entries.append((Patch(fc=_CLOSED), "closed"))
+    entries += _draw_paths(canvas, paths or {})
+    words = [grid.name, f"metres cost 1 to {scale.vmax:.3g} times as much"]
+    _finish(canvas, entries, words if title is None else [title], ScalarMappable(scale, shades))
+    return canvas.ax
+
+
+def _draw_paths(canvas: Canvas, paths: Mapping[str, ArrayLike]) -> list[Entry]:
+    """Draw paths as lines with a pale rim; return their legend entries."""
+    if len(paths) > len(_PATHS):
+        raise InvalidValueError(
+            f"at most {len(_PATHS)} paths can be drawn, got {len(paths)}: draw fewer"
+        )
+    entries: list[Entry] = []
+    for (label, points), colour in zip(paths.items(), _PATHS, strict=False):
+        line = checked_points(points)
+        width = 1.6 * canvas.sizes.line
+        canvas.add_lines([line], colors=style.FREE, linewidths=2.2 * width, zorder=6)
+        canvas.add_lines([line], colors=colour, linewidths=width, zorder=7, gid="path")
+        entries.append((Line2D([], [], color=colour, lw=width), label))
+    return entries
+
+
+def _finish(canvas: Canvas, entries: list[Entry], words: list[str], shown: ScalarMappable) -> None:
+    """Add the title, axes in metres, legend and colour bar."""
+    ax, font = canvas.ax, canvas.sizes.font
+    label_axes(canvas)
+    add_title(canvas, words)
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=(LABELS + _BAR) * font))
+    points = float(ax.get_window_extent().height) * 72 / ax.figure.dpi
+    place = (
+        _BAR_LEFT,
+        -(LABELS + _BAR_HEIGHT) * font / points,
+        _BAR_WIDTH,
+        _BAR_HEIGHT * font / points,
+    )
+    bar = ax.figure.colorbar(
+        shown, cax=ax.inset_axes(place), orientation="horizontal", format="{x:g}"
+    )
+    if isinstance(shown.norm, LogNorm):
+        bar.set_ticks([tick for tick in _TICKS if tick <= (shown.norm.vmax or 1)])
+        bar.minorticks_off()
+    bar.ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
+    bar.ax.text(
+        -0.03, 0.5, "factor", transform=bar.ax.transAxes, fontsize=font, ha="right", va="center"
+    )
+    bar.outline.set_linewidth(0.6)

@@ -16,10 +16,9 @@ from hybridnav.planner import COST_METRICS
 from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
-from hybridnav.viz.costs import draw_query
 from hybridnav.viz.labels import Marker, draw_markers
 from hybridnav.viz.layout import finish
-from hybridnav.viz.maps import arc_handle, ground_entries, swatch
+from hybridnav.viz.maps import arc_handle, draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from hybridnav.maps.islands import unique_rows
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.layout import finish_with_axes
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.places import colour_vertices
-from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

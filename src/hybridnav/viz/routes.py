@@ -11,13 +11,11 @@ from matplotlib.lines import Line2D
 from hybridnav.planner import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.costs import draw_query
-from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
+from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import finish
-from hybridnav.viz.maps import ground_entries, swatch
+from hybridnav.viz.maps import draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places
 from hybridnav.viz.room_map import DOOR_POINTS, draw_doors, draw_room_cells, room_entry
-from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

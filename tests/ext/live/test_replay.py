@@ -15,8 +15,8 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlineRooms, ReplayFigures, grids_of_scans, replay
-from hybridnav.ext.live.figures import faults_of
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser
+from hybridnav.ext.live.replay import faults_of
 from hybridnav.maps import Frame, OccupancyGrid
 from tests.ext.live.test_regions import check_events as check_regions_update
 from tests.ext.live.test_regions import check_levels, check_partition

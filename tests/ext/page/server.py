@@ -15,10 +15,9 @@ import numpy as np
 import hybridnav as hn
 from hybridnav.cli.reading import MapOptions
 from hybridnav.ext.page import Session, Site
-from hybridnav.ext.page.app import make_app
+from hybridnav.ext.page.app import make_app, make_server
 from hybridnav.ext.page.command import BuildingPage
-from hybridnav.ext.page.connections import make_server
-from hybridnav.ext.page.rooms_file import RoomsFile
+from hybridnav.ext.page.session import RoomsFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

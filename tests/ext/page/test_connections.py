@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.page import connections, serve
+from hybridnav.ext.page import app, serve
 from tests.ext.page.server import TOKEN, folder_in, served, site_of
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def client(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> Iterator[Client]:
     """A server that waits for half a second, and must say nothing."""
-    monkeypatch.setattr(connections, "REQUEST_S", 0.5)
+    monkeypatch.setattr(app, "REQUEST_S", 0.5)
     folder = folder_in(tmp_path)
     with served(site_of(folder / "four.yaml"), folder) as client:
         yield client
@@ -60,12 +60,12 @@ def is_over(connection: socket.socket) -> bool:
 def test_the_page_answers_beside_four_hundred_connections_that_wait(
     client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "REQUEST_S", 600.0)
+    monkeypatch.setattr(app, "REQUEST_S", 600.0)
     with ExitStack() as stack:
         made = [stack.enter_context(opened(client, HEAD)) for _ in range(400)]
         assert client.get("floor/0/map.json").code == 200
         still = [one for one in made if not is_over(one)]
-        assert 0 < len(still) <= connections.MOST_CONNECTIONS
+        assert 0 < len(still) <= app.MOST_CONNECTIONS
         # Those that have waited longest go first.
         assert still == made[-len(still) :]
 

@@ -73,7 +73,7 @@ def test_a_change_that_is_refused_is_said_and_stays_said(shown: Shown) -> None:
 def test_a_level_of_too_many_vertices_says_so_until_another_is_chosen(
     shown: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hybridnav.ext.page.graph.MOST_VERTICES", 100)
+    monkeypatch.setattr("hybridnav.ext.page.drawing.MOST_VERTICES", 100)
     assert client.get("floor/0/graph/0.json").value["drawn"] is False
     shown.page.select_option("#colours", "level")
     shown.page.check("#show-graph")

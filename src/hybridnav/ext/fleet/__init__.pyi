@@ -1,5 +1,5 @@
 from .align import align_floors as align_floors, moved_floor as moved_floor
-from .answers import BuildingAlternatives as BuildingAlternatives
+from .plan import BuildingAlternatives as BuildingAlternatives
 from .building import Building as Building
 from .floors import Floor as Floor
 from .graph_check import (
@@ -24,8 +24,8 @@ from .link_nodes import (
     join_links as join_links,
     to_networkx as to_networkx,
 )
-from .links import Link as Link, LinkEnd as LinkEnd, LinkKind as LinkKind
-from .plan import BuildingPlan as BuildingPlan, Ride as Ride
+from .links import Ride as Ride, Link as Link, LinkEnd as LinkEnd, LinkKind as LinkKind
+from .plan import BuildingPlan as BuildingPlan
 from .plot import plot_building as plot_building
 from .files import (
     building_graph as building_graph,

@@ -9,11 +9,10 @@ import numpy as np
 
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet.answers import Answers, BuildingAlternatives
 from hybridnav.ext.fleet.checks import check_floors, check_links, check_speed
-from hybridnav.ext.fleet.floors import FloorTable
-from hybridnav.ext.fleet.network import LinkNetwork
-from hybridnav.ext.fleet.saved import building_parts
+from hybridnav.ext.fleet.floors import FloorTable, building_parts
+from hybridnav.ext.fleet.links import LinkNetwork
+from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import did_you_mean, place_of_name
 from hybridnav.planner import PlanStatus

@@ -11,9 +11,16 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.blocked import closing_lines, parsed_closing
-from hybridnav.cli.common import answer, check_picture, progress_bar, stage, timings
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
+    UsageError,
+    answer,
+    check_picture,
+    progress_bar,
+    stage,
+    timings,
+)
+from hybridnav.cli.options import closing_lines, parsed_closing
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import check_model, load_numba, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound

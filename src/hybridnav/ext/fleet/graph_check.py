@@ -11,14 +11,14 @@ from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
-from hybridnav.ext.graphs.checked_components import (
+from hybridnav.ext.graphs.findings import Findings
+from hybridnav.ext.graphs.gather import shown
+from hybridnav.ext.graphs.waypoint_graph import (
     add_one_way,
     components_of,
     cut_off,
     one_way_nodes,
 )
-from hybridnav.ext.graphs.findings import Findings
-from hybridnav.ext.graphs.gather import shown
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:

@@ -1,12 +1,19 @@
-"""Links between floors: lifts, stairs and ramps, where they stand and what a ride costs."""
+"""Links between floors: lifts, stairs and ramps, their ends, and the cheapest ways over rides."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+import numpy as np
 
 from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav._base.typing import FloatArray, LongArray
 
 LinkKind = Literal["lift", "stairs", "ramp"]
 
@@ -172,3 +179,222 @@ class Link:
             When it does not stop at one of the floors.
         """
         return self.cost_m + speed_m_s * self.seconds(from_floor, to_floor)
+
+
+@dataclass(frozen=True)
+class Ride:
+    """One use of a link, from the floor where it is entered to the one where it is left.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Link, LinkEnd, Ride
+    >>> ends = LinkEnd("1", (0.0, 4.0)), LinkEnd("2", (0.5, 4.0))
+    >>> lift = Link(name="west lift", kind="lift", ends=ends, wait_s=20, ride_s=5)
+    >>> Ride(lift, "1", "2", charge_m=12.5).seconds
+    25.0
+    """
+
+    link: Link
+    from_floor: str
+    to_floor: str
+    charge_m: float
+    """What it costs, in metres."""
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of the wait and of the ride."""
+        return self.link.seconds(self.from_floor, self.to_floor)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "link": self.link.name,
+            "kind": self.link.kind,
+            "from_floor": self.from_floor,
+            "to_floor": self.to_floor,
+            "seconds": self.seconds,
+            "charge_m": self.charge_m,
+        }
+
+
+# The ends of links, the rides between them, and the cheapest ways over them.
+
+Part = tuple[int, int]
+"""A path on one floor: from the start, or the end of a link, to an end, or the goal."""
+
+
+class End(NamedTuple):
+    """The end of a link in the network."""
+
+    link: int
+    """Index of the link."""
+    floor: int
+    """Index of the floor."""
+    at: int
+    """Its row in the table of the floor."""
+
+
+class ChosenParts(NamedTuple):
+    """A route: its parts in order, between which rides lead."""
+
+    cost: float
+    """Costs of its parts, and charges of its rides, in metres."""
+    parts: tuple[Part, ...]
+    """Its paths on floors."""
+
+
+START, GOAL = -1, -2
+"""Where the first part of a route begins, and where its last one ends."""
+
+
+class LinkNetwork:
+    """The ends of the links of a building, and the rides between them.
+
+    Parameters
+    ----------
+    links
+        The links that may be used.
+    floor_of
+        Index of each floor, by its name.
+    rows
+        Row in its floor's table of each end, by link and floor.
+    speed_m_s
+        Metres per second, by which rides are charged.
+    """
+
+    def __init__(
+        self,
+        links: Sequence[Link],
+        floor_of: dict[str, int],
+        rows: dict[tuple[str, str], int],
+        speed_m_s: float,
+    ) -> None:
+        self.links = tuple(links)
+        self.ends = [
+            End(number, floor_of[end.floor], rows[link.name, end.floor])
+            for number, link in enumerate(links)
+            for end in link.ends
+        ]
+        self.on_floor: list[list[int]] = [[] for _ in floor_of]
+        of_link: list[list[int]] = [[] for _ in links]
+        for number, end in enumerate(self.ends):
+            self.on_floor[end.floor].append(number)
+            of_link[end.link].append(number)
+        names = [end.floor for link in links for end in link.ends]
+        self.rides: list[list[tuple[int, float]]] = [
+            [
+                (other, link.charge_m(names[number], names[other], speed_m_s=speed_m_s))
+                for other in of_link[end.link]
+                if other != number
+            ]
+            for number, end in enumerate(self.ends)
+            for link in (links[end.link],)
+        ]
+        legs = [(tail, head, charge) for tail, to in enumerate(self.rides) for head, charge in to]
+        self._tails, self._heads = (
+            np.array([leg[:2] for leg in legs], dtype=np.int64).reshape(-1, 2).T
+        )
+        self._charges = np.array([leg[2] for leg in legs], dtype=np.float64)
+        self._on_floor = [np.array(ends, dtype=np.int64) for ends in self.on_floor]
+        self._floor_of = np.array([end.floor for end in self.ends], dtype=np.int64)
+        self._at = np.array([end.at for end in self.ends], dtype=np.int64)
+
+    def cheapest(
+        self, first: FloatArray, last: FloatArray, costs_on: Callable[[int], FloatArray]
+    ) -> ChosenParts | None:
+        """Return the cheapest route with at least one ride; None if there is none.
+
+        Parameters
+        ----------
+        first
+            float64 (n_ends,), the cost from the start to each end, infinite on other floors.
+        last
+            float64 (n_ends,), that from each end to the goal.
+        costs_on
+            Returns the costs between the ends on a floor, float64, by their rows in its table.
+
+        Notes
+        -----
+        All ends are relaxed at once, by turns over rides and over floors, until nothing is cheaper
+        (R. Bellman: On a routing problem, 1958; L. Ford: Network flow theory, 1956). A turn costs
+        the square of the ends on a floor, and there are as many as rides on a cheapest route.
+        """
+        reached, left = first.copy(), np.full(len(first), np.inf)
+        came, rode = np.full((2, len(first)), START)
+        fresh, least_charge = reached < np.inf, self._charges.min(initial=math.inf)
+        while fresh.any():
+            legs = np.flatnonzero(fresh[self._tails])
+            arrived = reached[self._tails[legs]] + self._charges[legs]
+            is_less = arrived < left[self._heads[legs]]
+            legs, arrived = legs[is_less], arrived[is_less]
+            np.minimum.at(left, self._heads[legs], arrived)
+            is_least = arrived == left[self._heads[legs]]
+            heads = self._heads[legs[is_least]]
+            rode[heads] = self._tails[legs[is_least]]
+            # A route that goes on by another ride costs a charge more at least.
+            onward = np.unique(heads[left[heads] + least_charge <= (left + last).min()])
+            fresh = self._walked(onward, left, costs_on, (reached, came))
+        end = int((left + last).argmin()) if len(left) else START
+        if end == START or not left[end] + last[end] < np.inf:
+            return None
+        return self._traced(end, (first, last), (came, rode), costs_on)
+
+    def _walked(
+        self,
+        onward: LongArray,
+        left: FloatArray,
+        costs_on: Callable[[int], FloatArray],
+        known: tuple[FloatArray, LongArray],
+    ) -> np.ndarray:
+        """Relax the costs of all ends from those at which rides have ended.
+
+        Parameters
+        ----------
+        onward
+            int64 (k,), these ends.
+        left
+            float64 (n_ends,), the cost at which each is left.
+        costs_on
+            As in `cheapest`.
+        known
+            The cost at which each end is reached, and from which end; both are overwritten.
+        """
+        reached, came = known
+        fresh = np.zeros(len(reached), dtype=np.bool_)
+        for floor in np.unique(self._floor_of[onward]).tolist():
+            ends, rows = self._on_floor[floor], onward[self._floor_of[onward] == floor]
+            sums = costs_on(floor)[np.ix_(self._at[rows], self._at[ends])] + left[rows, None]
+            sums[rows[:, None] == ends] = np.inf
+            best = sums.argmin(axis=0)
+            least = sums[best, np.arange(len(ends))]
+            is_less = least < reached[ends]
+            reached[ends[is_less]] = least[is_less]
+            came[ends[is_less]] = rows[best[is_less]]
+            fresh[ends[is_less]] = True
+        return fresh
+
+    def _traced(
+        self,
+        end: int,
+        outer: tuple[FloatArray, FloatArray],
+        steps: tuple[LongArray, LongArray],
+        costs_on: Callable[[int], FloatArray],
+    ) -> ChosenParts:
+        """Return the route that ends with a ride to an end, its cost summed from the start."""
+        came, rode = steps
+        parts: list[Part] = [(end, GOAL)]
+        costs = [float(outer[1][end])]
+        while end != START:
+            entered = int(rode[end])
+            before = int(came[entered])
+            charge = dict(self.rides[entered])[end]
+            part = (before, entered)
+            one, other = (self.ends[each] for each in part)
+            cost = outer[0][entered] if before == START else costs_on(one.floor)[one.at, other.at]
+            parts.append(part)
+            costs += [charge, float(cost)]
+            end = before
+        total = 0.0
+        for cost in reversed(costs):
+            total += cost
+        return ChosenParts(total, tuple(reversed(parts)))

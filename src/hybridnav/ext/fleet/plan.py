@@ -1,62 +1,30 @@
-"""Plans over floors: the plans on each floor, and the rides between them."""
+"""Plans over floors, made from the routes that a search has chosen."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass, field
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, overload
 
 from hybridnav.errors import PlanError
+from hybridnav.ext.fleet.floors import ROUNDED
+from hybridnav.ext.fleet.links import START, Ride
+from hybridnav.ext.fleet.search import COUNTS, stats_of
 from hybridnav.planner import PlanStats, PlanStatus
-from hybridnav.planner.guide import sentences
+from hybridnav.planner.guide import FloorChange, Instruction, Space, sentences
+from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav.ext.fleet.links import Link
-    from hybridnav.planner import Metric, PlanResult
-    from hybridnav.planner.guide import Instruction
+    from hybridnav.ext.fleet.floors import Floor
+    from hybridnav.ext.fleet.links import LinkNetwork, Part
+    from hybridnav.ext.fleet.search import Endpoint, LinkSearch
+    from hybridnav.planner import Metric, Path, PlanResult
+    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.result import InstructionSource
-
-COUNTS = ("expanded", "expanded_places", "expanded_border_cells", "expanded_intervals")
-"""The counts of `PlanStats` that add up."""
-
-
-@dataclass(frozen=True)
-class Ride:
-    """One use of a link, from the floor where it is entered to the one where it is left.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.fleet import Link, LinkEnd, Ride
-    >>> ends = LinkEnd("1", (0.0, 4.0)), LinkEnd("2", (0.5, 4.0))
-    >>> lift = Link(name="west lift", kind="lift", ends=ends, wait_s=20, ride_s=5)
-    >>> Ride(lift, "1", "2", charge_m=12.5).seconds
-    25.0
-    """
-
-    link: Link
-    from_floor: str
-    to_floor: str
-    charge_m: float
-    """What it costs, in metres."""
-
-    @property
-    def seconds(self) -> float:
-        """Seconds of the wait and of the ride."""
-        return self.link.seconds(self.from_floor, self.to_floor)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "link": self.link.name,
-            "kind": self.link.kind,
-            "from_floor": self.from_floor,
-            "to_floor": self.to_floor,
-            "seconds": self.seconds,
-            "charge_m": self.charge_m,
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,20 +191,252 @@ def cost_of(results: Sequence[PlanResult], rides: Sequence[Ride]) -> float:
     return cost
 
 
-def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:
-    """Return the effort of a query.
+# From the routes that a search has chosen to plans.
+
+
+class Answers:
+    """Makes the plans of a building.
 
     Parameters
     ----------
-    planned
-        The effort of each plan that was made for it.
-    seconds
-        Wall-clock seconds of all; what the stages of the plans leave is called `links`.
+    floors
+        Its floors.
+    network
+        The links that may be used.
+    speed_m_s
+        Metres per second that the robot drives.
     """
-    stages: dict[str, float] = {}
-    for stats in planned:
-        for stage, spent in stats.seconds.items():
-            stages[stage] = stages.get(stage, 0.0) + spent
-    stages["links"] = max(seconds - sum(stages.values()), 0.0)
-    sums = {name: sum(getattr(stats, name) for stats in planned) for name in COUNTS}
-    return PlanStats(**sums, seconds=stages)
+
+    def __init__(self, floors: Sequence[Floor], network: LinkNetwork, speed_m_s: float) -> None:
+        self._floors, self._network, self._speed_m_s = floors, network, speed_m_s
+
+    def refused(self, status: PlanStatus, endpoints: tuple[Endpoint, Endpoint]) -> BuildingPlan:
+        """Return the plan of a query without a route."""
+        start, goal = (self._named(end) for end in endpoints)
+        return BuildingPlan(status, "octile", start, goal, speed_m_s=self._speed_m_s)
+
+    def found(
+        self,
+        search: LinkSearch,
+        endpoints: tuple[Endpoint, Endpoint],
+        limits: tuple[int, float],
+        began: float,
+    ) -> tuple[BuildingPlan, ...]:
+        """Search routes, and return them as plans.
+
+        Parameters
+        ----------
+        search
+            The search of a query.
+        endpoints
+            Its start and goal.
+        limits
+            Most routes, and cost of one over that of the first, at most.
+        began
+            When the query began, by `time.perf_counter`.
+        """
+        count, stretch = limits
+        if count == 1:
+            best = search.best()
+            chosen = [] if best is None else [best]
+        else:
+            ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
+            chosen = list(itertools.islice(ranked, count))
+        bound = search.bound()
+        results = [tuple(search.drafts[part].result() for part in one.parts) for one in chosen]
+        stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
+        if not chosen:
+            metrics = [draft.result().metric for draft in search.planned[:1]]
+            refused = self.refused(search.reason(), endpoints)
+            metric = metrics[0] if metrics else refused.metric
+            return (replace(refused, metric=metric, lower_bound=bound, stats=stats),)
+        return tuple(
+            self._plan(endpoints, (one.parts, of_parts), bound, stats)
+            for one, of_parts in zip(chosen, results, strict=True)
+        )
+
+    def _plan(
+        self,
+        endpoints: tuple[Endpoint, Endpoint],
+        route: tuple[tuple[Part, ...], tuple[PlanResult, ...]],
+        bound: float,
+        stats: PlanStats,
+    ) -> BuildingPlan:
+        """Return the plan of one route, of its parts and their results."""
+        parts, results = route
+        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(parts)))
+        floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]
+        start, goal = (self._named(end) for end in endpoints)
+        guided = GuidedRoute(
+            tuple(floor.planner.guide for floor in floors),
+            results,
+            rides,
+            waypoint_text(endpoints[1].waypoint),
+        )
+        cost = cost_of(results, rides)
+        return BuildingPlan(
+            PlanStatus.SOLVED,
+            results[0].metric,
+            start,
+            goal,
+            results,
+            tuple(floor.name for floor in floors),
+            rides,
+            # Sums are rounded: a bound that differs from the cost by that alone is the cost.
+            lower_bound=cost if bound >= cost * ROUNDED else bound,
+            speed_m_s=self._speed_m_s,
+            stats=stats,
+            instruction_source=guided,
+        )
+
+    def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
+        return endpoints[0].floor if part[0] == START else self._network.ends[part[0]].floor
+
+    def _ride(self, before: Part, after: Part) -> Ride:
+        """Return the ride between two parts of a route."""
+        entered, left = self._network.ends[before[1]], self._network.ends[after[0]]
+        charges = dict(self._network.rides[before[1]])
+        from_floor, to_floor = self._floors[entered.floor].name, self._floors[left.floor].name
+        return Ride(self._network.links[entered.link], from_floor, to_floor, charges[after[0]])
+
+    def _named(self, end: Endpoint) -> tuple[str, tuple[float, ...] | str]:
+        name, waypoint = self._floors[end.floor].name, end.waypoint
+        if isinstance(waypoint, str):
+            return name, waypoint
+        x, y = (float(number) for number in waypoint)  # type: ignore[union-attr, arg-type]
+        return name, (x, y)
+
+
+# Instructions for a person on a route over floors.
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedRoute:
+    """A route over floors whose instructions are found when somebody reads them."""
+
+    guides: Sequence[Guide | None]
+    """The source of descriptions on each floor that is visited; None on one without rooms."""
+    results: Sequence[PlanResult]
+    rides: Sequence[Ride]
+    goal: str
+    """What words call the goal."""
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions; none if no floor has rooms."""
+        if all(guide is None for guide in self.guides):
+            return ()
+        found: list[Instruction] = []
+        driven_m = 0.0
+        for number, (guide, result) in enumerate(zip(self.guides, self.results, strict=True)):
+            path, ride = result.path, self.rides[number] if number < len(self.rides) else None
+            assert path is not None  # noqa: S101 - a route is solved
+            before = self.rides[number - 1] if number else None
+            here = self._on_floor(guide, path, before, heading_of(result.start))
+            here = [replace(one, at_m=one.at_m + driven_m) for one in here]
+            if before is not None and here[0].kind == "start" and len(here) > 1:
+                here = self._joined(found, here)
+            if ride is not None:
+                change = self._change(ride, self.guides[number + 1])
+                last = replace(here[-1], waypoint=None, landmark=None)
+                here[-1] = replace(last, kind="ride", change=change)
+            found += here
+            driven_m += path.length_m
+        return tuple(found)
+
+    def _joined(self, found: list[Instruction], here: list[Instruction]) -> list[Instruction]:
+        """Return the instructions on a floor behind a ride, the last one of `found`: the turn of
+        the first step belongs to the sentence of the ride, and a start that shows no direction
+        needs none."""
+        change, start = found[-1].change, here[0]
+        if change is not None and change.has_exit:
+            found[-1] = replace(found[-1], turn=start.turn)
+            return here[1:]
+        is_needed = start.landmark is not None or start.heading_rad is not None
+        return here if is_needed else here[1:]
+
+    def _change(self, ride: Ride, guide: Guide | None) -> FloorChange:
+        """Return what words say of a ride; `guide` is that of the floor where it ends."""
+        end = ride.link.end_on(ride.to_floor)
+        has_exit = guide is not None and end is not None and end.yaw_rad is not None
+        return FloorChange(ride.link.name, ride.link.kind, ride.to_floor, has_exit=has_exit)
+
+    def _on_floor(
+        self, guide: Guide | None, path: Path, before: Ride | None, heading_rad: float | None
+    ) -> list[Instruction]:
+        """Return the instructions on one floor, from a start to an arrival."""
+        if guide is None:
+            x, y = path.points[-1].tolist()
+            storey = Space(None, "storey")
+            length_m = path.length_m
+            return [Instruction("arrive", (x, y), length_m, length_m, storey, waypoint=self.goal)]
+        if before is not None:
+            end = before.link.end_on(before.to_floor)
+            heading_rad = None if end is None else end.yaw_rad
+        legs = guide.legs(path, waypoint=self.goal)
+        return list(guide.instructions([path], [legs], heading_rad=heading_rad))
+
+
+# Routes over floors by different links, and whether there may be more.
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingAlternatives(Sequence["BuildingPlan"]):
+    """The routes that `Building.alternatives` has found, the cheapest first: a sequence of them.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Building, Floor
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor("1", hn.HybridPlanner(topology))])
+    >>> found = house.alternatives(("1", (0.5, 0.5)), ("1", (2.0, 2.5)), 2)
+    >>> len(found), found[0].solved, found.complete
+    (1, True, True)
+    """
+
+    found: tuple[BuildingPlan, ...]
+    """The plans; one that is not solved if there is no route."""
+    complete: bool
+    """Whether there are as many as requested, or all that keep to the limits: False where the
+    search stopped before."""
+    note: str = ""
+    """The reason why there are fewer than requested, one line; empty if there are not."""
+
+    @overload
+    def __getitem__(self, index: int) -> BuildingPlan: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[BuildingPlan, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> BuildingPlan | tuple[BuildingPlan, ...]:
+        """Return one plan, or some."""
+        return self.found[index]
+
+    def __len__(self) -> int:
+        """Return the number of plans."""
+        return len(self.found)
+
+    @classmethod
+    def of(
+        cls, found: tuple[BuildingPlan, ...], limits: tuple[int, float], *, complete: bool
+    ) -> BuildingAlternatives:
+        """Return the alternatives of a query, with the reason why there are no more.
+
+        Parameters
+        ----------
+        found
+            The plans.
+        limits
+            Most routes, and cost of one over that of the first, at most.
+        complete
+            Whether the search has looked at all sequences of links that keep to the limits.
+        """
+        count, stretch = limits
+        if not found[0].solved:
+            return cls(found, complete=True, note=f"no route was planned: {found[0].status}")
+        if len(found) >= count:
+            return cls(found, complete=True)
+        if not complete:
+            note = f"the search stopped after {len(found)} of {count} routes: there may be more"
+            return cls(found, complete=False, note=note)
+        reason = f"no other sequence of links is at most {stretch:g} times as dear as the first"
+        return cls(found, complete=True, note=f"{len(found)} of {count}: {reason}")

@@ -13,11 +13,10 @@ from hybridnav.ext.fleet import BuildingPlan
 from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, draw_cells, known_view
-from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
+from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, frame_axes, text_width
 from hybridnav.viz.maps import ground_entries
 from hybridnav.viz.room_map import draw_room_cells, room_entry
-from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

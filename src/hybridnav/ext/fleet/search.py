@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.network import GOAL, START, ChosenParts
-from hybridnav.planner import PlanStatus
+from hybridnav.ext.fleet.links import GOAL, START, ChosenParts
+from hybridnav.planner import PlanStats, PlanStatus
 from hybridnav.planner.result import PlanDraft
 
 if TYPE_CHECKING:
@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, IntArray
     from hybridnav.ext.fleet.floors import FloorTable
-    from hybridnav.ext.fleet.network import LinkNetwork, Part
+    from hybridnav.ext.fleet.links import LinkNetwork, Part
     from hybridnav.planner import HybridPlanner
     from hybridnav.planner.named import At
     from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""
+
+COUNTS = ("expanded", "expanded_places", "expanded_border_cells", "expanded_intervals")
+"""The counts of `PlanStats` that add up."""
 
 
 @dataclass(frozen=True)
@@ -369,3 +372,22 @@ class LinkSearch:
 
     def _links_of(self, parts: Sequence[Part]) -> tuple[int, ...]:
         return tuple(self._network.ends[part[1]].link for part in parts if part[1] != GOAL)
+
+
+def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:
+    """Return the effort of a query.
+
+    Parameters
+    ----------
+    planned
+        The effort of each plan that was made for it.
+    seconds
+        Wall-clock seconds of all; what the stages of the plans leave is called `links`.
+    """
+    stages: dict[str, float] = {}
+    for stats in planned:
+        for stage, spent in stats.seconds.items():
+            stages[stage] = stages.get(stage, 0.0) + spent
+    stages["links"] = max(seconds - sum(stages.values()), 0.0)
+    sums = {name: sum(getattr(stats, name) for stats in planned) for name in COUNTS}
+    return PlanStats(**sums, seconds=stages)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.kernels.spanner import routes
+from hybridnav.ext.graphs.kernels.edges import routes
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.graphs.attach import PlacedGraph
-from hybridnav.ext.graphs.checked_components import add_components
 from hybridnav.ext.graphs.findings import MOST_EXAMPLES, Findings
 from hybridnav.ext.graphs.gather import shown
 from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.lanes import DoorsPassed
-from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
+from hybridnav.ext.graphs.waypoint_graph import WaypointGraph, add_components
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear

@@ -11,8 +11,15 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output, check_picture, stage, timings
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
+    UsageError,
+    answer,
+    check_output,
+    check_picture,
+    stage,
+    timings,
+)
 from hybridnav.cli.options import (
     GraphFloorOption,
     JsonOption,
@@ -22,7 +29,7 @@ from hybridnav.cli.options import (
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
-from hybridnav.ext.graphs.findings_text import (
+from hybridnav.ext.graphs.findings_report import (
     FAIL_ON,
     SHOWN,
     FailOnOption,
@@ -104,7 +111,7 @@ def _check_over_floors(
     if pairs:
         with stage("comparing routes", seconds, "routes"):
             report = judge_building_graph(matched, pairs=pairs, stairs=not no_stairs)
-    from hybridnav.ext.graphs.page import building_facts, render_building_check  # noqa: PLC0415
+    from hybridnav.ext.graphs.findings_report import building_facts, render_building_check  # noqa: PLC0415
 
     cases = () if report is None else report.contradictions
     whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
@@ -237,7 +244,7 @@ def check(
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)
     with stage("checking", seconds, "check"):
         found = hn.ext.graphs.check_graph(topology, graph, along_lines=along_lines)
-    from hybridnav.ext.graphs.page import check_facts, render_check  # noqa: PLC0415 - on demand
+    from hybridnav.ext.graphs.findings_report import check_facts, render_check  # noqa: PLC0415 - on demand
 
     wrong = _counted({"": found.findings}, ignore)
     facts = [(name, printable(text)) for name, text in check_facts(found)]

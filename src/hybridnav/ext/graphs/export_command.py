@@ -12,8 +12,15 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output, check_picture, progress_bar, stage, timings
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import (
+    UsageError,
+    answer,
+    check_output,
+    check_picture,
+    progress_bar,
+    stage,
+    timings,
+)
 from hybridnav.cli.options import JsonOption, MapOrBuildingArgument, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors

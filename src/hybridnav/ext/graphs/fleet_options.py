@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path

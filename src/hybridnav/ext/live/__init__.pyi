@@ -1,11 +1,11 @@
-from .figures import ReplayFigures as ReplayFigures
+from .replay import ReplayFigures as ReplayFigures
 from .plot import ReplayAnimation as ReplayAnimation
 from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
 from .regions import OnlineRegions as OnlineRegions, RegionsUpdate as RegionsUpdate
 from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay
 from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdate
 from .rooms_doors import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
-from .shift import CarriedCosts as CarriedCosts, Flips as Flips, carry_costs as carry_costs
+from .identities import CarriedCosts as CarriedCosts, Flips as Flips, carry_costs as carry_costs
 from .tiles import NO_PLACE as NO_PLACE
 from .files import (
     BagLog as BagLog,

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.live.kernels import merging as _merge_kernels
-from hybridnav.ext.live.kernels import removal as _removal_kernels
-from hybridnav.ext.live.kernels.cells import box_round
+from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.merging import merge_pairs
-from hybridnav.ext.live.kernels.rings import box_groups
+from hybridnav.ext.live.kernels.rings import box_groups, box_round
 from hybridnav.ext.live.state import PLACE, State
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.maps.islands import unique_rows
@@ -158,7 +157,7 @@ class _Window:
         draft, places = self._draft, self._draft.places
         cells = (found.row - self.low[0]) * self._box.shape[1] + found.col - self.low[1]
         self.planes[1].ravel()[cells] = found.of_class
-        parents, lost, altered = _removal_kernels.take_out(
+        parents, lost, altered = take_out(
             self.planes[0], self.low, places.columns(), (cells, found.place), draft.next_place
         )
         if len(parents):

@@ -12,6 +12,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import (
+    UsageError,
     answer,
     check_output,
     check_writable,
@@ -19,7 +20,6 @@ from hybridnav.cli.common import (
     progress_bar,
     timings,
 )
-from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption
 from hybridnav.cli.reading import check_room_to_be, load_numba
 from hybridnav.maps import DEFAULT_MAX_CELLS

@@ -1,4 +1,4 @@
-"""`hybridnav map`: from a robot's log to a map file."""
+"""`hybridnav map`: from a robot's log to a map file; and logs as commands read them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,47 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_writable, extent_line, progress_bar
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
 from hybridnav.cli.options import JsonOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
-from hybridnav.ext.live.log_options import is_bag, open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav.ext.live.files.scan_log import ScanLog
     from hybridnav.ext.live.mapping import Mapper
+
+# Logs of scans that commands read: CARMEN's, and bags.
+
+_BAGS = (".bag", ".mcap", ".db3")
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path names a bag of ROS, by its ending, or a folder."""
+    return path.suffix.lower() in _BAGS or path.is_dir()
+
+
+def open_log(path: Path, topic: str | None = None, frame: str | None = None) -> ScanLog:
+    """Open a log of scans.
+
+    Parameters
+    ----------
+    path
+        The file or folder.
+    topic, frame
+        As in `BagLog`, for bags.
+    """
+    if is_bag(path):
+        return hn.ext.live.BagLog(path, topic=topic, frame=frame)
+    if topic is not None or frame is not None:
+        option = "--topic" if topic is not None else "--frame"
+        raise UsageError(
+            f"{option} is for bags of ROS, got the log {printable(path)}: leave it out"
+        )
+    return hn.ext.live.CarmenLog(path)
+
+
+# The command.
 
 _LESS_OFTEN = 16
 """Scans between two moves of the bar."""

@@ -18,8 +18,8 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view, new_figure
+from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.room_map import DOOR_POINTS
-from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,9 +11,8 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.cellwise import CellDraft
-from hybridnav.ext.live.identities import settle
+from hybridnav.ext.live.identities import check_sides, settle, shift_of
 from hybridnav.ext.live.kernels import rings as _ring_kernels
-from hybridnav.ext.live.shift import check_sides, shift_of
 from hybridnav.ext.live.state import State, pyramid_of, state_of
 from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import OccupancyGrid
@@ -359,3 +358,20 @@ def _joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteA
             first = tiles.parent_of(first)
         joins[edge] = level
     return joins
+
+
+def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
+    """Return bool (rows, cols) of the newer grid, the cells of the older one whose class differs.
+
+    Cells by which the map grew are left out, as updates look at them anyway.
+
+    Raises
+    ------
+    InvalidValueError
+        When the newer grid does not cover the older one, cell on cell.
+    """
+    rows, cols = shift_of(before, after, otherwise="begin a new replay")
+    changed = np.zeros(after.shape, np.bool_)
+    inside = np.s_[rows : rows + before.shape[0], cols : cols + before.shape[1]]
+    changed[inside] = after.classes[inside] != before.classes
+    return changed

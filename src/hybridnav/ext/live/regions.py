@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.identities import Overlap, events_of, heirs_of
+from hybridnav.ext.live.identities import Overlap, events_of, heirs_of, shift_of
 from hybridnav.ext.live.pyramid import OnlinePyramid
 from hybridnav.ext.live.region_growth import (
     Touched,
@@ -21,7 +21,6 @@ from hybridnav.ext.live.region_growth import (
     lengths_between,
     touched_between,
 )
-from hybridnav.ext.live.shift import shift_of
 from hybridnav.ext.live.tiles import NO_PLACE
 from hybridnav.maps.checks import checked_type
 

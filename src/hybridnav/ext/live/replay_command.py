@@ -11,12 +11,18 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output, progress_bar
-from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
+from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
+    EXIT_SOLVED,
+    UsageError,
+    answer,
+    check_output,
+    progress_bar,
+)
 from hybridnav.cli.options import JsonOption, MaxCellsOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
-from hybridnav.ext.live.log_options import open_log
+from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:

@@ -10,10 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Self
 import typer
 
 from hybridnav._base.files import printable
-from hybridnav.cli.common import answer, check_output
-from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
-from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import BesideRoomsOption, MapOrBuildingArgument
+from hybridnav.cli.common import UsageError, answer, check_output
+from hybridnav.cli.options import (
+    PRESET,
+    BesideRoomsOption,
+    CostsOption,
+    MapOrBuildingArgument,
+    parsed_costs,
+)
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
@@ -22,10 +26,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import hybridnav as hn
-    from hybridnav.cli.costs import Costs
+    from hybridnav.cli.options import Costs
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
-    from hybridnav.ext.page.rooms_file import RoomsFile
+    from hybridnav.ext.page.session import RoomsFile
 
 
 _ROOMS = "rooms.yaml"
@@ -145,7 +149,7 @@ class MapPage:
         """Read a map, and its rooms."""
         # These load numba, which help and wrong usage can do without.
         import hybridnav as hn  # noqa: PLC0415
-        from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415
+        from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415
 
         preset = PRESET if costs else None
         settings = reading.settings(file, preset=preset, overrides=costs.overrides)
@@ -239,7 +243,7 @@ class BuildingPage:
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
     """Return the files of rooms that a description names in its folder, by floor."""
-    from hybridnav.ext.page.rooms_file import RoomsFile  # noqa: PLC0415 - loads numpy
+    from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415 - loads numpy
 
     found = {}
     for entry in floors:

@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError
-from hybridnav.ext.page.graph import map_facts
+from hybridnav.ext.page.drawing import map_facts
 from hybridnav.ext.page.tiles import hex_colours, map_layer
 
 if TYPE_CHECKING:

@@ -61,8 +61,11 @@ def serve(
     http://127.0.0.1:
     """
     try:
-        from hybridnav.ext.page.app import make_app  # noqa: PLC0415 - an extra
-        from hybridnav.ext.page.connections import MOST_CONNECTIONS, make_server  # noqa: PLC0415
+        from hybridnav.ext.page.app import (  # noqa: PLC0415 - an extra
+            MOST_CONNECTIONS,
+            make_app,
+            make_server,
+        )
     except ModuleNotFoundError as error:
         raise InvalidValueError(
             f"the page needs the package {error.name}, which is not installed: "

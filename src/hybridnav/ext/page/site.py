@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
-from hybridnav.ext.page.graph import in_grid, in_metres
-from hybridnav.ext.page.planning import facts_of, finite
+from hybridnav.ext.page.drawing import facts_of, finite, in_grid, in_metres
 from hybridnav.ext.page.session import Session
 from hybridnav.planner import Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
         PathQuery,
         PlanQuery,
     )
-    from hybridnav.ext.page.rooms_file import RoomsFile
+    from hybridnav.ext.page.session import RoomsFile
     from hybridnav.planner import Blocked, HybridPlanner, PlanResult
     from hybridnav.topology.rooms import Rooms
 

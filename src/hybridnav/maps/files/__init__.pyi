@@ -6,7 +6,7 @@ from .formats import (
 from .movingai import (
     Scenario as Scenario,
     load_movingai_map as load_movingai_map,
-    read_scenarios as read_scenarios,
+    load_scenarios as load_scenarios,
 )
 from .ros import example_map as example_map, load_ros_map as load_ros_map
 

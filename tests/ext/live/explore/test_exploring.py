@@ -17,7 +17,7 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.subjects.explore import missed_cells, narrow_world, widest_point
 from hybridnav.ext.live.explore import By, Exploration, Goals, Step, explore, laser_all_round
-from hybridnav.ext.live.explore.doubts import doubtful_spots, narrow_spots
+from hybridnav.ext.live.explore.goals import doubtful_spots, narrow_spots
 from hybridnav.ext.live.explore.robot import Robot
 from hybridnav.ext.live.mapping import SimulatedLaser, SimulatedSonars
 from tests.strategies import examples

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import WaypointGraph
-    from hybridnav.ext.graphs.files.anchors import Anchor
+    from hybridnav.ext.graphs.files.osm_xml import Anchor
 
 
 _MOST_XML = 2**26

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav._base.files import MODEL_SUFFIX
+from hybridnav.errors import MapError
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
@@ -44,9 +46,7 @@ def is_building(path: PathLike) -> bool:
     except OSError:  # a name that is too long
         return False
     if suffix == MODEL_SUFFIX:
-        from hybridnav.ext.fleet.files.model import is_building_model  # noqa: PLC0415 - on demand
-
-        return is_building_model(file)
+        return _is_building_model(file)
     if suffix not in {".yaml", ".yml"}:
         return False
     try:
@@ -55,3 +55,14 @@ def is_building(path: PathLike) -> bool:
     except OSError:
         return False
     return _FLOORS.search(text) is not None
+
+
+def _is_building_model(path: Path) -> bool:
+    """Return whether a file is the model of a building; False for one that cannot be read."""
+    from hybridnav.planner.saved.container import read_parts  # noqa: PLC0415 - on demand
+    from hybridnav.planner.saved.structures import BUILDING  # noqa: PLC0415
+
+    with suppress(MapError):
+        filed = read_parts(path)
+        return bool(filed) and filed[0].kind == BUILDING.kind
+    return False

@@ -1,4 +1,4 @@
-from .anchors import Anchor as Anchor
+from .osm_xml import Anchor as Anchor
 from .lif import export_lif as export_lif
 from .load import load_graph as load_graph
 from .nav2 import export_nav2 as export_nav2

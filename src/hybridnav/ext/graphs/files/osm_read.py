@@ -9,18 +9,32 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.anchors import Anchor
-from hybridnav.ext.graphs.files.osm_areas import add_area_graph
 from hybridnav.ext.graphs.files.osm_write import ALONE
-from hybridnav.ext.graphs.files.osm_xml import OsmData, OsmWay, Tags, levels_of, read_osm_xml
+from hybridnav.ext.graphs.files.osm_xml import (
+    Anchor,
+    OsmData,
+    OsmWay,
+    Tags,
+    anchor_of,
+    levels_of,
+    part_of,
+    points_of,
+    read_osm_xml,
+    title_of,
+)
 from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count
-from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, shown
+from hybridnav.ext.graphs.gather import Gathered, number_of, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
     from hybridnav.ext.fleet import LinkKind
 
 Point = tuple[float, float]
@@ -29,10 +43,8 @@ _HERE: dict[str, LinkKind] = {"elevator": "lift", "steps": "stairs"}
 """Values of `highway` that join levels."""
 _VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
 """Values of `osmAG:areaType` that join levels."""
-_INDOOR = ("room", "corridor", "area")
 _FACTS = ("wait_s", "ride_s", "cost_m", "max_radius_m")
 _KM_H = 3.6
-_DECIMALS = 5
 """Decimals of metres."""
 
 
@@ -87,8 +99,7 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
     data = read_osm_xml(text, where)
     if not data.places:
         raise MapError(f"{where}: no node has a latitude and a longitude")
-    title, anchor = _title(data, name), anchor or _anchor_of(data)
-    points = {node: _point(anchor, place) for node, place in data.places.items()}
+    points = points_of(data, anchor or anchor_of(data))
     floors = _sorted_floors(data, where)
     graphs = [
         _floor(floor, data, points, f"{where}, level {shown(floor.name)}") for floor in floors
@@ -104,45 +115,17 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
     found = {floor.level: floor.name for floor, _ in kept}
     links = _Links(data, points, found, where)
     return BuildingGraph(
-        name=title,
+        name=title_of(data, name),
         floors=tuple(graph for _, graph in kept if graph is not None),
         links=tuple(links.found(floors)),
     )
-
-
-def _point(anchor: Anchor, place: tuple[float, float]) -> Point | None:
-    """Return a point in metres, rounded: else nodes at a wall would lie in it after a round trip,
-    by less than the last decimal of degrees."""
-    x, y = anchor.point_of(*place)
-    return pair_of((round(x, _DECIMALS), round(y, _DECIMALS)))
-
-
-def _title(data: OsmData, name: str) -> str:
-    return next(
-        (t["hybridnav:building"] for t in data.tags.values() if "hybridnav:building" in t), name
-    )
-
-
-def _anchor_of(data: OsmData) -> Anchor:
-    """Return the anchor of a file: its root, or the corner of its nodes."""
-    for node, tags in data.tags.items():
-        if tags.get("name") == "root" and node in data.places:
-            heading = number_of(tags.get("hybridnav:heading_deg", 0.0))
-            latitude, longitude = data.places[node]
-            return _clipped(latitude, longitude, 0.0 if math.isnan(heading) else heading)
-    latitude, longitude = np.array(list(data.places.values())).min(axis=0).tolist()
-    return _clipped(latitude, longitude, 0.0)
-
-
-def _clipped(latitude: float, longitude: float, heading: float) -> Anchor:
-    return Anchor(min(max(latitude, -85.0), 85.0), longitude, heading)
 
 
 def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
     """Return the levels, each with its ways; ways without a level lie on 0."""
     floors: dict[float, OsmFloor] = {}
     for way in data.ways:
-        part, levels = _part(way), levels_of(way.tags) or [0.0]
+        part, levels = part_of(way), levels_of(way.tags) or [0.0]
         if part == "" or (part == "routes" and len(levels) > 1):
             continue
         for level in levels:
@@ -163,19 +146,6 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
         for floor in found:
             floor.name = f"{floor.level:g}"
     return found
-
-
-def _part(element: OsmWay) -> str:
-    """Return the list of a floor that an element belongs to, empty for none."""
-    kind = element.tags.get("osmAG:type")
-    if kind == "passage":
-        return "passages"
-    if element.is_closed and (kind == "area" or element.tags.get("indoor") in _INDOOR):
-        return "areas"
-    is_route = (
-        "highway" in element.tags and not element.is_closed and "hybridnav:link" not in element.tags
-    )
-    return "routes" if is_route else ""
 
 
 def _floor(
@@ -346,3 +316,123 @@ class _Links:
         given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
         known = {key: value for key, value in given.items() if value > 0}
         return Link(name=own, kind=kind, ends=tuple(ends.values()), **known)
+
+
+# The graph of rooms and doors that have no ways between them.
+
+_MOST_DOORS = 60
+"""Doors of one area that are joined with each other; 1,770 pairs."""
+_MOST_PAIRS = 100_000
+"""Pairs of doors of all areas that are tried."""
+
+
+def add_area_graph(
+    gathered: Gathered,
+    areas: Sequence[OsmWay],
+    passages: Sequence[OsmWay],
+    tags: Mapping[int, Tags],
+    points: Mapping[int, Point | None],
+) -> None:
+    """Add a node in each area, one in each passage or door, and edges between them.
+
+    An area is joined with its passages, in both directions, and two of its passages with each other
+    where the segment between them stays inside it. A passage (osmAG) belongs to the two areas that
+    it names, by their ids or names; a door, a node with `door`, to those whose outline it is part
+    of.
+
+    Parameters
+    ----------
+    gathered
+        What they are added to; ids are `way ID` and `node ID`.
+    areas
+        Closed ways.
+    passages
+        Ways of two nodes.
+    tags
+        Tags of nodes.
+    points
+        Points of nodes in metres; None for none.
+    """
+    shapes = {way.id: shape for way in areas if (shape := _shape(way, points)) is not None}
+    inside: dict[int, list[tuple[str, Point]]] = {area: [] for area in shapes}
+    by_name: dict[str, int] = {}
+    for way in areas:
+        if way.id in shapes:
+            place = shapes[way.id].representative_point()
+            gathered.add_node(f"way {way.id}", (place.x, place.y), way.tags)
+            by_name.setdefault(way.tags.get("name", ""), way.id)
+    for way in passages:
+        sides = [_area(way.tags.get(key), shapes, by_name) for key in ("osmAG:from", "osmAG:to")]
+        if sides[0] == sides[1]:
+            continue
+        middle = _middle([points.get(node) for node in way.refs[:2]])
+        gathered.add_node(f"way {way.id}", middle, way.tags)
+        for side in sides:
+            if side is not None and middle is not None:
+                inside[side].append((f"way {way.id}", middle))
+    _add_doors(gathered, areas, inside, tags, points)
+    _join(gathered, shapes, inside)
+
+
+def _join(
+    gathered: Gathered,
+    shapes: Mapping[int, BaseGeometry],
+    inside: Mapping[int, list[tuple[str, Point]]],
+) -> None:
+    """Add edges between each area and its doors, and between those that see each other."""
+    left = _MOST_PAIRS
+    for area, doors in inside.items():
+        for door, _ in doors:
+            gathered.add_link((f"way {area}", door), {}, directed=False)
+        pairs = list(itertools.islice(itertools.combinations(doors[:_MOST_DOORS], 2), left))
+        left -= len(pairs)
+        shapely.prepare(shapes[area])
+        for (one, at), (other, there) in pairs:
+            if at != there and shapes[area].covers(shapely.LineString([at, there])):
+                gathered.add_link((one, other), {}, directed=False)
+
+
+def _shape(ring: OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry | None:
+    """Return the area inside a way; None for what contains others, and without points."""
+    corners = [point for node in ring.refs[:-1] if (point := points.get(node)) is not None]
+    is_whole = len(corners) == len(ring.refs) - 1
+    if not is_whole or ring.tags.get("osmAG:areaType") == "structure":
+        return None
+    return shapely.make_valid(shapely.Polygon(corners))
+
+
+def _middle(found: list[Point | None]) -> Point | None:
+    """Return the middle of the points that are there, None without any."""
+    known = [end for end in found if end is not None]
+    if not known:
+        return None
+    return sum(x for x, _ in known) / len(known), sum(y for _, y in known) / len(known)
+
+
+def _add_doors(
+    gathered: Gathered,
+    areas: Sequence[OsmWay],
+    inside: dict[int, list[tuple[str, Point]]],
+    tags: Mapping[int, Tags],
+    points: Mapping[int, Point | None],
+) -> None:
+    """Add the nodes with `door` on outlines of areas."""
+    added: set[int] = set()
+    for way in areas:
+        for node in dict.fromkeys(way.refs) if way.id in inside else ():
+            point = points.get(node)
+            if "door" not in tags.get(node, {}) or point is None:
+                continue
+            if node not in added:
+                gathered.add_node(f"node {node}", point, tags[node])
+                added.add(node)
+            inside[way.id].append((f"node {node}", point))
+
+
+def _area(
+    value: str | None, shapes: Mapping[int, BaseGeometry], by_name: Mapping[str, int]
+) -> int | None:
+    number = number_of(value)
+    if number in shapes:
+        return int(number)
+    return by_name.get(value) if value else None

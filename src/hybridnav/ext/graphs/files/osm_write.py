@@ -12,7 +12,7 @@ import shapely
 from hybridnav._base.files import NewFile
 from hybridnav.ext.fleet import BuildingGraph, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
-from hybridnav.ext.graphs.files.anchors import Anchor
+from hybridnav.ext.graphs.files.osm_xml import Anchor
 from hybridnav.ext.graphs.files.rmf_write import speed_limit_of
 from hybridnav.ext.graphs.gather import number_of
 from hybridnav.maps.checks import checked_type

@@ -1,4 +1,4 @@
-"""OpenStreetMap's XML: nodes and ways with their tags, element by element."""
+"""OpenStreetMap's XML: nodes and ways with their tags, and where on the Earth they lie."""
 
 from __future__ import annotations
 
@@ -9,8 +9,103 @@ from functools import cached_property
 from typing import Any
 from xml.parsers import expat
 
-from hybridnav.errors import MapError
-from hybridnav.ext.graphs.gather import number_of, shown
+import numpy as np
+
+from hybridnav._base.trig import cos, sin
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.ext.graphs.gather import number_of, pair_of, shown
+
+# From metres to latitude and longitude, and back.
+
+_DECIMALS = 5
+_INDOOR = ("room", "corridor", "area")
+_EQUATOR_M = 6378137.0
+_SQUARED_ECCENTRICITY = 6.69437999014e-3
+"""WGS 84."""
+_MOST_LATITUDE_DEG = 85.0
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """The place of a map frame's origin on the Earth, and where its y axis points.
+
+    The projection is local: metres to the north are degrees of latitude times the radius of
+    curvature of the meridian at the anchor, metres to the east degrees of longitude times that of
+    the parallel, on the ellipsoid of WGS 84. Up to 200 m from the anchor, and 60 degrees from the
+    equator, that is within 2 cm of the plane that touches the Earth there.
+
+    Raises
+    ------
+    InvalidValueError
+        When a number is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import Anchor
+    >>> anchor = Anchor(48.0, 11.0)
+    >>> latitude, longitude = anchor.degrees_of((100.0, 0.0))
+    >>> round(latitude, 7), round(longitude, 7)
+    (48.0, 11.00134)
+    >>> x, y = anchor.point_of(latitude, longitude)
+    >>> round(x, 6), round(y, 6)
+    (100.0, 0.0)
+    """
+
+    latitude_deg: float
+    """Degrees to the north of the equator, from -85 to 85."""
+    longitude_deg: float
+    """Degrees to the east, from -180 to 180."""
+    heading_deg: float = 0.0
+    """Direction of the y axis in degrees, clockwise from north: with 0, x points east."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no place."""
+        for name, most in (("latitude", _MOST_LATITUDE_DEG), ("longitude", 180.0)):
+            value = getattr(self, f"{name}_deg")
+            if not -most <= value <= most:
+                raise InvalidValueError(
+                    f"an anchor has {name} {value}, expected degrees from -{most:g} to {most:g}"
+                )
+        if not math.isfinite(self.heading_deg):
+            raise InvalidValueError(
+                f"an anchor has heading {self.heading_deg}, expected degrees clockwise from north"
+            )
+
+    @cached_property
+    def _radii_m(self) -> tuple[float, float]:
+        """Metres per radian to the north and to the east."""
+        sine = sin(math.radians(self.latitude_deg))
+        bulge = 1.0 - _SQUARED_ECCENTRICITY * sine * sine
+        north = _EQUATOR_M * (1.0 - _SQUARED_ECCENTRICITY) / (bulge * math.sqrt(bulge))
+        east = _EQUATOR_M / math.sqrt(bulge) * cos(math.radians(self.latitude_deg))
+        return north, east
+
+    def degrees_of(self, point: tuple[float, float]) -> tuple[float, float]:
+        """Return latitude and longitude of a point `(x, y)` in metres, in degrees."""
+        sine, cosine = self._turn
+        east = cosine * point[0] + sine * point[1]
+        north = cosine * point[1] - sine * point[0]
+        per_north, per_east = self._radii_m
+        return (
+            self.latitude_deg + math.degrees(north / per_north),
+            self.longitude_deg + math.degrees(east / per_east),
+        )
+
+    def point_of(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
+        """Return the point `(x, y)` in metres at a latitude and longitude in degrees."""
+        sine, cosine = self._turn
+        per_north, per_east = self._radii_m
+        north = math.radians(latitude_deg - self.latitude_deg) * per_north
+        east = math.radians(longitude_deg - self.longitude_deg) * per_east
+        return cosine * east - sine * north, sine * east + cosine * north
+
+    @property
+    def _turn(self) -> tuple[float, float]:
+        heading = math.radians(self.heading_deg)
+        return sin(heading), cos(heading)
+
+
+# Nodes and ways with their tags, element by element.
 
 MOST_BYTES = 2**25
 """Most characters of a file: some 100,000 ways, which take 150 MB of memory."""
@@ -200,3 +295,51 @@ def levels_of(tags: Tags) -> list[float]:
         if len(found) > _MOST_LEVELS:
             break
     return sorted(level for level in found if not math.isnan(level))
+
+
+def part_of(element: OsmWay) -> str:
+    """Return the list of a floor that an element belongs to, empty for none."""
+    kind = element.tags.get("osmAG:type")
+    if kind == "passage":
+        return "passages"
+    if element.is_closed and (kind == "area" or element.tags.get("indoor") in _INDOOR):
+        return "areas"
+    is_route = (
+        "highway" in element.tags and not element.is_closed and "hybridnav:link" not in element.tags
+    )
+    return "routes" if is_route else ""
+
+
+def title_of(data: OsmData, name: str) -> str:
+    """Return the name of the building that a file has, else `name`."""
+    return next(
+        (t["hybridnav:building"] for t in data.tags.values() if "hybridnav:building" in t), name
+    )
+
+
+def anchor_of(data: OsmData) -> Anchor:
+    """Return the anchor of a file: its root, or the corner of its nodes."""
+    for node, tags in data.tags.items():
+        if tags.get("name") == "root" and node in data.places:
+            heading = number_of(tags.get("hybridnav:heading_deg", 0.0))
+            latitude, longitude = data.places[node]
+            return _clipped(latitude, longitude, 0.0 if math.isnan(heading) else heading)
+    latitude, longitude = np.array(list(data.places.values())).min(axis=0).tolist()
+    return _clipped(latitude, longitude, 0.0)
+
+
+def _clipped(latitude: float, longitude: float, heading: float) -> Anchor:
+    return Anchor(min(max(latitude, -85.0), 85.0), longitude, heading)
+
+
+def points_of(data: OsmData, anchor: Anchor) -> dict[int, tuple[float, float] | None]:
+    """Return the points of the nodes in metres, rounded.
+
+    Else nodes at a wall would lie in it after a round trip, by less than the last decimal of
+    degrees.
+    """
+    points: dict[int, tuple[float, float] | None] = {}
+    for node, place in data.places.items():
+        x, y = anchor.point_of(*place)
+        points[node] = pair_of((round(x, _DECIMALS), round(y, _DECIMALS)))
+    return points

@@ -13,7 +13,8 @@ from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav._base.trig import atan2
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
-from hybridnav.ext.live.explore.doubts import (
+from hybridnav.ext.live.explore.goals import (
+    Goals,
     cells_in_reach,
     doubtful_spots,
     narrow_spots,
@@ -21,7 +22,6 @@ from hybridnav.ext.live.explore.doubts import (
     walled,
     widest_point,
 )
-from hybridnav.ext.live.explore.goals import Goals
 from hybridnav.ext.live.mapping import (
     LaserModel,
     Mapper,

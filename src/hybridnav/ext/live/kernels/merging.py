@@ -1,4 +1,4 @@
-"""Kernels that merge whole places; see `_cell_kernels` for windows and tables."""
+"""Kernels that merge whole places; see `cells` for windows and tables."""
 
 from __future__ import annotations
 
@@ -307,7 +307,7 @@ def pairs_at(window, cells):
     return pairs[:count].copy()
 
 
-# Kernels that move changed cells, many steps in one call; see `_cell_kernels` for windows and
+# Kernels that move changed cells, many steps in one call; see `cells` for windows and
 # tables.
 #
 # A call from Python takes longer than most of the steps do.

@@ -137,6 +137,28 @@ def box_groups(boxes):
     return group
 
 
+@guarded
+@njit(cache=True, nogil=True)
+def box_round(row, col, place, table):
+    """Return the least box round cells and the places that they are in, four numbers.
+
+    `row`, `col` and `place` are int64 (n,), n at least 1, places -1 for none, `table` the
+    columns of the places (see `PlaceTable.columns`).
+    """
+    numbers, box = table[0], table[3]
+    low_row, low_col, high_row, high_col = row[0], col[0], row[0] + 1, col[0] + 1
+    last = np.int64(-1)
+    for k in range(row.size):
+        low_row, low_col = min(low_row, row[k]), min(low_col, col[k])
+        high_row, high_col = max(high_row, row[k] + 1), max(high_col, col[k] + 1)
+        if place[k] >= 0 and place[k] != last:
+            last = place[k]
+            i = np.searchsorted(numbers, last)
+            low_row, low_col = min(low_row, box[i, 0]), min(low_col, box[i, 1])
+            high_row, high_col = max(high_row, box[i, 2]), max(high_col, box[i, 3])
+    return low_row, low_col, high_row, high_col
+
+
 # The kernel that enters what a window was contracted to.
 
 _SURVIVES = 255
