@@ -22,7 +22,6 @@ from hybridnav.search.overlay.changes import (
     ONE,
     Change,
     PathsTooLongError,
-    Window,
     are_whole,
     box_within,
     change_in,
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.search.overlay.changes import Window
 
 TOP_BYTES_PER_CELL = 10.0
 """Most bytes for each cell of the distances over the last level, unless asked otherwise."""
