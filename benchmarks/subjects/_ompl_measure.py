@@ -17,8 +17,8 @@ from benchmarks.subjects._queries_measure import (
     ROS_MERGE_DISTANCE_M,
 )
 from hybridnav.harness.judges import segment_faults
-from hybridnav.harness.pairs import sample_pairs
-from hybridnav.harness.records import environment, map_digest
+from hybridnav.harness.records import environment
+from hybridnav.harness.scenes import map_digest, sample_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.planner import load_preset
 from hybridnav.planner.methods.ompl import OmplPlanner
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.scenes import Pair
     from hybridnav.planner import PlannerSettings
 
 Record = dict[str, Any]

@@ -18,7 +18,7 @@ from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.adapters import _nbytes
 from hybridnav.harness.judges import judge_line, judge_path
 from hybridnav.harness.outcome import loss_of
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.planner import load_preset
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.scenes import Pair
     from hybridnav.harness.tables import Row
 
 YARDSTICK = "grid-astar"

@@ -14,10 +14,9 @@ from hybridnav.harness.columns import (
     figures,
     loss_columns,
 )
-from hybridnav.harness.contradictions import ANSWERED, TOO_SLOW
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.tables import rows_of_methods
-from hybridnav.harness.yardstick import YARDSTICKS
+from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW, YARDSTICKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -20,14 +20,14 @@ from benchmarks.common import NEEDED_DATA, option, read
 from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness import AnyAngleOptimum
 from hybridnav.harness.judges import judge_line
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.scenes import Pair
     from hybridnav.harness.tables import Row
 
 _GRAPHS = {

@@ -24,7 +24,7 @@ from benchmarks.common import (
     timed,
 )
 from hybridnav._base.moves import path_length_in_cells
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.search.grid_search import CellPath, GridSearch
 from hybridnav.search.octile import JumpPath, JumpSearch, build_jump_graph, contract_graph
 

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.maps.files import load_map
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty

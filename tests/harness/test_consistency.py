@@ -14,7 +14,7 @@ from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
-from hybridnav.harness.pairs import Pair, sample_pairs
+from hybridnav.harness.scenes import Pair, sample_pairs
 from hybridnav.maps import CellClass
 from hybridnav.planner import Preset
 from hybridnav.pyramid import DualGraphPyramid

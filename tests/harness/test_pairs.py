@@ -10,7 +10,8 @@ from hypothesis.extra import numpy as arrays
 
 from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.pairs import (
+from hybridnav.harness.records import decode_path, encode_path
+from hybridnav.harness.scenes import (
     STRATA,
     Pair,
     components,
@@ -18,7 +19,6 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.records import decode_path, encode_path
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.files.movingai import Scenario
 from tests.strategies import drawn, examples, occupancy_grid, scenes

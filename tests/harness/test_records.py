@@ -10,15 +10,14 @@ import pytest
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import MethodSpec, baseline_spec, preset_spec
-from hybridnav.harness.pairs import Pair
 from hybridnav.harness.records import (
     RECORDS_FILE,
     RecordFile,
-    map_digest,
     pair_id,
     preparation_id,
     read_records,
 )
+from hybridnav.harness.scenes import Pair, map_digest
 from tests.strategies import drawn, occupancy_grid
 
 GRID = occupancy_grid(drawn("..#", "...", "#.."))
@@ -112,8 +111,9 @@ def test_equal_settings_have_equal_ids_and_others_have_others():
 def test_ids_are_the_same_in_every_process():
     code = (
         "from hybridnav.harness.methods import preset_spec\n"
-        "from hybridnav.harness.pairs import Pair\n"
-        "from hybridnav.harness.records import map_digest, pair_id\n"
+        "from hybridnav.harness.scenes import Pair\n"
+        "from hybridnav.harness.records import pair_id\n"
+        "from hybridnav.harness.scenes import map_digest\n"
         "from tests.harness.test_records import GRID\n"
         "print(pair_id(map_digest(GRID), preset_spec('paper'), Pair((0, 0), (1, 1))))\n"
     )

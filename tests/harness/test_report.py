@@ -15,12 +15,12 @@ import pytest
 from PIL import Image
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.figures import paths_uri
 from hybridnav.harness.report import (
     CounterExample,
     MapSection,
     ReportData,
     WorstCase,
+    paths_uri,
     render_report,
 )
 from hybridnav.harness.tables import Table

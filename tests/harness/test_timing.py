@@ -15,10 +15,9 @@ from hybridnav.harness.analysis import load_study
 from hybridnav.harness.baselines.grid import GridAstar as Baseline
 from hybridnav.harness.methods import baseline_spec
 from hybridnav.harness.output import write_outputs
-from hybridnav.harness.pairs import Pair, sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.scenes import MapSpec, read_scene
+from hybridnav.harness.scenes import MapSpec, Pair, read_scene, sample_pairs
 from hybridnav.harness.timing import TimingTask, circumstances_of
 from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty

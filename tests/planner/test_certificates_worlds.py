@@ -13,7 +13,7 @@ import pytest
 
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from tests.certificates import (
     ROUNDING,
     Cell,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness.judges import segment_faults
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.planner.blocked import Blocked
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, recounted

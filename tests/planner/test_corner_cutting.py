@@ -13,7 +13,7 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.baselines.hpa import HpaStar
-from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid
+from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.maps import CellClass
 from tests.strategies import MAX_SIDE, drawn, examples

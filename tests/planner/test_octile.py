@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from tests.oracle.grid import assert_legal, recounted
 from tests.strategies import class_grids, examples, occupancy_grid
 

@@ -11,7 +11,7 @@ from benchmarks.worlds import office_world
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.judges import judge_path
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 from hybridnav.search.grid_search import GridSearch
 from tests.certificates import ROUNDING
 from tests.strategies import examples, scenes

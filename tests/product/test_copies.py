@@ -22,7 +22,7 @@ import hybridnav as hn
 from hybridnav._base.pool import Pool
 from hybridnav.ext.live import OnlinePyramid, OnlineRegions, OnlineRooms
 from hybridnav.harness.baselines.hpa import HpaStar
-from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid
+from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.search.grid_search import GridSearch
 from tests.strategies import Scene, examples, scenes

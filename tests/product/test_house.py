@@ -5,7 +5,7 @@ from tests.product.house import figures
 LIMITS = {
     "code": 56_250,
     "lines": 92_850,
-    "files": 440,
+    "files": 431,
     "code outside ext": 39_100,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
@@ -15,7 +15,7 @@ LIMITS = {
     "files visited by paper": 56,
     "lines visited by paper": 11_300,
     "modules of a plan and a picture": 157,
-    "imports, % of the code": 9.9,
+    "imports, % of the code": 9.8,
     "lines of tests": 55_800,
 }
 

@@ -2,10 +2,12 @@
 
 `names.txt` holds what there was before the house was halved; it never changes. `ledger.tsv` has a
 line for each of these that is no longer what it was: the old name, its fate, the name now, and why.
-What has no line must still be there.
+What has no line must still be there. `features.tsv` has a line for each feature that README, docs
+and CHANGELOG promise: its fate, the page, the tests that hold it, the new name or the reason.
 """
 
 import importlib
+import re
 from pathlib import Path
 
 import pytest
@@ -15,9 +17,25 @@ import hybridnav as hn
 from hybridnav.cli.app import app
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 NAMES = (HERE / "names.txt").read_text().splitlines()
 LEDGER = [line.split("\t") for line in (HERE / "ledger.tsv").read_text().splitlines()]
 FATES = {"moved", "merged", "removed"}
+FEATURES = [line.split("\t") for line in (HERE / "features.tsv").read_text().splitlines()]
+CODE = re.compile(r"`([^`]+)`")
+NAME = re.compile(r"--[\w-]+|[A-Za-z_][\w-]{3,}")
+GENERAL = {"hybridnav", "python", "benchmarks", "planner", "plan", "build", "rooms", "grid"}
+UNHELD = {"make docs", "make site", "make test", "NO_PLACE"}  # promised, and no test asks for it
+TOLD = {  # bullets that name no code of a feature, and the feature that each is about
+    "The harness has one optimum a table": "Choose the optimum of losses",
+    "A glossary": "Look up each word in the glossary",
+    "Every public class and function": "Run every example in docstrings",
+    "Alternatives by doors honour costs": "Order alternatives by cost",
+    "Words state the direction at the start": "Follow turns behind doors and landmarks",
+    "Words name the side of every door": "Follow turns behind doors and landmarks",
+    "A place that follows its map": "Follow places of a changing map",
+    "A command that compiles": "Compile kernels ahead",
+}
 
 
 def options_of(name, command):
@@ -93,3 +111,41 @@ def test_a_name_of_the_ledger_is_gone_and_what_took_its_place_is_there(line):
     old, _, now, _ = line
     assert not is_there(old)
     assert not now or is_there(now)
+
+
+def words_of(text):
+    """Return the options and names in the code of a text, but those that say nothing."""
+    code = " ".join(CODE.findall(text))
+    return set(NAME.findall(code)) - GENERAL
+
+
+def test_each_feature_has_five_fields_a_page_and_a_test():
+    assert len({line[0] for line in FEATURES}) == len(FEATURES)
+    for line in FEATURES:
+        assert len(line) == 5, line
+        feature, fate, page, tests, why = line
+        assert len(feature.split()) <= 12, line
+        assert fate in FATES | {"kept"}
+        assert bool(why.strip()) == (fate != "kept"), line
+        assert fate != "removed" or (page, tests) == ("CHANGELOG.md", ""), line
+        code = set(CODE.findall(feature))
+        assert bool(tests) == (fate != "removed" and not code & UNHELD), line
+        assert all((ROOT / path).is_file() for path in [page, *tests.split()]), line
+        names = words_of(feature)
+        assert not names or names & set(NAME.findall((ROOT / page).read_text())), line
+
+
+def test_features_name_every_page_with_headings():
+    pages = [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/howto/*.md")]
+    named = {ROOT / line[2] for line in FEATURES}
+    assert [page for page in pages if "\n## " in page.read_text() and page not in named] == []
+
+
+def test_features_cover_what_the_changelog_adds():
+    unreleased = (ROOT / "CHANGELOG.md").read_text().partition("\n### Added\n")[2]
+    bullets = [" ".join(b.split()) for b in unreleased.partition("\n### ")[0].split("\n- ")[1:]]
+    known = set().union(*(words_of(line[0]) for line in FEATURES))
+    assert [b for b in bullets if not words_of(b) & known and not b.startswith(tuple(TOLD))] == []
+    assert [told for told in TOLD if not any(b.startswith(told) for b in bullets)] == []
+    lines = [line[0] for line in FEATURES]
+    assert [f for f in TOLD.values() if not any(line.startswith(f) for line in lines)] == []

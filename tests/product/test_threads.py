@@ -14,7 +14,7 @@ import hybridnav
 import hybridnav as hn
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
 from hybridnav.harness.baselines.hpa import HpaStar
-from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid
+from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planner import load_preset

@@ -11,9 +11,9 @@ from hybridnav.errors import MapError
 from hybridnav.harness.judges import chords_of
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.records import decode_path, map_digest
+from hybridnav.harness.records import decode_path
 from hybridnav.harness.report import CounterExample, WorstCase
-from hybridnav.harness.scenes import MapSpec, read_map
+from hybridnav.harness.scenes import MapSpec, map_digest, read_map
 from hybridnav.maps import MAX_CELLS, Frame
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def cases_of(outcome: Outcome) -> list[tuple[CaseKey, WorstCase]]:
 
 
 def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
-    from hybridnav.harness.figures import paths_uri  # noqa: PLC0415 - loads matplotlib
+    from hybridnav.harness.report import paths_uri  # noqa: PLC0415 - loads matplotlib
 
     about = outcome.preparation
     if "file" not in about:

@@ -14,23 +14,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.harness.analysis import not_everywhere, pairs_in_common
-from hybridnav.harness.contradictions import ANSWERED, KINDS, contradiction, kind_of_contradiction
 from hybridnav.harness.judges import summarise
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile, query_key
 from hybridnav.harness.tables import METHOD_COLUMNS, text_of
-from hybridnav.harness.yardstick import OPTIMA
+from hybridnav.harness.yardstick import (
+    ANSWERED,
+    KINDS,
+    OPTIMA,
+    contradiction,
+    kind_of_contradiction,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
-    from hybridnav.harness.contradictions import Kind
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.records import Record
     from hybridnav.harness.tables import Row
-    from hybridnav.harness.yardstick import Optimum
+    from hybridnav.harness.yardstick import Kind, Optimum
 
 RIGHTLY, WRONGLY = '"no path", right', '"no path", wrong'
 CONSISTENCY_COLUMNS = {

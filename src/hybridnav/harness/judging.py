@@ -11,7 +11,6 @@ import numpy as np
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
-from hybridnav.harness.contradictions import ANY_ANGLE_SLACK, ARC_SLACK, SLACK, Fault
 from hybridnav.harness.judges import (
     CheapestCost,
     ScipyOptimum,
@@ -21,7 +20,7 @@ from hybridnav.harness.judges import (
     judge_path,
     line_cells,
 )
-from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.harness.yardstick import ANY_ANGLE_SLACK, ARC_SLACK, SLACK, AnyAngleOptimum, Fault
 from hybridnav.maps import CellClass
 from hybridnav.maps.costs import cost_along
 from hybridnav.search.grid_search import GridSearch
@@ -31,11 +30,11 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import LongArray
     from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-    from hybridnav.harness.contradictions import Kind
     from hybridnav.harness.judges import Chords
     from hybridnav.harness.methods import Prepared
-    from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
+    from hybridnav.harness.scenes import Pair
+    from hybridnav.harness.yardstick import Kind
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
 

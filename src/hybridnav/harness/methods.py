@@ -40,7 +40,7 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "hpa-star": ("hybridnav.harness.baselines.hpa:HpaStar", {}),
     "hpa-star-raw": ("hybridnav.harness.baselines.hpa:HpaStar", {"smooth": False}),
     "hpa-star-lines": ("hybridnav.harness.baselines.hpa:HpaStar", {"line_cells": 1000}),
-    "simple-graph": ("hybridnav.harness.baselines.simple_graph:SimpleGraphPyramid", {}),
+    "simple-graph": ("hybridnav.harness.baselines.regions:SimpleGraphPyramid", {}),
     "thrun": ("hybridnav.harness.baselines.thrun:ThrunMap", {}),
 }
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a

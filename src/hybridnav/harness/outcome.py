@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.contradictions import (
+from hybridnav.harness.judges import thrun_count
+from hybridnav.harness.records import path_steps
+from hybridnav.harness.yardstick import (
     ANSWERED,
     ANY_ANGLE_SLACK,
     NOT_ASKED,
@@ -19,8 +21,6 @@ from hybridnav.harness.contradictions import (
     is_any_angle,
     octile_optimum_m,
 )
-from hybridnav.harness.judges import thrun_count
-from hybridnav.harness.records import path_steps
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

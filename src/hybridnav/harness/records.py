@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import json
 import os
@@ -33,8 +32,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from hybridnav.harness.methods import MethodSpec
-    from hybridnav.harness.pairs import Pair
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav.harness.scenes import Pair
 
 Record = dict[str, Any]
 
@@ -42,14 +40,6 @@ RECORDS_FILE, RUNS_FILE = "records.jsonl", "runs.jsonl"
 
 _KEYS = ("id", "type", "map", "map_sha", "method", "method_sha", "status")
 _LIBRARIES = ("numpy", "scipy", "numba")
-
-
-def map_digest(grid: OccupancyGrid) -> str:
-    """Return the SHA-256 of all that planners see of a map: its size, resolution, classes and
-    moves."""
-    digest = hashlib.sha256(repr((grid.shape, grid.resolution_m, grid.corner_cutting)).encode())
-    digest.update(np.ascontiguousarray(grid.classes).tobytes())
-    return digest.hexdigest()
 
 
 def pair_id(map_sha: str, spec: MethodSpec, pair: Pair) -> str:

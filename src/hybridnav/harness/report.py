@@ -2,19 +2,162 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import math
 import re
+import warnings
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
+import matplotlib as mpl
+import numpy as np
 from jinja2 import Environment, StrictUndefined
+from PIL import Image
+
+from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
+from hybridnav.viz.canvas import picture_bytes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from jinja2 import Template
+    from matplotlib.axes import Axes
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.harness.tables import Table
+    from hybridnav.maps import OccupancyGrid
+
+
+_CASE_WIDTH_IN = 4.0
+_CASE_DPI = 144.0
+_CASE_COLOURS = 32
+"""Cells have four; lines and their smooth rims have the others."""
+
+_OF_LOSSES = (
+    "Each line is the share of pairs whose loss is above the value below it; at 0, the share with "
+    "any loss. The share is logarithmic, so that the few worst pairs show; a line ends at the "
+    "largest loss of its method, and one on the axis stands for no pair. A line further down and "
+    "left is better."
+)
+_OF_SPEED = "Down and to the left is better; the loss axis is logarithmic above 0.01\u00a0%."
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A chart with its caption."""
+
+    title: str
+    uri: str
+    """A data URI; empty where there is nothing to draw."""
+    caption: str
+    missing: list[str]
+    """Methods without values."""
+
+
+class Charts:
+    """The charts of a report, in which each method looks the same.
+
+    Parameters
+    ----------
+    names
+        Methods of the report, in its order; they may repeat.
+    metric_of
+        The metric of the paths of a method, octile where it has none.
+    """
+
+    def __init__(self, names: Iterable[str], metric_of: Mapping[str, str]) -> None:
+        self._styles = method_styles(names)
+        self._metric_of = metric_of
+
+    def overall(
+        self, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
+    ) -> list[Chart]:
+        """Return the charts of all maps together, one for each metric."""
+        title = "Speed against loss, all maps"
+        groups = self._groups([*losses, *times_ms])
+        return [self._speed(losses, times_ms, names, f"{title}{of}") for of, names in groups]
+
+    def of_map(
+        self, name: str, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
+    ) -> list[Chart]:
+        """Return the charts of one map, two for each metric."""
+        charts = []
+        for of, names in self._groups([*losses, *times_ms]):
+            charts.append(self._losses(losses, names, f"Loss, {name}{of}"))
+            title = f"Speed against loss, {name}{of}"
+            charts.append(self._speed(losses, times_ms, names, title))
+        return charts
+
+    def _groups(self, names: list[str]) -> list[tuple[str, list[str]]]:
+        """Return the methods of each metric, and what titles add for it: nothing for octile alone.
+
+        Without methods there is one group, which is empty.
+        """
+        groups: dict[str, list[str]] = {}
+        for name in dict.fromkeys(names):
+            groups.setdefault(self._metric_of.get(name, "octile"), []).append(name)
+        if groups.keys() <= {"octile"}:
+            return [("", groups.get("octile", []))]
+        return [(f", {metric} paths", of_metric) for metric, of_metric in groups.items()]
+
+    def _losses(self, losses: Mapping[str, FloatArray], names: list[str], title: str) -> Chart:
+        asked = [name for name in names if name in losses]
+        drawn = {name: losses[name] for name in asked if np.isfinite(losses[name]).any()}
+        missing = [name for name in asked if name not in drawn]
+        if not drawn:
+            return Chart(title, "", "No pair has a known loss.", missing)
+        return Chart(title, _svg_uri(plot_losses(drawn, styles=self._styles)), _OF_LOSSES, missing)
+
+    def _speed(
+        self,
+        losses: Mapping[str, FloatArray],
+        times_ms: Mapping[str, float],
+        names: list[str],
+        title: str,
+    ) -> Chart:
+        drawn = {
+            name: losses[name]
+            for name in names
+            if np.isfinite(losses.get(name, np.empty(0))).any()
+            and 0 < times_ms.get(name, math.nan) < math.inf
+        }
+        missing = [name for name in names if name not in drawn]
+        if not drawn:
+            return Chart(title, "", "No method has both a time and a loss.", missing)
+        chart = plot_speed(drawn, times_ms, styles=self._styles)
+        return Chart(title, _svg_uri(chart), _OF_SPEED, missing)
+
+
+def paths_uri(grid: OccupancyGrid, path: FloatArray, shortest: FloatArray | None) -> str:
+    """Return the picture of a path and a shortest one as a PNG, half as large as an SVG.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    path, shortest
+        float64 (n, 2), points `(x, y)` in metres.
+    """
+    ax = plot_paths(grid, path, shortest, title="", width_in=_CASE_WIDTH_IN)
+    drawn, small = io.BytesIO(picture_bytes(ax, ".png", dpi=_CASE_DPI)), io.BytesIO()
+    with Image.open(drawn) as image:
+        image.convert("RGB").quantize(_CASE_COLOURS).save(small, format="PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(small.getvalue()).decode('ascii')}"
+
+
+def _svg_uri(chart: Axes) -> str:
+    """Return a chart whose texts are texts: the reader's fonts have more letters than ours."""
+    with mpl.rc_context({"svg.fonttype": "none"}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        drawn = picture_bytes(chart, ".svg", dpi=_CASE_DPI)
+    return f"data:image/svg+xml,{quote(drawn, safe=' /:=,;()!*+-._~')}"
+
+
+# The report of a run as one HTML text that opens without network: tables, charts, worst cases.
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
@@ -103,7 +246,7 @@ def render_report(report: ReportData) -> str:
     str
         An HTML document, to be written as UTF-8.
     """
-    from hybridnav.harness.figures import Charts  # noqa: PLC0415 - loads matplotlib
+    from hybridnav.harness.report import Charts  # noqa: PLC0415 - loads matplotlib
 
     names = [*report.overall_losses, *report.overall_times_ms]
     for section in report.maps:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, overload
 from hybridnav._base.files import MODEL_SUFFIX
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.contradictions import ANSWERED, TOO_SLOW
 from hybridnav.harness.methods import (
     REFERENCE,
     MethodSpec,
@@ -22,19 +21,24 @@ from hybridnav.harness.methods import (
     named_spec,
     preset_spec,
 )
-from hybridnav.harness.pairs import (
+from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile, read_records
+from hybridnav.harness.scenes import (
     SAMPLER_VERSION,
+    GivenCosts,
+    MapSpec,
     Pair,
+    clear_scenes,
     evenly_spread,
     lattice_pairs,
+    read_scene,
     sample_pairs,
     scenario_pairs,
+    text_of_costs,
 )
-from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile, read_records
-from hybridnav.harness.scenes import GivenCosts, MapSpec, clear_scenes, read_scene, text_of_costs
 from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
+from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.files.movingai import read_scenarios
 from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M

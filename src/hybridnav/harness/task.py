@@ -12,13 +12,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
-from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
-from hybridnav.harness.pairs import SAMPLER_VERSION
-from hybridnav.harness.records import encode_path, environment, map_digest, pair_id, preparation_id
-from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
+from hybridnav.harness.records import encode_path, environment, pair_id, preparation_id
+from hybridnav.harness.scenes import (
+    SAMPLER_VERSION,
+    map_digest,
+    read_map,
+    read_scene,
+    text_of_costs,
+)
+from hybridnav.harness.yardstick import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.maps import CellClass
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.files import example_map
@@ -27,9 +32,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-    from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
-    from hybridnav.harness.scenes import MapSpec, Scene
+    from hybridnav.harness.scenes import MapSpec, Pair, Scene
 
 
 @dataclass(frozen=True)

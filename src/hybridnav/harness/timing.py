@@ -33,9 +33,8 @@ if TYPE_CHECKING:
 
     from hybridnav.harness.methods import MethodSpec, Prepared
     from hybridnav.harness.outcome import Outcome
-    from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
-    from hybridnav.harness.scenes import MapSpec
+    from hybridnav.harness.scenes import MapSpec, Pair
 
 _DIGITS = 12
 LONG_S = 0.05

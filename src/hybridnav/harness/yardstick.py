@@ -1,15 +1,17 @@
-"""The reference of losses: the metrics to choose from, and the any-angle optimum, proved."""
+"""What answers are held against: the reference of losses, and the answers of other methods."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
+    from hybridnav.harness.records import Record
     from hybridnav.maps import OccupancyGrid
+
 
 Cell = tuple[int, int]
 
@@ -89,3 +91,128 @@ class AnyAngleOptimum:
         """
         centres = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
         return self._search.path((start, goal), centres).length_cells * self._resolution_m
+
+
+# Contradictions of an answer by the answers of other methods, and above all by the optimum.
+
+SLACK = 1e-9
+"""Relative difference of lengths that is rounding."""
+
+ANY_ANGLE_SLACK = 1e-6
+"""That of any-angle lengths: the judge of segments rounds points to 2^-24 of a cell, so a path may
+cut each corner by as much."""
+
+ARC_SLACK = 1e-5
+"""That of costs of arcs, which judges read by chords."""
+
+ANSWERED = ("solved", "no path")
+"""Statuses of records that hold an answer."""
+
+NOT_ASKED = "not asked"
+"""Status of all records of a method that cannot take the map, by a limit of its own."""
+TOO_SLOW = "too slow"
+"""Status of a query that is not asked, because the time of its method on the map is spent."""
+
+
+Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds"]
+"""What a contradiction is about: the regions of a map; a plan without a path; a path without a
+plan; a path that is none; whether there is a path; lengths, costs and bounds."""
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+class Fault(NamedTuple):
+    """A contradiction that the judge found."""
+
+    kind: Kind
+    """What the contradiction is about."""
+    text: str
+    """The contradiction in words."""
+
+
+def is_any_angle(record: Record) -> bool:
+    """Return whether a record holds an any-angle path, which is compared with such paths only."""
+    return bool(record.get("metric") == "any-angle")
+
+
+def contradiction(record: Record, reference: Record) -> str | None:
+    """Return the contradiction of an answer by the optima, None if there is none.
+
+    Parameters
+    ----------
+    record
+        Record of the answer.
+    reference
+        The reference's record of the same pair, which holds both optima.
+
+    Returns
+    -------
+    str or None
+        The contradiction.
+    """
+    if {record["status"], reference["status"]} == set(ANSWERED):
+        return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
+    if record.get("length_m") is None or reference.get("length_m") is None:
+        return None
+    wrong = _cost_contradiction(record, reference.get("weighted_m"))
+    if wrong:
+        return wrong
+    if is_any_angle(record):
+        return _any_angle_contradiction(record, reference.get("any_angle_m"))
+    return _cells_contradiction(record, reference)
+
+
+def kind_of_contradiction(text: str) -> Kind:
+    """Return the kind of a contradiction by the optima."""
+    return "no path" if text.startswith("solvability") else "bounds"
+
+
+def octile_optimum_m(reference: Record) -> float:
+    """Return the length of the shortest path of cells that a record of the reference holds."""
+    return float(reference["octile_m"] if "octile_m" in reference else reference["length_m"])
+
+
+def _cost_contradiction(record: Record, optimum: float | None) -> str | None:
+    """Return the contradiction of costs by the least cost of paths of cells.
+
+    An any-angle path may cost less, and a bound on all any-angle paths holds for paths of cells.
+    """
+    cost, bound = record.get("cost_m"), record.get("cost_lower_bound_m")
+    if optimum is None or cost is None:
+        return None
+    if cost < optimum * (1 - SLACK) and not is_any_angle(record):
+        return f"cost {cost:.6f} m is below the weighted optimum {optimum:.6f} m"
+    of_cells = record.get("cost_grid_bound_m")
+    if of_cells is not None and of_cells > optimum * (1 + SLACK):
+        return (
+            f"the lower bound on paths of cells {of_cells:.6f} m is above the weighted optimum "
+            f"{optimum:.6f} m"
+        )
+    slack = ANY_ANGLE_SLACK if is_any_angle(record) else SLACK
+    if bound is not None and bound > optimum * (1 + slack):
+        return (
+            f"the lower bound on costs {bound:.6f} m is above the weighted optimum {optimum:.6f} m"
+        )
+    return None
+
+
+def _cells_contradiction(record: Record, reference: Record) -> str | None:
+    length, optimum = record["length_m"], octile_optimum_m(reference)
+    if length < optimum * (1 - SLACK):
+        return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
+    bound = record.get("bound")
+    if bound is not None and length > optimum * bound * (1 + SLACK) + SLACK:
+        return f"length {length:.6f} m breaks its bound, {bound:.6f} x optimum {optimum:.6f} m"
+    return None
+
+
+def _any_angle_contradiction(record: Record, optimum: float | None) -> str | None:
+    if optimum is None:  # corners may be cut
+        return None
+    length = record["length_m"]
+    if length < optimum * (1 - ANY_ANGLE_SLACK):
+        return f"length {length:.6f} m is below the any-angle optimum {optimum:.6f} m"
+    bound = record.get("lower_bound_m")
+    if bound is not None and bound > optimum * (1 + ANY_ANGLE_SLACK):
+        return f"the lower bound {bound:.6f} m is above the any-angle optimum {optimum:.6f} m"
+    return None

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 Smooth = Literal["none", "line-of-sight", "arcs"]
+_SMOOTH = get_args(Smooth)
 
 _KEPT = 16
 """Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
@@ -102,9 +103,10 @@ class Planning:
         if isinstance(start, str) or isinstance(goal, str):
             start, goal = self.points_of([start, goal], at, blocked)
         closed = self.closed(blocked)
-        read = partial(read_end, needs_heading=self.needs_headings)
-        poses = read("start", start), read("goal", goal)
-        return PlanRequest(poses, self._checked(smooth), closed, waypoint, began)
+        turns = self.needs_headings
+        first = read_end("start", start, needs_heading=turns)
+        last = read_end("goal", goal, needs_heading=turns)
+        return PlanRequest((first, last), self._checked(smooth), closed, waypoint, began)
 
     @property
     def needs_headings(self) -> bool:
@@ -160,8 +162,8 @@ class Planning:
     def _checked(self, smooth: Smooth | None) -> Smooth:
         """Return the finish asked for, or that of the preset for None."""
         chosen = self.preset.planner.finish if smooth is None else smooth
-        if chosen not in get_args(Smooth):
-            known = ", ".join(map(repr, get_args(Smooth)))
+        if chosen not in _SMOOTH:
+            known = ", ".join(map(repr, _SMOOTH))
             raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
         if chosen == "arcs" and self._by_costs is None:
             raise InvalidValueError(

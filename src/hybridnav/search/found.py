@@ -127,8 +127,9 @@ class Found:
 
     passed: LongArray | Callable[[], LongArray] | None
     """The cells of the path, or how to find them; None without a path."""
-    cost_m: float = math.inf
-    """Length or cost in the metric of the method; infinite without a path."""
+    cost: float | Callable[[], float] = math.inf
+    """Length or cost in the metric of the method, metres, or how to find it; infinite without a
+    path."""
     lower_bound_m: float = math.inf
     """Proved bound on the cost of all paths; infinite where it is proved that there is none."""
     points: FloatArray | None = None
@@ -141,6 +142,11 @@ class Found:
     def has_path(self) -> bool:
         """Whether there is a path."""
         return self.passed is not None
+
+    @cached_property
+    def cost_m(self) -> float:
+        """Length or cost in the metric of the method, metres; infinite without a path."""
+        return self.cost() if callable(self.cost) else self.cost
 
     @cached_property
     def cells(self) -> LongArray:

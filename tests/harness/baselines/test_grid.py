@@ -14,8 +14,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines import MethodResult, Solver
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
-from hybridnav.harness.baselines.regions import joined_regions
-from hybridnav.harness.baselines.simple_graph import SimpleGraphPyramid, first_arcs
+from hybridnav.harness.baselines.regions import SimpleGraphPyramid, first_arcs, joined_regions
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.pyramid.simple import report_of
 from hybridnav.route import MaxDistanceSearch

@@ -1,5 +1,5 @@
-from .anyangle import AnyAnglePath as AnyAnglePath, VisibilityGraph as VisibilityGraph
-from .arcs import Chords as Chords, chords_of as chords_of
+from .judge_line import AnyAnglePath as AnyAnglePath, VisibilityGraph as VisibilityGraph
+from .cheapest import Chords as Chords, chords_of as chords_of
 from .cheapest import CheapestCost as CheapestCost
 from .judge import (
     ScipyOptimum as ScipyOptimum,

@@ -1,29 +1,32 @@
-"""Any-angle paths judged: ends, exact geometry, length, and the cells that they pass."""
+"""Any-angle paths judged by exact geometry, and exact shortest ones by a visibility graph."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges.judge import (
+    Cell,
     Verdict,
     free_classes,
     grid_positions,
     more,
     segment_faults,
 )
+from hybridnav.harness.judges.kernels import segments as kernels
 from hybridnav.maps.checks import checked_points
 from hybridnav.maps.lines import cells_of_line
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
 
-Cell = tuple[int, int]
 
 _NEAR_CELLS = 2.0**-20
 """Greatest distance of an end from the centre of its cell."""
@@ -128,3 +131,149 @@ def _wrong_endpoints(grid: OccupancyGrid, xy: FloatArray, start: Cell, goal: Cel
         )
         if wrong
     ]
+
+
+# Exact shortest any-angle paths, by a visibility graph that tests sight on demand.
+
+ROUNDING = 1e-9
+"""Share by which bounds are slackened, because they are sums of rounded lengths."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnyAnglePath:
+    """A shortest path that may run at any angle."""
+
+    points: FloatArray | None
+    """float64 (n, 2), `(x, y)` in metres, map frame; None where there is no path. A path from a
+    cell to itself has one point."""
+    length_m: float
+    """Length in metres, infinite where there is no path."""
+
+
+class VisibilityGraph:
+    """Exact Euclidean shortest paths between the centres of cells.
+
+    Free space is the union of the closed squares of the free cells, without the passages between
+    two blocked cells that meet at a corner (see `segment_faults`). A shortest path there bends at
+    convex corners of blocked cells only: lattice corners with exactly one blocked cell of four.
+    Visibility is tested exactly, of those corners alone that a search comes to.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+
+    Notes
+    -----
+    T. Lozano-Perez, M. A. Wesley: An algorithm for planning collision-free paths among polyhedral
+    obstacles, 1979. J. P. Bailey and others: Path-length analysis for grid-based path planning,
+    2021, on the bound of the search: an octile path over corners of the lattice is at most 8.24 %
+    longer.
+
+    Examples
+    --------
+    >>> from hybridnav.harness.judges import VisibilityGraph
+    >>> graph = VisibilityGraph(hn.OccupancyGrid(np.zeros((3, 4)), robot_radius_m=0))
+    >>> graph.shortest((0, 0), (2, 0)).length_m
+    2.0
+    """
+
+    def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+        self._grid = grid
+        self._free_of = free_classes(allow_unexplored=allow_unexplored)
+        self.corners, self._blocked = _convex_corners(self._free_of[grid.classes])
+        """float64 (n, 2), (row, col) of the corners in grid units, whole numbers."""
+
+    def shortest(self, start_cell: Cell, goal_cell: Cell) -> AnyAnglePath:
+        """Find a shortest path between the centres of two cells.
+
+        Parameters
+        ----------
+        start_cell, goal_cell
+            (row, col), inside the map.
+
+        Returns
+        -------
+        AnyAnglePath
+            Without points if there is no path or a cell is not free.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell lies outside the map.
+        """
+        start, goal = (_centre(self._grid, cell) for cell in (start_cell, goal_cell))
+        if not all(
+            self._free_of[self._grid.classes[tuple(cell)]] for cell in (start_cell, goal_cell)
+        ):
+            return AnyAnglePath(None, math.inf)
+        return self.between(start, goal)
+
+    def between(self, start: tuple[float, float], goal: tuple[float, float]) -> AnyAnglePath:
+        """Find a shortest path between two positions in free space.
+
+        Parameters
+        ----------
+        start, goal
+            (row, col) in grid units, where the centre of cell (0, 0) is (0.5, 0.5); neither may be
+            a corner at which two free cells meet alone.
+        """
+        classes = self._grid.classes
+        endpoints = np.array([start, goal])
+        if start == goal:
+            return self._path(endpoints[:1])
+        if kernels.segment_code(classes, self._free_of, *start, *goal) == kernels.CLEAR:
+            return self._path(endpoints)
+        octile, most = kernels.octile_lengths(classes, self._free_of, *start, *goal)
+        if math.isinf(most):
+            return AnyAnglePath(None, math.inf)
+        most *= 1 + ROUNDING
+        row, col = self.corners.astype(np.int64).T
+        to_goal = _lower_bounds(octile[row, col], self.corners - endpoints[1])
+        away = self.corners - endpoints[0]
+        near = np.hypot(away[:, 0], away[:, 1]) + to_goal <= most
+        nodes = np.concatenate([self.corners[near], endpoints])
+        blocked = np.concatenate([self._blocked[near], np.zeros((2, 2), np.int64)])
+        straight = np.array([math.dist(start, goal), 0.0])
+        chain = kernels.shortest_chain(
+            classes, self._free_of, nodes, blocked, np.concatenate([to_goal[near], straight]), most
+        )
+        return self._path(nodes[chain])
+
+    def _path(self, positions: FloatArray) -> AnyAnglePath:
+        steps = np.diff(positions, axis=0)
+        length = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        frame = self._grid.frame
+        return AnyAnglePath(frame.points_of_grid(positions), length * frame.resolution_m)
+
+
+def _lower_bounds(octile: FloatArray, offset: FloatArray) -> FloatArray:
+    """Return lower bounds on paths at any angle by octile lengths, which begin at corners of the
+    goal's cell, and by straight lines."""
+    by_octile = (octile - kernels.ACROSS) / kernels.OCTILE_RATIO - kernels.ACROSS
+    bounds: FloatArray = np.maximum(by_octile, np.hypot(offset[:, 0], offset[:, 1]))
+    return bounds * (1 - ROUNDING)
+
+
+def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:
+    """Return the lattice corners with one blocked cell of four, and the signs of the direction to
+    it, int64 (n, 2)."""
+    blocked = ~free
+    here = blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:]
+    row, col = np.nonzero(np.sum(here, axis=0, dtype=np.int8) == 1)
+    is_above, is_right = (
+        np.where(a[row, col] | b[row, col], 1, -1) for a, b in (here[2:], here[1::2])
+    )
+    corners = np.stack([row, col], axis=1).astype(np.float64) + 1
+    return corners, np.stack([is_above, is_right], axis=1).astype(np.int64)
+
+
+def _centre(grid: OccupancyGrid, cell: Cell) -> tuple[float, float]:
+    row, col = int(cell[0]), int(cell[1])
+    if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+        raise InvalidValueError(
+            f"cell ({row}, {col}) lies outside the map of {grid.shape[0]} x {grid.shape[1]} cells"
+        )
+    return row + 0.5, col + 0.5

@@ -1,4 +1,4 @@
-"""The table that a language fills in."""
+"""The table that a language fills in, and the sentences in English and in German."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Language:
 
     Examples
     --------
-    >>> from hybridnav.planner.guide.english import ENGLISH
+    >>> from hybridnav.planner.guide.language import ENGLISH
     >>> ENGLISH.turn
     '{inside} {lead}{turn}'
     """
@@ -177,3 +177,195 @@ class Language:
     """In the room that is the waypoint, some way behind its door; `{lead}`, `{inside}`."""
     there: str
     """End of the sentence whose door leads to the waypoint."""
+
+
+# The sentences in English.
+
+ENGLISH = Language(
+    name="English",
+    decimal=".",
+    numbers=(
+        *("two", "three", "four", "five", "six", "seven"),
+        *("eight", "nine", "ten", "eleven", "twelve"),
+    ),
+    named=SpaceWords(inside="in {name}", into="into {name}", itself="{name}"),
+    common=SpaceWords(inside="in the {name}", into="into the {name}", itself="the {name}"),
+    corridor=SpaceWords(inside="in the corridor", into="into the corridor", itself="the corridor"),
+    hall=SpaceWords(inside="in the hall", into="into the hall", itself="the hall"),
+    room=SpaceWords(inside="in the room", into="into the room", itself="the room"),
+    passage=SpaceWords(inside="in the passage", into="into the passage", itself="the passage"),
+    storey=SpaceWords(inside="on this floor", into="onto this floor", itself="this floor"),
+    left=HandWords(
+        turn="turn left",
+        sharp="turn sharply left",
+        slight="bear left",
+        face="face left",
+        beside="on the left",
+        ahead="ahead on the left",
+        behind="behind you on the left",
+        onward=", then left",
+    ),
+    right=HandWords(
+        turn="turn right",
+        sharp="turn sharply right",
+        slight="bear right",
+        face="face right",
+        beside="on the right",
+        ahead="ahead on the right",
+        behind="behind you on the right",
+        onward=", then right",
+    ),
+    turn_round="turn round",
+    face_round="turn round",
+    start="start {inside}",
+    start_facing="start {inside} and {turn}",
+    start_beside="start {inside} with {landmark} {beside}",
+    start_heading="start {inside} heading {compass}",
+    compass=(
+        *("east", "north-east", "north", "north-west"),
+        *("west", "south-west", "south", "south-east"),
+    ),
+    start_towards="start {inside} towards {landmark}",
+    start_away="start {inside} with {landmark} behind you",
+    door_to="door {number} to {itself}",
+    opening_to="opening {number} to {itself}",
+    after="after {metres} m ",
+    after_passing="after {metres} m, past {passed}, ",
+    passed_beside="{things} {beside}",
+    passed_both="{things} on each side",
+    one_door="one door",
+    doors="{count} doors",
+    one_opening="one opening",
+    openings="{count} openings",
+    joint=" and ",
+    turn="{inside} {lead}{turn}",
+    go="{lead}go through {door} {into}{out}",
+    go_turning="{lead}{turn} through {door} {into}{out}",
+    leave="{lead}leave {itself} by {door} {into}{out}",
+    leave_turning="{lead}{turn} and leave {itself} by {door} {into}{out}",
+    go_on="{lead}go on {into}{out}",
+    go_on_turning="{lead}{turn} {into}{out}",
+    door="door {number}",
+    door_beside="door {number} {beside}",
+    narrow_opening="opening {number}",
+    narrow_opening_beside="opening {number} {beside}",
+    opening="opening {number} ({width} m wide)",
+    opening_beside="opening {number} {beside} ({width} m wide)",
+    out_turning=" and {turn}",
+    lift=NameWords(common="the {name}", titled="{name}", plain="lift {name}"),
+    stairs=NameWords(common="the {name}", titled="{name}", plain="stairs {name}"),
+    ramp=NameWords(common="the {name}", titled="{name}", plain="ramp {name}"),
+    floor=NameWords(common="the {name}", titled="{name}", plain="floor {name}"),
+    take_lift="{lead}take {link} to {floor}{out}",
+    take_stairs="{lead}take {link} to {floor}{out}",
+    out_of_lift=", {turn} out of it",
+    out_of_stairs=", then {turn}",
+    straight_out=", go straight on",
+    arrive="{lead}you are at {waypoint} {inside}",
+    at_beside=", with {landmark} {beside}",
+    at_ahead=", with {landmark} ahead",
+    at_behind=", with {landmark} behind you",
+    arrive_at_goal="{lead}you are at the goal {inside}",
+    arrive_inside="{lead}you are there",
+    there=", and you are there",
+)
+
+
+# The sentences in German.
+
+_NAMED = SpaceWords(inside="in „{name}“", into="in „{name}“", itself="„{name}“")
+"""A name keeps no article: its gender is not known."""
+
+
+def _always(words: str) -> NameWords:
+    return NameWords(common=words, titled=words, plain=words)
+
+
+GERMAN = Language(
+    name="Deutsch",
+    decimal=",",
+    numbers=(
+        *("zwei", "drei", "vier", "fünf", "sechs", "sieben"),
+        *("acht", "neun", "zehn", "elf", "zwölf"),
+    ),
+    named=_NAMED,
+    common=_NAMED,
+    corridor=SpaceWords(inside="im Flur", into="in den Flur", itself="den Flur"),
+    hall=SpaceWords(inside="in der Halle", into="in die Halle", itself="die Halle"),
+    room=SpaceWords(inside="im Raum", into="in den Raum", itself="den Raum"),
+    passage=SpaceWords(inside="im Durchgang", into="in den Durchgang", itself="den Durchgang"),
+    storey=SpaceWords(inside="auf dieser Etage", into="auf diese Etage", itself="diese Etage"),
+    left=HandWords(
+        turn="links abbiegen",
+        sharp="scharf links abbiegen",
+        slight="halb links halten",
+        face="nach links drehen",
+        beside="links",
+        ahead="links voraus",
+        behind="links hinten",
+        onward=", dann nach links",
+    ),
+    right=HandWords(
+        turn="rechts abbiegen",
+        sharp="scharf rechts abbiegen",
+        slight="halb rechts halten",
+        face="nach rechts drehen",
+        beside="rechts",
+        ahead="rechts voraus",
+        behind="rechts hinten",
+        onward=", dann nach rechts",
+    ),
+    turn_round="umkehren",
+    face_round="umdrehen",
+    start="Start {inside}",
+    start_facing="Start {inside}: {turn}",
+    start_beside="Start {inside}, {landmark} {beside}",
+    start_heading="Start {inside} in Richtung {compass}",
+    compass=(
+        *("Osten", "Nordosten", "Norden", "Nordwesten"),
+        *("Westen", "Südwesten", "Süden", "Südosten"),
+    ),
+    start_towards="Start {inside} auf {landmark} zu",
+    start_away="Start {inside}, {landmark} im Rücken",
+    door_to="Tür {number} {into}",
+    opening_to="Öffnung {number} {into}",
+    after="nach {metres} m ",
+    after_passing="nach {metres} m, vorbei an {passed}, ",
+    passed_beside="{things} {beside}",
+    passed_both="{things} auf jeder Seite",
+    one_door="einer Tür",
+    doors="{count} Türen",
+    one_opening="einer Öffnung",
+    openings="{count} Öffnungen",
+    joint=" und ",
+    turn="{inside} {lead}{turn}",
+    go="{lead}durch {door} {into} gehen{out}",
+    go_turning="{lead}{turn} und durch {door} {into} gehen{out}",
+    leave="{lead}{itself} durch {door} verlassen und {into} gehen{out}",
+    leave_turning="{lead}{turn}, {itself} durch {door} verlassen und {into} gehen{out}",
+    go_on="{lead}weiter {into} gehen{out}",
+    go_on_turning="{lead}{turn} und weiter {into} gehen{out}",
+    door="Tür {number}",
+    door_beside="Tür {number} ({beside})",
+    narrow_opening="Öffnung {number}",
+    narrow_opening_beside="Öffnung {number} ({beside})",
+    opening="Öffnung {number} ({width} m breit)",
+    opening_beside="Öffnung {number} ({beside}, {width} m breit)",
+    out_turning=", dann {turn}",
+    lift=_always("dem Aufzug „{name}“"),
+    stairs=_always("die Treppe „{name}“"),
+    ramp=_always("die Rampe „{name}“"),
+    floor=NameWords(common="Etage „{name}“", titled="Etage „{name}“", plain="Etage {name}"),
+    take_lift="{lead}mit {link} auf {floor} fahren{out}",
+    take_stairs="{lead}über {link} auf {floor} gehen{out}",
+    out_of_lift=", beim Aussteigen {turn}",
+    out_of_stairs=", dann {turn}",
+    straight_out=", dann geradeaus",
+    arrive="{lead}am Ziel: {waypoint} {inside}",
+    at_beside=", {landmark} {beside}",
+    at_ahead=", {landmark} voraus",
+    at_behind=", {landmark} im Rücken",
+    arrive_at_goal="{lead}am Ziel {inside}",
+    arrive_inside="{inside} {lead}am Ziel",
+    there=", und Sie sind am Ziel",
+)

@@ -6,8 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.guide.english import ENGLISH
-from hybridnav.planner.guide.german import GERMAN
+from hybridnav.planner.guide.language import ENGLISH, GERMAN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

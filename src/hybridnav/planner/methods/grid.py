@@ -49,9 +49,16 @@ def on_cells(
     stats: PlanStats,
 ) -> Found:
     """Return the answer for a path of cells: its cost, and its bound, the cost itself for None."""
-    per_cell, cost_cells = refiner.grid.resolution_m, refiner.cost_in_cells(cells)
-    bound = cost_cells if bound_cells is None else bound_cells
-    return Found(cells, cost_cells * per_cell, bound * per_cell, stats=stats)
+    per_cell = refiner.grid.resolution_m
+
+    def cost_m() -> float:
+        return refiner.cost_in_cells(cells) * per_cell
+
+    if bound_cells is None:
+        cost = cost_m()
+        return Found(cells, cost, cost, stats=stats)
+    # The cost along the cells is counted if somebody reads it: a path that is smoothed has its own.
+    return Found(cells, cost_m, bound_cells * per_cell, stats=stats)
 
 
 def round_closed(found: Found, query: Query, refiner: GridRefiner) -> Found:

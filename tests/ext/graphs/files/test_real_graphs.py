@@ -16,7 +16,7 @@ from hybridnav.ext.fleet import (
 )
 from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness.judges import judge_line, segment_faults
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.scenes import sample_pairs
 
 ANCHOR = hn.ext.graphs.Anchor(30.2862, -97.7366, heading_deg=12)
 
