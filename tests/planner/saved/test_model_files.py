@@ -86,7 +86,13 @@ def test_a_model_of_an_earlier_version_has_the_settings_of_now(
     content: bytes, tmp_path: Path
 ) -> None:
     """No warning: nobody can write these settings anew."""
-    old = {"coarse": "jumps", "corridor": "route", "refine": "none", "ompl": None, "epsilon": None}
+    old: dict[str, Any] = {
+        "coarse": "jumps",
+        "corridor": "route",
+        "refine": "none",
+        "ompl": None,
+        "epsilon": None,
+    }
     old |= {"smooth": "line-of-sight", "turning_radius_m": 0.3, "costs": None, "budget_s": None}
     path = tmp_path / "m.hnm"
     path.write_bytes(altered(content, put("preset", "values", "planner", to=old)))
