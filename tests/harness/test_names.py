@@ -9,7 +9,7 @@ import pytest
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.methods import BASELINES, baseline_spec
-from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_hash
+from hybridnav.harness.names import NamedMethod, class_of, load_methods, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
@@ -162,7 +162,7 @@ def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
         "- {class: 'mine:Mine', settings: {weight: 1}}\n"
         "- {name: 'near', preset: shortest, settings: {planner.epsilon: 0.1}}\n"
     )
-    run = replace(settings, baselines=(), methods=read_methods(file))
+    run = replace(settings, baselines=(), methods=load_methods(file))
     evaluate(run, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     assert study.faults == []
@@ -225,13 +225,13 @@ def test_a_file_of_another_form_is_refused_in_one_line(tmp_path, text, words):
     file = tmp_path / "methods.yaml"
     file.write_text(text)
     with pytest.raises(InvalidValueError, match=words) as refusal:
-        read_methods(file)
+        load_methods(file)
     assert "\n" not in str(refusal.value)
 
 
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InvalidValueError, match="No such file"):
-        read_methods(tmp_path / "none.yaml")
+        load_methods(tmp_path / "none.yaml")
 
 
 def test_a_module_that_cannot_be_imported_is_told_at_once(settings, tmp_path):

@@ -27,7 +27,8 @@ JUDGES: Any = CheapestCost
 OPTIONS: Any = OverlayOptions
 PREPARE: Any = prepare_overlay
 PLANNERS: Any = hn.HybridPlanner
-BUILD: Any = hn
+BUILD: Any = hn.ext.graphs
+MAPS: Any = hn
 CARRY: Any = carry_costs
 GRAPH = hn.ext.graphs.build_route_graph(TOPOLOGY)
 
@@ -55,7 +56,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "topology is None": lambda: BUILD.build_route_graph(None),
     "nodes is 'many'": lambda: BUILD.build_route_graph(TOPOLOGY, nodes="many"),
     "spacing_m is nan": lambda: BUILD.build_route_graph(TOPOLOGY, spacing_m=np.nan),
-    "grid is 'office'": lambda: BUILD.write_movingai_map("office", "office.map"),
+    "grid is 'office'": lambda: MAPS.write_movingai_map("office", "office.map"),
     "before is None": lambda: CARRY(layer_of(np.ones((3, 5))), None, GRID),
     "costs is": lambda: PLANNERS(TOPOLOGY, preset="robot", costs=np.ones((3, 5))),
 }

@@ -3,8 +3,8 @@
 from tests.product.house import figures
 
 LIMITS = {
-    "code": 56_250,
-    "lines": 92_850,
+    "code": 56_100,
+    "lines": 92_800,
     "files": 431,
     "code outside ext": 39_100,
     "lines of a file, median": 300,
@@ -14,9 +14,11 @@ LIMITS = {
     "arrows, with single modules": 78,
     "files visited by paper": 56,
     "lines visited by paper": 11_300,
-    "modules of a plan and a picture": 157,
+    "modules of a plan and a picture": 150,
     "imports, % of the code": 9.8,
-    "lines of tests": 55_800,
+    "names at the root": 44,
+    "parameters of commands, shared ones once": 139,
+    "lines of tests": 56_400,
 }
 
 

@@ -17,7 +17,7 @@ from scipy import sparse
 import hybridnav as hn
 from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
 from hybridnav.maps import CellClass
-from hybridnav.maps.files.movingai import Scenario, read_scenarios
+from hybridnav.maps.files.movingai import Scenario, load_scenarios
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.kernels import weighted as kernels
 from hybridnav.search.waypoints import cheapest_waypoints
@@ -236,7 +236,7 @@ def problem_set(file: Path) -> tuple[hn.OccupancyGrid, list[Problem]]:
     digits = digits_of([line[-1] for line in lines if line])
     problems = [
         Problem(scenario, *digit)
-        for scenario, digit in zip(read_scenarios(file), digits, strict=True)
+        for scenario, digit in zip(load_scenarios(file), digits, strict=True)
     ]
     order = np.argsort([problem.scenario.optimum_cells for problem in problems], kind="stable")
     others = np.random.default_rng(0).choice(order[:-LONGEST], PROBLEMS - LONGEST, replace=False)

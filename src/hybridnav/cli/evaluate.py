@@ -178,7 +178,7 @@ def evaluate(
         raise UsageError(
             "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
         )
-    from hybridnav.harness.names import read_methods  # noqa: PLC0415
+    from hybridnav.harness.names import load_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -202,7 +202,7 @@ def evaluate(
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
         graphs=tuple(_graph(file, floor) for file in graph or ()),
-        methods=() if methods is None else read_methods(methods),
+        methods=() if methods is None else load_methods(methods),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,

@@ -172,7 +172,7 @@ def own_settings(method: Any) -> str:
     return " ".join(words.split())[:_MOST_LETTERS_OF_SETTINGS] if isinstance(words, str) else ""
 
 
-def read_methods(path: PathLike) -> tuple[NamedMethod, ...]:
+def load_methods(path: PathLike) -> tuple[NamedMethod, ...]:
     """Read a YAML file of methods.
 
     Parameters
@@ -194,9 +194,9 @@ def read_methods(path: PathLike) -> tuple[NamedMethod, ...]:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from hybridnav.harness import read_methods
+    >>> from hybridnav.harness import load_methods
     >>> _ = Path("methods.yaml").write_text("methods: [{name: taut, preset: shortest}]")
-    >>> read_methods("methods.yaml")[0].name
+    >>> load_methods("methods.yaml")[0].name
     'taut'
     """
     try:

@@ -40,7 +40,7 @@ from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW
 from hybridnav.maps import DEFAULT_MAX_CELLS
-from hybridnav.maps.files.movingai import read_scenarios
+from hybridnav.maps.files.movingai import load_scenarios
 from hybridnav.maps.limits import DEFAULT_ROBOT_RADIUS_M
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class RunSettings:
     the nearest node in sight of the start, over the edges that are shortest in metres, and straight
     from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
-    """Methods with names and settings of their own, as `read_methods` reads them from a file."""
+    """Methods with names and settings of their own, as `load_methods` reads them from a file."""
     clear_edges_only: bool = False
     """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None
@@ -376,7 +376,7 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
 
 def _pairs_of(settings: RunSettings, grid: OccupancyGrid, scenarios: str) -> list[Pair]:
     if scenarios:
-        pairs = scenario_pairs(grid, read_scenarios(scenarios))
+        pairs = scenario_pairs(grid, load_scenarios(scenarios))
         return evenly_spread(pairs, settings.pairs or len(pairs))
     if settings.lattice_step_m is not None:
         return lattice_pairs(grid, settings.lattice_step_m)

@@ -18,7 +18,7 @@ from hybridnav.harness.baselines import MethodResult
 from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.maps import CellClass
-from hybridnav.maps.files.movingai import load_movingai_map, read_scenarios
+from hybridnav.maps.files.movingai import load_movingai_map, load_scenarios
 from hybridnav.search.grid_search import GridSearch
 from tests.harness.small_runs import free_pairs
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
@@ -228,7 +228,7 @@ def test_senseless_sizes_are_refused() -> None:
 def test_loss_on_a_game_map_is_that_of_the_paper(data: Path) -> None:
     folder = data / "movingai" / "dao"
     grid = load_movingai_map(folder / "arena2.map")
-    scenarios = [s for s in read_scenarios(folder / "arena2.map.scen") if s.optimum_cells > 0]
+    scenarios = [s for s in load_scenarios(folder / "arena2.map.scen") if s.optimum_cells > 0]
     enterable = grid.classes == CellClass.FREE
     smooth, raw = HpaStar(grid), HpaStar(grid, smooth=False)
     losses = []

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.maps import CellClass, Frame
-from hybridnav.maps.files import Scenario, load_map, read_scenarios
+from hybridnav.maps.files import Scenario, load_map, load_scenarios
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 HEADER = "type octile\nheight 3\nwidth 4\nmap\n"
@@ -118,12 +118,12 @@ def test_scenarios_count_rows_from_the_bottom(write, separator, end, version):
     columns = ["7", "maps/dao/a.map", "4", "3", "0", "2", "3", "1", "3.41421356"]
     path = write(end.join([version, separator.join(columns), "", ""]), "a.scen")
     expected = Scenario(7, "maps/dao/a.map", 3, 4, (0, 0), (1, 3), 3.41421356)
-    assert read_scenarios(path) == [expected]
+    assert load_scenarios(path) == [expected]
 
 
 def test_a_map_name_may_hold_spaces_between_tabs(write):
     path = write("version 1\n0\tmy map.map\t4\t3\t0\t0\t1\t0\t1\n", "a.scen")
-    assert read_scenarios(path)[0].map_name == "my map.map"
+    assert load_scenarios(path)[0].map_name == "my map.map"
 
 
 GOOD = "0 a.map 4 3 0 0 1 0 1\n"
@@ -146,12 +146,12 @@ GOOD = "0 a.map 4 3 0 0 1 0 1\n"
     ],
 )
 def test_a_damaged_scenario_file_gives_one_line_that_says_where(write, content, words):
-    assert words in _one_line(write(content, "a.scen"), read_scenarios)
+    assert words in _one_line(write(content, "a.scen"), load_scenarios)
 
 
 def test_missing_scenarios(tmp_path):
     with pytest.raises(MapNotFoundError, match=r"no\.scen: no such file"):
-        read_scenarios(tmp_path / "no.scen")
+        load_scenarios(tmp_path / "no.scen")
 
 
 def test_all_reference_maps_load_and_their_scenarios_stand_on_free_cells(data):
@@ -159,7 +159,7 @@ def test_all_reference_maps_load_and_their_scenarios_stand_on_free_cells(data):
     assert paths
     for path in paths:
         grid = load_map(path)
-        scenarios = read_scenarios(path.with_suffix(".map.scen"))
+        scenarios = load_scenarios(path.with_suffix(".map.scen"))
         assert scenarios
         assert {(scenario.rows, scenario.cols) for scenario in scenarios} == {grid.shape}
         endpoints = np.array([(scenario.start, scenario.goal) for scenario in scenarios])

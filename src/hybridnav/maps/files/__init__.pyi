@@ -2,7 +2,7 @@ from .load import load_map as load_map
 from .movingai import (
     Scenario as Scenario,
     load_movingai_map as load_movingai_map,
-    read_scenarios as read_scenarios,
+    load_scenarios as load_scenarios,
 )
 from .ros import example_map as example_map, load_ros_map as load_ros_map
 from .write import write_movingai_map as write_movingai_map, write_ros_map as write_ros_map

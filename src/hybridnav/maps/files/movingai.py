@@ -230,7 +230,7 @@ def _misfit(body: bytes, shape: tuple[int, int], first_line: int) -> str:
     return f": {found} rows, expected {rows} (the height)"
 
 
-def read_scenarios(path: PathLike) -> list[Scenario]:
+def load_scenarios(path: PathLike) -> list[Scenario]:
     r"""Read a scenario file.
 
     Parameters
@@ -253,9 +253,9 @@ def read_scenarios(path: PathLike) -> list[Scenario]:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from hybridnav.maps.files import read_scenarios
+    >>> from hybridnav.maps.files import load_scenarios
     >>> _ = Path("tiny.scen").write_text("version 1\n0 tiny.map 3 1 0 0 2 0 2.0\n")
-    >>> read_scenarios("tiny.scen")[0].goal
+    >>> load_scenarios("tiny.scen")[0].goal
     (0, 2)
     """
     where = f"scenarios {printable(path)}"
