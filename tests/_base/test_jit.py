@@ -1,8 +1,11 @@
 """Compiled kernels: callable from Python and from each other, and compiled once."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,3 +68,37 @@ def test_a_kernel_that_kernels_call_is_called_from_python_too() -> None:
     assert _times(values, 3, True) == 4.5
     assert _times(values, k=3, is_halved=False) == 9
     assert _sum_of_times(values) == 12.5
+
+
+_STALE = """
+import sys
+from collections import namedtuple
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+import kernels_of_both
+from {module} import State
+print(kernels_of_both.outer(State(np.arange(3.0))))
+"""
+
+
+def test_kept_code_that_names_a_module_that_is_gone_is_compiled_anew(tmp_path: Path) -> None:
+    """As after an upgrade that moved a named tuple: numba reads the index before its date."""
+    tuples = "from typing import Any, NamedTuple\nclass State(NamedTuple):\n    values: Any\n"
+    (tmp_path / "kernels_of_both.py").write_text(
+        "from hybridnav._base.jit import njit\n"
+        "@njit(cache=True)\ndef inner(state):\n    return state.values.sum()\n"
+        "@njit(cache=True)\ndef outer(state):\n    return inner(state) + 1.0\n"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for module, other in (("before", "after"), ("after", "before")):
+        (tmp_path / f"{module}.py").write_text(tuples)
+        (tmp_path / f"{other}.py").unlink(missing_ok=True)
+        code = _STALE.format(module=module)
+        done = subprocess.run(
+            [sys.executable, "-c", code, tmp_path],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stdout) == (0, "4.0\n"), done.stderr

@@ -19,7 +19,7 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.ext.classes import AlternativeSearch, alternative_search, search
 from hybridnav.ext.classes.kernels import classes as _class_kernels
-from hybridnav.ext.classes.kernels import words as _word_kernels
+from hybridnav.ext.classes.kernels import trees as _tree_kernels
 from hybridnav.harness.judges import judge_path
 from hybridnav.maps import CellClass
 from hybridnav.route import RouteFinder
@@ -130,7 +130,7 @@ def test_no_time_limit_counts_the_compilation_of_kernels(monkeypatch):
     clocks = ("hybridnav.ext.classes.alternatives", "hybridnav.ext.classes.search")
     names = {
         _class_kernels: ("begin", "find_classes", "path_to"),
-        _word_kernels: ("word_at",),
+        _tree_kernels: ("word_at",),
         search: ("field_distances", "legal_moves"),
     }
     ready: set[Any] = set()

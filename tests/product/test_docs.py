@@ -39,7 +39,7 @@ def _public_names() -> list[str]:
     names = [name for name in hn.__all__ if name not in modules]
     wing = [f"ext.{name}" for name in importlib.import_module("hybridnav.ext").__all__]
     packages = [module.name for module in pkgutil.iter_modules(hn.__path__) if module.ispkg]
-    for place in (*set(packages) - modules, *wing):
+    for place in (*sorted(set(packages) - modules), *wing):
         package = importlib.import_module(f"hybridnav.{place}")
         listed = getattr(package, "__all__", [])
         names += [f"{place}.{name}" for name in listed if name not in hn.__all__]
@@ -59,7 +59,7 @@ def test_the_reference_names_nothing_that_is_not_there() -> None:
         assert hasattr(home, attribute), name
 
 
-@pytest.mark.parametrize("name", [*set(hn.__all__) - {"errors", "ext"}])
+@pytest.mark.parametrize("name", sorted(set(hn.__all__) - {"errors", "ext"}))
 def test_what_the_reference_shows_is_documented(name: str) -> None:
     thing = getattr(hn, name)
     assert inspect.getdoc(thing)

@@ -85,7 +85,23 @@ def _tell() -> None:
         )
 
 
-class _Inner(CPUDispatcher):
+class _Renewed(CPUDispatcher):
+    """A kernel whose kept code is dropped if it cannot be read.
+
+    An index of the cache names the types of arguments by their modules. One that another version of
+    this package wrote may name a module that is gone, and numba reads it before it compares dates.
+    """
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, or load it from the cache."""
+        try:
+            return super().compile(sig)
+        except (AttributeError, ImportError):
+            self._cache.flush()  # type: ignore[attr-defined]
+            return super().compile(sig)
+
+
+class _Inner(_Renewed):
     """The twin of a kernel that other kernels call.
 
     A first plan spends most of its time in the compiler. A quarter of that went into wrappers for
@@ -107,7 +123,7 @@ def _type_of(argument: Any) -> Any:
     return types.unliteral(argument)  # type: ignore[no-untyped-call]
 
 
-class _Kernel(CPUDispatcher):
+class _Kernel(_Renewed):
     """A kernel that Python calls; other kernels call its twin. Slow compilations are logged."""
 
     def compile(self, sig: Any) -> Any:

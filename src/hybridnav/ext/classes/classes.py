@@ -177,7 +177,7 @@ class HomotopyClasses:
     @cached_property
     def cell_words(self) -> CellWords:
         """The words of base edges."""
-        from hybridnav.ext.classes.kernels.words import spread_words  # noqa: PLC0415 - loads numba
+        from hybridnav.ext.classes.kernels.trees import spread_words  # noqa: PLC0415 - loads numba
 
         of_edge = np.zeros(2 * self.enterable_cells.size, dtype=np.int32)
         carrying = np.array([word != IDENTITY for word in self.words], dtype=np.bool_)

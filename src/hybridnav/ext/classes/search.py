@@ -17,7 +17,7 @@ from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.classes.classes import HomotopyClasses
 from hybridnav.ext.classes.kernels import classes as _class_kernels
-from hybridnav.ext.classes.kernels import words as _word_kernels
+from hybridnav.ext.classes.kernels import trees as _tree_kernels
 from hybridnav.maps.islands import in_runs
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class AlternativeSearch:
         gap_m = min(math.sqrt(least_hole_m2), _LARGEST_GAP_M)
         self._apart = max(1, round(gap_m / grid.resolution_m))
         words = self.classes.cell_words.words
-        self._letters = _word_kernels.Letters(
+        self._letters = _tree_kernels.Letters(
             np.cumsum([0, *map(len, words)], dtype=np.int64),
             np.array([letter for word in words for letter in word], dtype=np.int32),
         )
@@ -262,7 +262,7 @@ def _search(
         Time of `perf_counter` at which the search gives up.
     """
     states = _class_kernels.States.of_room(most_states)
-    tree = _word_kernels.Tree.of_room(most_states)
+    tree = _tree_kernels.Tree.of_room(most_states)
     waiting = _class_kernels.Open.of_room(plane.left.size, most_states, count)
     _class_kernels.begin(plane, states, waiting, first)
     reason, is_late = _class_kernels.PAUSED, False
@@ -272,7 +272,7 @@ def _search(
     found = []
     for state in waiting.goals[: waiting.used[_class_kernels.GOALS]].tolist():
         flat = _class_kernels.path_to(states, state)
-        word = tuple(_word_kernels.word_at(tree, states.word[state]).tolist())
+        word = tuple(_tree_kernels.word_at(tree, states.word[state]).tolist())
         length = float(length_in_cells(states.cost[[state]])[0])
         found.append(ClassPath(np.stack(np.divmod(flat, plane.cols), axis=1), word, length))
     return tuple(found), reason

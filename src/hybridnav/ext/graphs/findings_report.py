@@ -10,7 +10,6 @@ import typer
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.cli.common import UsageError
-from hybridnav.harness.report import page_template
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -251,6 +250,8 @@ def _page(
     rows: list[list[str]] | None = None,
     lines: tuple[str, ...] = (),
 ) -> str:
+    from hybridnav.harness.report import page_template  # noqa: PLC0415 - loads matplotlib
+
     source = resources.files("hybridnav.ext.graphs").joinpath("check.html.j2")
     return page_template(source.read_text(encoding="utf-8")).render(
         title=title, facts=facts, parts=parts, rows=rows, lines=lines, most=_SHOWN

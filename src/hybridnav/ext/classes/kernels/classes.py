@@ -13,7 +13,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
-from hybridnav.ext.classes.kernels.words import Letters, after, along, times
+from hybridnav.ext.classes.kernels.trees import Letters, after, along, times
 
 _STATE_BITS = 26
 _STATE_MASK = (1 << _STATE_BITS) - 1
