@@ -43,7 +43,7 @@ class Islands:
     @classmethod
     def of_classes(cls, classes: ByteArray) -> Islands:
         """Find the islands of a grid of `CellClass`, shape (rows, cols)."""
-        from scipy import ndimage  # noqa: PLC0415 - most plans need no islands
+        from scipy import ndimage  # noqa: PLC0415 - takes long to load
 
         occupied = classes == CellClass.OCCUPIED
         padded = np.pad(occupied, 1, constant_values=True)
