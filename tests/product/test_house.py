@@ -13,7 +13,7 @@ LIMITS = {
     "arrows between packages": 62,
     "arrows, with single modules": 78,
     "files visited by paper": 51,
-    "lines visited by paper": 11_300,
+    "lines visited by paper": 12_550,
     "modules of a plan and a picture": 131,
     "imports, % of the code": 9.3,
     "names at the root": 44,
