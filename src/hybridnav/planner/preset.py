@@ -63,9 +63,9 @@ class Preset(Section):
         """Return the preset as the text of a YAML file, every key present."""
         # Unless it escapes them, PyYAML reads back line breaks such as U+0085 as spaces.
         plain = self.description.isprintable()
-        text: str = yaml.safe_dump(
-            self.model_dump(exclude={"name"}), sort_keys=False, allow_unicode=plain
-        )
+        tree = self.model_dump(exclude={"name"})
+        tree["planner"] = {"method": self.planner.method, **tree["planner"]}  # the method first
+        text: str = yaml.safe_dump(tree, sort_keys=False, allow_unicode=plain)
         return text
 
 
