@@ -155,6 +155,8 @@ def field_distances(classes, field_of, sources):
     distance = np.full(rows * cols, np.int64(-1), np.int64)
     open_cells = np.empty((3, 1024), np.int32)
     count = np.zeros(3, np.int64)
+
+    # No search leaves its field, so one array holds the distances of all and is never cleared.
     for v in range(sources.size):
         distance[sources[v]] = 0
         free_only = classes[sources[v] // cols, sources[v] % cols] == 1
@@ -162,11 +164,13 @@ def field_distances(classes, field_of, sources):
         count[0] = 1
         turn = 0
         while count[0] + count[1] + count[2] > 0:
+            # A move costs one width or more, less than two: it leads into one of the next two.
             slot = turn % 3
             while count[slot] > 0:
                 count[slot] -= 1
                 cell = np.int64(open_cells[slot, count[slot]])
                 cost = distance[cell]
+                # A better cost put this cell into an earlier bucket, which expanded it.
                 if cost // STRAIGHT != turn:
                     continue
                 row, col = cell // cols, cell % cols
@@ -177,6 +181,7 @@ def field_distances(classes, field_of, sources):
                     to = to_row * cols + to_col
                     if field_of[to] != v:
                         continue
+                    # A field is of one class: that of its source decides what a diagonal needs.
                     if k & 1:
                         side_cell, other_side_cell = classes[row, to_col], classes[to_row, col]
                         if side_cell == 0 or other_side_cell == 0:
@@ -187,6 +192,7 @@ def field_distances(classes, field_of, sources):
                     if distance[to] >= 0 and distance[to] <= new_cost:
                         continue
                     distance[to] = new_cost
+                    # An entry with the worse cost stays: to take it out would need a search.
                     into = new_cost // STRAIGHT % 3
                     if count[into] == open_cells.shape[1]:
                         larger = np.empty((3, 2 * open_cells.shape[1]), np.int32)

@@ -161,10 +161,12 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
         first = -1
         last = -1
         open_corner = False
+        # From the south-east corner on, sides and darts follow each other counter-clockwise.
         row, col = boxes[v, 0], boxes[v, 3]
         for direction in range(4):  # along the sides that look east, north, west, south
             out_row, out_col = (0, 1, 0, -1)[direction], (1, 0, -1, 0)[direction]
             step_row, step_col = out_col, -out_row
+            # A corner is amid four vertices if the two cells behind and the one across are filled.
             beside = filled(classes, row - step_row, col - step_col) and filled(
                 classes, row - step_row + out_row, col - step_col + out_col
             )
@@ -175,6 +177,8 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
                 beside = across
                 run = 1
                 if across:
+                    # Blocks are aligned squares of powers of two: two of them share the side of the
+                    # smaller one. The edge at its lowest cell stands for all across that side.
                     run = 1 << min(p, np.int64(power[(row + out_row) >> 1, (col + out_col) >> 1]))
                     low_row = row + min(step_row, 0) * (run - 1)
                     low_col = col + min(step_col, 0) * (run - 1)
@@ -196,6 +200,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
                 row, col = row + run * step_row, col + run * step_col
             row, col = row - step_row, col - step_col
         if last >= 0:
+            # The circle closes: a corner behind the last dart is one ahead of the first.
             sigma[last] = first
             protected[first] |= open_corner
     protect_faces(sigma, protected)

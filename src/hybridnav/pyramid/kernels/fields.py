@@ -103,6 +103,8 @@ def find_cracks(field_of, rows, cols):
     cracks; the class is the position of one of its cracks.
     """
     count = 0
+
+    # The first pass counts and the second one writes, so the array has exactly the size needed.
     for pass_ in range(2):
         if pass_ == 1:
             cracks = np.empty(count, np.int64)
@@ -122,6 +124,9 @@ def find_cracks(field_of, rows, cols):
                     if pass_ == 1:
                         cracks[count] = 2 * cell + 1
                     count += 1
+
+    # Only two fields meet in a block with two cracks, and their border runs on through it: the
+    # cracks of one stretch of border become one class.
     root = np.empty(count, np.int64)
     for i in range(count):
         root[i] = i
@@ -129,6 +134,8 @@ def find_cracks(field_of, rows, cols):
         cell = cracks[i] >> 1
         # Every pair of cracks is met in the block whose lower-left cell is this one.
         for back in range(2):
+            # A crack borders on two blocks: that whose lower-left cell is its first cell, and the
+            # one west or south of that.
             corner = cell
             if back == 1:
                 if cracks[i] & 1:
@@ -139,11 +146,13 @@ def find_cracks(field_of, rows, cols):
                     if cell < cols:
                         continue
                     corner = cell - cols
+            # Beyond the east and the north rim of the map there is no block.
             if (corner + 1) % cols == 0 or corner + cols >= rows * cols:
                 continue
             other = other_crack(field_of, cols, corner, cracks[i])
             if other >= 0:
                 a, b = find(root, i), find(root, place_of(cracks, other))
+                # The least position is the root: the class does not depend on the order of unions.
                 root[max(a, b)] = min(a, b)
     for i in range(count):
         root[i] = find(root, i)

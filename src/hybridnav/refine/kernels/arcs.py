@@ -238,18 +238,22 @@ def round_bends(free, factors, line, radius, spare):
     size, cost, length, last = 1, 0.0, 0.0, line[0].copy()
     for i in range(1, n - 1):
         bend, ahead = line[i].copy(), line[i + 1].copy()
+        # An arc begins `most` before its bend and ends as far behind: its radius times `half`.
         turn = max(_turn_at(line, i), _SMALLEST_TURN)
         half = tan(turn / 2)
         most = math.hypot(ahead[0] - bend[0], ahead[1] - bend[1])
+        # Leave the next bend room for its smallest arc, unless this one needs that for its own.
         if i < n - 2:
             kept = radius * tan(_turn_at(line, i + 1) / 2) + _MARGIN
             most = max(most - kept, min(most, radius * half))
         room = math.hypot(bend[0] - last[0], bend[1] - last[1])
         most = min(room, most, _LARGEST * radius * half)
         a, c, arc = bend, bend, 0.0
+        # The widest arc first, then halves of it down to the radius; else a turn on the spot.
         while most >= radius * half * (1 - _SMALLEST_TURN):
             a, c = _towards(bend, last, most), _towards(bend, ahead, most)
             arc = -1.0
+            # Rounding moves a and c off the segments, so what is left of these is tested again.
             if _is_legal(free, last, a) and _is_legal(free, c, ahead):
                 arc = arc_cost(free, factors, a, bend, c)
             added = arc - segment_cost(factors, a[0], a[1], bend[0], bend[1])

@@ -236,6 +236,8 @@ def legal_cost(free, factors, a_row, a_col, b_row, b_col, most):
         if not is_legal(free, a_row, a_col, b_row, b_col, _FREE, _FREE):
             return np.inf
         return segment_cost(factors, a_row, a_col, b_row, b_col)
+
+    # The walk runs towards higher columns, so that only rows have two directions.
     if b_col < a_col:
         a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
     up = b_row > a_row
@@ -248,6 +250,8 @@ def legal_cost(free, factors, a_row, a_col, b_row, b_col, most):
     to_row, to_col = row + 1.0 - a_row if up else a_row - row, col + 1.0 - a_col
     length = math.sqrt(rows * rows + cols * cols)
     limit = most / length * (1 + _LEGAL_SLACK)
+
+    # `share` of the segment is behind, at a cost of `total` if the whole had length 1.
     share, total = 0.0, 0.0
     while free[row, col] >= _FREE:
         if row == last_row and col == last_col:

@@ -158,11 +158,17 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     if row < 0 or distance == 0.0:
         return 0, 0
     string[0, 0], string[0, 1], string[0, 2] = u_row, u_col, 1.0
+
+    # The line leaves row `row` at the share (row + row_ahead) * per_row of it; so with columns.
     per_row = 1 / to_row if to_row != 0.0 else np.inf
     per_col = 1 / to_col if to_col != 0.0 else np.inf
     row_ahead, col_ahead = (to_row > 0) - u_row, (to_col > 0) - u_col
     row_turn, col_turn = 1 if to_row > 0 else 3, 0 if to_col > 0 else 2
+
+    # The line meets a cell if the cross product below, with the cell's centre, is `reach` at most.
     reach = (abs(to_row) + abs(to_col)) / 2
+
+    # Two states: straight along the line, or, if `follows`, round an obstacle met at about `hit`.
     size, last, hit, follows, heading = 1, -1, 0.0, False, 0
     # The centre of a cell may lie a little outside an ellipse that contains the string.
     limit += 0.5
@@ -173,6 +179,8 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
         if follows:
             d_row, d_col = row + 0.5 - u_row, col + 0.5 - u_col
             done = (to_row * d_row + to_col * d_col) / (distance * distance)
+            # From round to straight: back on the line, and nearer to w than where it was left, so
+            # that each obstacle brings the walk ahead (Bug2).
             if abs(to_row * d_col - to_col * d_row) <= reach and done > hit:
                 follows = False
                 size = _add(string, size, row + 0.5, col + 0.5)
@@ -181,6 +189,7 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
                 meet_col = min(max(meet_col, float(col)), col + 1.0)
                 size = _add(string, size, meet_row, meet_col)
         if follows:
+            # Round an obstacle: look to its side first, so that it stays on the same hand.
             heading = (heading - hand) & 3
         else:
             # Share of the line at which it leaves the cell.
@@ -198,6 +207,7 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
             if 0 <= n_row < rows and 0 <= n_col < cols and (marks[n_row, n_col] >= FREE):
                 is_free = True
                 break
+            # From straight to round. Half a cell is added, as the line must be met farther ahead.
             if not follows:
                 follows, hit, last = True, at + 0.5 / distance, -1
                 hit_row = min(max(u_row + at * to_row, float(row)), row + 1.0)
@@ -207,9 +217,11 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
         if not is_free:
             return 0, step
         if follows:
+            # Bends of the walk are enough: between them the centres lie on one line.
             if heading != last:
                 size = _add(string, size, row + 0.5, col + 0.5)
                 last = heading
+            # Outside this ellipse with foci u and w no path is shorter than `limit`.
             from_row, from_col = n_row + 0.5 - u_row, n_col + 0.5 - u_col
             d_row, d_col = from_row - to_row, from_col - to_col
             near = math.sqrt(from_row * from_row + from_col * from_col)
@@ -236,6 +248,8 @@ def improve(marks, string, n, budget):
     Parts of two to `_WIDEST` segments, short ones first, until the budget of steps is used up.
     """
     room = np.empty((256, 3))
+
+    # Short parts first: they are the cheapest to walk, and the budget may not last.
     for span in range(2, _WIDEST + 1):
         i = 0
         while i < n - span:
@@ -247,12 +261,15 @@ def improve(marks, string, n, budget):
                 string[j, 0],
                 string[j, 1],
             )
+            # A part that is almost straight has too little to gain for a walk.
             if length - math.hypot(w_row - u_row, w_col - u_col) < _SLACK * length * (span > 2):
                 continue
             for hand in (1, -1):
                 if budget <= 0:
                     return string, n
                 size, steps = _detour(marks, room, u_row, u_col, w_row, w_col, length, hand)
+                # Each walk is charged for its steps and its start, each taut string for its
+                # points: so the budget bounds the time.
                 budget -= steps + 20
                 if size == 0:
                     continue
@@ -260,6 +277,7 @@ def improve(marks, string, n, budget):
                 detour, size = tighten(marks, room[:size].copy(), size)
                 if _length(detour, 0, size - 1) > length - 1e-9:
                     continue
+                # The walk rounds some of its points, so its string may cross a blocked cell.
                 legal = True
                 for k in range(size - 1):
                     legal = legal and is_legal(
@@ -273,12 +291,14 @@ def improve(marks, string, n, budget):
                     )
                 if not legal:
                     continue
+                # All points may give way again: the new part can pull its ends off corners.
                 larger = np.empty((n - span + size - 1, 3))
                 larger[:i] = string[:i]
                 larger[i : i - 1 + size] = detour[1:size]
                 larger[i - 1 + size :] = string[j + 1 : n]
                 larger[:, 2] = 1.0
                 string, n = tighten(marks, larger, larger.shape[0])
+                # Parts that begin a little before have changed too, so they are tried again.
                 i = max(i - 3, 0)
                 break
     return string, n

@@ -337,6 +337,8 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
     columns = room(ahead.shape[0], reach, length)
     moves = SHIFTS if turn == 0.0 else TURNS
+
+    # Parts form a binary tree, searched depth first: this is part number `part` of 2^level.
     part, level = 0, 0
     while True:
         share = 1.0 / (1 << level)
@@ -345,7 +347,10 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             row, col, heading, d_row, d_col, turn, radius, (part + 0.5) * share
         )
         at_least, at_most = near(clearance, mid_row, mid_col)
+        # The base stays within half the length of the part from its middle, and the body within the
+        # circumscribed radius of the base: so much clearance needs no corners.
         free = at_least >= reach + 0.5 * length * share
+        # A point of the body leaves the chord of its way by no more; halving divides this by four.
         margin = (abs(radius) + reach) * angle * angle / 8
         if not free and margin <= WIDEST:
             at_row, at_col, at = moved(row, col, heading, d_row, d_col, turn, radius, part * share)
@@ -354,6 +359,8 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
                 row, col, heading, d_row, d_col, turn, radius, (part + 1) * share
             )
             place(corners, at_row, at_col, at, after)
+            # Below the rounding of positions the test without a margin decides, or halving
+            # would not end.
             last = margin <= ROUNDING
             free = is_free(ahead, offsets, before, after, 0.0 if last else margin, moves, columns)
             if not free and last:
@@ -363,11 +370,14 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             if level == 0:
                 return True
             continue
+        # One state that collides settles it; the inscribed disc may show that without corners.
         if at_most < radii[0]:
             return False
+        # In between, only the corners can decide on the middle.
         if at_least < reach:
             place(corners, mid_row, mid_col, mid_heading, middle)
             if not is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
                 return False
+        # Undecided: its first half is next.
         part <<= 1
         level += 1

@@ -171,6 +171,8 @@ def spread_words(enterable, removed, word_of):
     unknown = np.zeros(rows * cols, np.int8)
     ready = np.empty(rows * cols, np.int64)
     n_ready = 0
+
+    # Only full blocks count their removed sides; the others stay at 0 and are never solved.
     for row in range(rows - 1):
         for col in range(cols - 1):
             if not (
@@ -190,9 +192,12 @@ def spread_words(enterable, removed, word_of):
     factors = np.empty(64, np.int64)
     n_factors = 0
     open_edge = removed.copy()
+
+    # A block enters the stack when its count comes down to 1, once at most: all have room.
     while n_ready > 0:
         n_ready -= 1
         at = ready[n_ready]
+        # The last edge of a tree may lie between two ready blocks: the first solved it for both.
         if unknown[at] != 1:
             continue
         solved = 0
@@ -203,6 +208,7 @@ def spread_words(enterable, removed, word_of):
         first = _along(word_of, at, solved + 1 & 3, cols)
         second = _along(word_of, at, solved + 2 & 3, cols)
         third = _along(word_of, at, solved + 3 & 3, cols)
+        # A product of at most one word, or of two that cancel, needs no new number.
         left = (first != 0) + (second != 0) + (third != 0)
         if left < 2 or (left == 2 and (first == -second or second == -third or first == -third)):
             word = -(first + second + third)
@@ -213,9 +219,11 @@ def spread_words(enterable, removed, word_of):
             factors[n_factors : n_factors + 3] = -third, -second, -first
             n_factors += 3
             word = number
+        # Words are those of steps to the higher cell; round a block, north and west sides run back.
         word_of[edge] = word if solved < 2 else -word
         open_edge[edge] = False
         unknown[at] = 0
+        # The edge has its word in the block across it too, which may have one side left now.
         beyond = _beyond(at, solved, cols)
         if beyond >= 0 and unknown[beyond] > 0:
             unknown[beyond] -= 1

@@ -108,10 +108,14 @@ def routes(graph, starts, goals, passed):
     found, offsets = np.full(n_pairs, np.inf), np.zeros(n_pairs + 1, np.int64)
     expanded = np.zeros(n_pairs, np.int64)
     used = 0
+
+    # The arrays serve all pairs: each search resets only the nodes that it reached.
     for pair in range(n_pairs):
         reached = [np.int64(0) for _ in range(0)]
+        # Elsewhere `finish` stays infinite, so that every node can be tested as the last one.
         for k in range(goals[0][pair], goals[0][pair + 1]):
             finish[goals[1][k]] = goals[2][k]
+        # This entry is never taken out: the heap is never empty, and a search without a path ends.
         heap = [(np.inf, np.int64(-1))]
         for k in range(starts[0][pair], starts[0][pair + 1]):
             node = starts[1][k]
@@ -119,6 +123,7 @@ def routes(graph, starts, goals, passed):
             reached.append(node)
             heapq.heappush(heap, (costs[node], node))
         best, last = np.inf, np.int64(-1)
+        # No cost is negative: a node that costs `best` or more cannot be on a cheaper route.
         while heap[0][0] < best:
             cost, here = heapq.heappop(heap)
             if cost > costs[here]:
@@ -134,6 +139,7 @@ def routes(graph, starts, goals, passed):
                     costs[other], before[other] = through, here
                     heapq.heappush(heap, (through, other))
         found[pair] = best
+        # The caller calls again with more room if the nodes do not fit.
         node = last
         while node >= 0:
             if used == len(passed):
@@ -143,6 +149,7 @@ def routes(graph, starts, goals, passed):
             used += 1
             node = before[node]
         offsets[pair + 1] = used
+        # The next search must find these arrays as this one did.
         for node in reached:
             costs[node], before[node] = np.inf, -1
         for k in range(goals[0][pair], goals[0][pair + 1]):

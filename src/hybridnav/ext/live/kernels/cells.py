@@ -215,6 +215,8 @@ def join_nearest(window, low, table, cells, limit):
     numbers, area, survivor, box, is_stale = table
     cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
+
+    # A cell waits once at the beginning, and once for each of four neighbours that joins.
     queue = np.empty(5 * cells.size, np.int64)
     head = tail = 0
     for cell in cells:
@@ -224,12 +226,16 @@ def join_nearest(window, low, table, cells, limit):
                 queue[tail] = cell
                 tail += 1
                 break
+
+    # First in, first out: all places grow by one ring of cells after another.
     while head < tail:
         cell = queue[head]
         head += 1
+        # It has joined since, for it waited more than once.
         if flat[cell] >= 0:
             continue
         row, col = cell // cols + low[0], cell % cols + low[1]
+        # Among places equally near the least number wins, whatever the order of the sides.
         least, nearest = limit, np.int64(-1)
         for side in range(4):
             beside = cell + step_to(side, cols)
@@ -239,8 +245,10 @@ def join_nearest(window, low, table, cells, limit):
             squared = (row - survivor[i, 0]) ** 2 + (col - survivor[i, 1]) ** 2
             if squared < least or (squared == least and i < nearest):
                 least, nearest = squared, i
+        # All places beside it are too far; it waits again if another neighbour joins one.
         if nearest < 0:
             continue
+        # A place only gains here, so its area and its box stay exact without another look at it.
         flat[cell] = numbers[nearest]
         is_stale[nearest] = True
         area[nearest] += 1
@@ -328,16 +336,22 @@ def take_out(place, low, table, removed, first):
         Those of them that lost a part, their surviving cell, or a cell at a side of their box.
     """
     numbers, area, survivor, box, is_stale = table
+
+    # Ordered by place, the cells of each are one run, and those without a place come first.
     order = np.argsort(removed[1], kind="mergesort")
     order = order[np.searchsorted(removed[1][order], 0) :]
     cells, was = removed[0][order], removed[1][order]
     cols = place.shape[1]
     flat = place.ravel()
+
+    # All cells leave before any place is searched: parts are cut off by all of them together.
     for cell in cells:
         flat[cell] = -1
     parts, n_parts = np.empty(16, np.int64), 0
     lost, n_lost = np.empty(cells.size, np.int64), 0
     altered, n_altered = np.empty(cells.size, np.int64), 0
+
+    # One queue and one scratch serve all places: `cut_off` leaves the scratch as it was.
     queue = np.empty(flat.size, np.int64)
     scratch = np.full(place.shape, np.int32(-1), np.int32)
     begin = 0
@@ -347,17 +361,20 @@ def take_out(place, low, table, removed, first):
             end += 1
         number = was[begin]
         i = np.searchsorted(numbers, number)
+        # Compare with the area before, which shrinks next.
         is_other = 2 * (area[i] - (end - begin)) <= area[i]
         area[i] -= end - begin
         lost[n_lost] = number
         n_lost += 1
         is_stale[i] = True
+        # The box can only shrink if a cell at one of its sides went.
         alters = False
         for cell in cells[begin:end]:
             row, col = cell // cols + low[0], cell % cols + low[1]
             alters |= row == box[i, 0] or row == box[i, 2] - 1
             alters |= col == box[i, 1] or col == box[i, 3] - 1
         n_cut = cut_off(place, cells[begin:end], number, scratch, queue, first + n_parts)
+        # The rest is renamed last, for the search above knows its cells by the old number.
         if is_other and area[i] > 0:
             rename(place, low, box[i], number, first + n_parts + n_cut)
             n_cut += 1
@@ -403,6 +420,8 @@ def cut_off(place, cells, number, scratch, queue, first):
     flat, marks = place.ravel(), scratch.ravel()
     parent = np.empty(4 * cells.size, np.int64)
     n_open = tail = 0
+
+    # Each part that is cut off has a cell beside a removed one, so a search begins at all of these.
     for cell in cells:
         for side in range(4):
             beside = cell + step_to(side, cols)
@@ -411,9 +430,15 @@ def cut_off(place, cells, number, scratch, queue, first):
                 queue[tail] = beside
                 n_open += 1
                 tail += 1
+
+    # Searches that meet become one set of a union-find forest. `waiting` counts the queued cells
+    # of each root, `n_open` the sets that may still meet another one.
     waiting = np.ones(n_open, np.int64)
     part_of = np.full(n_open, np.int64(-1), np.int64)
     n_parts = head = 0
+
+    # One queue makes the searches take turns, so that a small part ends early. The last open set
+    # keeps the old number.
     while head < tail and n_open > 1:
         cell = queue[head]
         head += 1
@@ -434,15 +459,19 @@ def cut_off(place, cells, number, scratch, queue, first):
                 waiting[root] += waiting[other]
                 n_open -= 1
         waiting[root] -= 1
+        # All cells of the part were searched, and it met no other one: it is cut off.
         if waiting[root] == 0 and n_open > 1:
             n_open -= 1
             part_of[root] = n_parts
             n_parts += 1
     if n_parts > 0:
+        # The parts were searched whole, so the queue holds all their cells.
         for cell in queue[:tail]:
             part = part_of[root_of(parent, marks[cell])]
             if part >= 0:
                 flat[cell] = first + part
+
+    # The next place needs a scratch of -1; only these cells differ.
     for cell in queue[:tail]:
         marks[cell] = -1
     return n_parts

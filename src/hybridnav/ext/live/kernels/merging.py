@@ -104,6 +104,8 @@ def absorbing(window, low, table, lost, limit):
     place, of_class = window
     pairs, count = np.empty((16, 2), np.int64), 0
     around = np.empty(4, np.int64)
+
+    # A surviving cell farther out reaches no cell here; an infinite limit needs an integer too.
     reach = np.int64(min(np.sqrt(limit) + 1, 2.0**31))
     rows, cols = place.shape
     near, n_near = np.empty((numbers.size, 3), np.int32), 0
@@ -118,20 +120,25 @@ def absorbing(window, low, table, lost, limit):
             continue
         for k in range(4):
             around[k] = box[j, k] - low[k & 1]
+        # A pair of one place stands for all its pairs: `merge_pairs` looks at the few cells.
         if (around[2] - around[0]) * (around[3] - around[1]) < _FEW_CELLS:
             pairs = with_space(pairs, count, 1)
             pairs[count, 0] = pairs[count, 1] = number
             count += 1
             continue
         of_place = of_class[survivor[j, 0] - low[0], survivor[j, 1] - low[1]]
+        # A surviving cell that may reach the whole place is within reach of all sides of its box.
         low_row, high_row = around[2] - 1 - reach, around[0] + reach
         low_col, high_col = around[3] - 1 - reach, around[1] + reach
         for n in range(n_near):
             row, col, i = near[n]
             if row < low_row or row > high_row or col < low_col or col > high_col or i == j:
                 continue
+            # Beyond the window `of_class` has no entry: `are_beside` compares the classes then.
             if 0 <= row < rows and 0 <= col < cols and of_class[row, col] != of_place:
                 continue
+            # A place has a cell at each side of its box: a side too far away excludes it. A box
+            # near enough up to its farthest corner needs no look at the cells.
             far_row = max(abs(row - around[0]), abs(around[2] - 1 - row))
             far_col = max(abs(col - around[1]), abs(around[3] - 1 - col))
             if max(far_row, far_col) ** 2 >= limit or not are_beside(window, low, table, (i, j)):

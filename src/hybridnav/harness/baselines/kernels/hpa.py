@@ -142,6 +142,8 @@ def flood(moves, cluster_cells, cell, distance, waiting):
     improved at most once by each neighbour, so `waiting` needs 8 entries a cell.
     """
     rows, cols = moves.shape
+
+    # Cells are numbered inside the cluster: the work arrays need its size, not that of the map.
     row0, col0 = (
         cell // cols // cluster_cells * cluster_cells,
         cell % cols // cluster_cells * cluster_cells,
@@ -155,6 +157,8 @@ def flood(moves, cluster_cells, cell, distance, waiting):
     count[0] = 1
     turn = 0
     reached = 1
+
+    # A move costs one width or more, less than two: it leads into one of the next two buckets.
     while count[0] + count[1] + count[2] > 0:
         slot = turn % 3
         while count[slot] > 0:
@@ -162,6 +166,7 @@ def flood(moves, cluster_cells, cell, distance, waiting):
             local = np.int64(waiting[slot, count[slot]])
             row, col = local // cluster_cells, local % cluster_cells
             cost = distance[row, col]
+            # A better cost put this cell into an earlier bucket, which expanded it.
             if cost // STRAIGHT != turn:
                 continue
             mask = moves[row0 + row, col0 + col]
@@ -169,12 +174,14 @@ def flood(moves, cluster_cells, cell, distance, waiting):
                 if not mask >> k & 1:
                     continue
                 to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
+                # Legal moves may lead out of the cluster, which the rim of the map cuts off.
                 if not (0 <= to_row < height and 0 <= to_col < width):
                     continue
                 new_cost = cost + (DIAGONAL if k & 1 else STRAIGHT)
                 old_cost = distance[to_row, to_col]
                 if 0 <= old_cost <= new_cost:
                     continue
+                # A cell may be improved later: it counts when it is first reached.
                 if old_cost < 0:
                     reached += 1
                 distance[to_row, to_col] = new_cost
@@ -248,6 +255,9 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
         cluster_at(cols, cluster_cells, start),
         cluster_at(cols, cluster_cells, goal),
     )
+
+    # Start and goal are not inserted into the graph, which queries leave as it is: floods of their
+    # clusters join them. Moves are legal both ways, so one from the goal finds the costs to it.
     goal_row, goal_col = goal // cols, goal % cols
     goal_low, goal_high = graph.cluster_first[goal_cluster], graph.cluster_first[goal_cluster + 1]
     to_goal = np.empty(goal_high - goal_low, np.int64)
@@ -256,11 +266,15 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
         to_goal[node - goal_low] = distance_in_cluster(
             distance, cols, cluster_cells, graph.cells[node]
         )
+
+    # A path inside one cluster passes no node: `last` is -1 until another one is cheaper.
     least, last = _NONE, np.int64(-1)
     if start_cluster == goal_cluster:
         direct = distance_in_cluster(distance, cols, cluster_cells, start)
         if direct >= 0:
             least = direct
+
+    # This flood overwrites the distances to the goal, which `to_goal` keeps.
     n_cells += flood(moves, cluster_cells, start, distance, waiting)
     heap = np.empty((256, 2), np.int64)
     size = expanded = 0
@@ -275,23 +289,29 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
         rest = octile_cost(cell // cols - goal_row, cell % cols - goal_col)
         push(heap, size, cost + rest, node)
         size += 1
+
+    # Octile costs never exceed those of paths: a key is a bound, and none from `least` on wins.
     while size > 0 and heap[0, 0] < least:
         node = pop(heap, size)
         size -= 1
+        # An improved node waits more than once; the first entry to come is the cheapest.
         if mark[node] == is_closed:
             continue
         mark[node] = is_closed
         expanded += 1
+        # The goal is no node: a path ends at a node of its cluster, plus the way inside that.
         if goal_low <= node < goal_high and to_goal[node - goal_low] >= 0:
             cost = cost_of[node] + to_goal[node - goal_low]
             if cost < least:
                 least, last = cost, node
         for i in range(graph.first[node], graph.first[node + 1]):
             to, cost = graph.endpoints[i], cost_of[node] + graph.costs[i]
+            # Marks of earlier searches are smaller: their costs do not count, nor need clearing.
             if mark[to] >= is_open and cost_of[to] <= cost:
                 continue
             cell = graph.cells[to]
             key = cost + octile_cost(cell // cols - goal_row, cell % cols - goal_col)
+            # The node cannot lead to a cheaper path than the one known, so it need not wait.
             if key >= least:
                 continue
             cost_of[to], previous[to], mark[to] = cost, node, is_open
@@ -301,6 +321,8 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
             size += 1
     if least == _NONE:
         return np.empty(0, np.int64), expanded, n_cells
+
+    # Start and goal are no nodes: the path has two cells more.
     count = 2
     node = last
     while node >= 0:

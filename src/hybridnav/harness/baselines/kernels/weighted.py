@@ -103,12 +103,16 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
     size = 1
     cost_of[start] = 0
     mark[start] = is_open
+
+    # The first path to the goal is the result. Weighted keys are no lower bounds, so a cheaper
+    # path may still be open; what it costs at least is computed below.
     while size > 0:
         cell = np.int64(heap[0, 1])
         if cell == goal:
             break
         pop(heap, size)
         size -= 1
+        # An entry with a smaller key came before, when the cell was expanded.
         if mark[cell] == is_closed:
             continue
         mark[cell] = is_closed
@@ -124,6 +128,7 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
                 continue
             cost_of[to] = cost
             came[to] = k
+            # A cell is expanded once, by design; aside, its better cost still counts for the bound.
             if mark[to] == is_closed:
                 if n_aside == aside.size:
                     aside = grow(aside)
@@ -136,11 +141,16 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
             estimate = octile_cost(row + ROW_STEP[k] - goal_row, col + COL_STEP[k] - goal_col)
             push(heap, size, cost + weight * estimate, to)
             size += 1
+
+    # The heap is empty, and the goal was never reached.
     if mark[goal] < is_open:
         return np.int64(-1), expanded
+
+    # The least g + h of the cells that the docstring names, with the path that was found.
     bound = cost_of[goal]
     for i in range(size + n_aside):
         cell = np.int64(heap[i, 1] if i < size else aside[i - size])
+        # Closed cells in the heap are older entries; one that was improved later is aside as well.
         if i < size and mark[cell] == is_closed:
             continue
         estimate = octile_cost(cell // cols - goal_row, cell % cols - goal_col)

@@ -30,9 +30,13 @@ def cheapest_cost(factors, cuts_corners, start, goal):
     cols = factors.shape[1]
     factor = factors.ravel()
     diagonal = math.sqrt(2.0)
+
+    # The dearest move must lead less than once round the ring, or buckets would mix costs.
     n_buckets = int(diagonal * factors.max()) + 2
     cost = np.full(factor.size, np.inf)
     first = np.full(n_buckets, -1, np.int64)
+
+    # Entries of all chains share two arrays; those taken out form a chain too, and are used again.
     following = np.empty(1024, np.int64)
     cell_of = np.empty(1024, np.int64)
     unused = np.int64(-1)
@@ -41,6 +45,7 @@ def cheapest_cost(factors, cuts_corners, start, goal):
     first[0], following[0], cell_of[0], n_entries = 0, -1, start, 1
     while left > 0:
         slot = turn % n_buckets
+        # What is found from now on costs `turn` + 1 or more, so this is the least.
         if cost[goal] < turn + 1:
             return cost[goal]
         while first[slot] >= 0:
@@ -50,11 +55,13 @@ def cheapest_cost(factors, cuts_corners, start, goal):
             unused = entry
             left -= 1
             cell = cell_of[entry]
+            # A better cost put the cell into an earlier bucket, where it was expanded.
             if int(cost[cell]) != turn:
                 continue
             for k in range(9):
                 up, right = k // 3 - 1, k % 3 - 1
                 to = cell + up * cols + right
+                # The middle of the nine is the cell itself; the rim of zeros keeps `to` on the map.
                 if k == 4 or factor[to] == 0.0:
                     continue
                 length = 1.0
@@ -63,6 +70,7 @@ def cheapest_cost(factors, cuts_corners, start, goal):
                     is_past = factor[cell + up * cols] == 0.0 or factor[cell + right] == 0.0
                     if is_past and not cuts_corners:
                         continue
+                # Half of a move lies in each of its two cells, and pays the factor of that cell.
                 new_cost = cost[cell] + length * (factor[cell] + factor[to]) / 2.0
                 if new_cost >= cost[to]:
                     continue
@@ -70,6 +78,7 @@ def cheapest_cost(factors, cuts_corners, start, goal):
                 if unused < 0 and n_entries == cell_of.size:
                     following = np.append(following, np.empty_like(following))
                     cell_of = np.append(cell_of, np.empty_like(cell_of))
+                # So room grows with the entries that wait, not with all that ever did.
                 entry = unused
                 if entry >= 0:
                     unused = following[entry]

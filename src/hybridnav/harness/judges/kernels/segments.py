@@ -258,6 +258,8 @@ def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
     n = nodes.shape[0]
     lengths = np.zeros(n)
     came = np.full(n, -1, np.int64)
+
+    # The start is reached from itself: then it counts as reached, and no segment leads to it.
     heap = [(0.0, n - 2, n - 2)]
     while heap and came[n - 1] < 0:
         _, node, before = heapq.heappop(heap)
@@ -271,22 +273,29 @@ def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
                 continue
         came[node] = before
         lengths[node] = lengths[before] + math.hypot(from_row, from_col)
+        # The blocked cell lies to the left or right of the path that arrives, by this sign.
         side = from_row * blocked[node, 1] - from_col * blocked[node, 0]
         for head in range(n):
             if came[head] >= 0:
                 continue
             to_row, to_col = nodes[head, 0] - row, nodes[head, 1] - col
+            # A shortest path leaves on a tangent to the blocked cell: neither into the quadrant
+            # of that cell nor into the opposite one. So it arrives at the next corner, too.
             if to_row * to_col * blocked[node, 0] * blocked[node, 1] > 0:
                 continue
             if to_row * to_col * blocked[head, 0] * blocked[head, 1] > 0:
                 continue
             if side != 0.0:
+                # Round a corner it turns towards the blocked cell, by a right angle at most.
                 turn = compare_products(from_row, to_col, from_col, to_row)
                 if turn * side < 0 or from_row * to_row + from_col * to_col < 0:
                     continue
+            # Longer paths are of no use to the caller, and the heap stays small without them.
             estimate = lengths[node] + math.hypot(to_row, to_col) + to_goal[head]
             if estimate <= most:
                 heapq.heappush(heap, (estimate, head, node))
+
+    # From the goal back to the start; without a path the chain is empty.
     chain = np.empty(n, np.int64)
     size, node = 0, n - 1
     while came[n - 1] >= 0 and size < n:
