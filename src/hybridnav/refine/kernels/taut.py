@@ -148,6 +148,7 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
         Number of points of the chain, including u and w; 0 if v itself is a corner that holds the
         string, -1 if the chain has too little room.
     """
+    # Without a corner in the triangle u, v, w the string runs straight from u to w.
     chain[0, 0], chain[0, 1] = u_row, u_col
     chain[1, 0], chain[1, 1] = w_row, w_col
     size = 2
@@ -155,6 +156,9 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
     if hand == 0:
         return size
     uv_row, uv_col, vw_row, vw_col = v_row - u_row, v_col - u_col, w_row - v_row, w_col - v_col
+
+    # A corner at v whose blocked cell lies inside the bend, as seen along both segments, holds the
+    # string there.
     rows, cols = marks.shape
     if v_row == math.floor(v_row) and v_col == math.floor(v_col):
         if 0 < v_row < rows and 0 < v_col < cols:
@@ -170,6 +174,9 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
         m_row, m_col, h_row, h_col = h_row, h_col, m_row, m_col
         if l_row > m_row:
             l_row, l_col, m_row, m_col = m_row, m_col, l_row, l_col
+
+    # A row meets the triangle between the long edge and the low one, or the high one from m on. A
+    # level edge needs no slope: no row reads it, or only at m, where it has no effect.
     long_slope = (h_col - l_col) / (h_row - l_row)
     low_slope = (m_col - l_col) / (m_row - l_row) if m_row > l_row else 0.0
     high_slope = (h_col - m_col) / (h_row - m_row) if h_row > m_row else 0.0
@@ -183,9 +190,14 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
         last = min(math.floor(right + 1e-6), cols - 1)
         while col <= last:
             kind = int(marks[row, col]) & (FREE - 1)
+
+            # The mark states how far the next corner that can hold a string is at least.
             if kind >= _KINDS:
                 col += kind - (_KINDS - 1)
                 continue
+
+            # Strictly on v's side of the line from u to w and between the edges at v. A corner on
+            # such an edge touches the string already, and holds it if its blocked cell lies inside.
             if turn_of(u_row, u_col, w_row, w_col, row, col) == hand:
                 turn = turn_of(u_row, u_col, v_row, v_col, row, col)
                 if turn == 0:
@@ -211,6 +223,8 @@ def tighten(marks, string, n):
     """
     out = np.empty_like(string)
     chain = np.empty((16, 2))
+
+    # A round that releases no bend leaves none that may give way: the string is taut.
     loose = True
     while loose:
         loose = False
@@ -219,6 +233,9 @@ def tighten(marks, string, n):
         while i < n:
             if size + 1 > out.shape[0]:
                 out = grown(out, size + 1)
+
+            # The last point stays, and so does a bend that held and whose neighbours did not move
+            # since.
             if i == n - 1 or string[i, 2] == 0.0:
                 out[size] = string[i]
                 size += 1
@@ -234,14 +251,21 @@ def tighten(marks, string, n):
                 string[i + 1, 0],
                 string[i + 1, 1],
             )
+
+            # Too little room for the chain: the same bend is tried again with more.
             if held < 0:
                 chain = grown(chain, chain.shape[0] + 1)
                 continue
+
+            # A corner holds the bend: it is not tried again until a neighbour gives way.
             if held == 0:
                 out[size, 0], out[size, 1], out[size, 2] = string[i, 0], string[i, 1], 0.0
                 size += 1
                 i += 1
                 continue
+
+            # The chain replaces the bend. Both neighbours turn by other angles then, so they may
+            # give way.
             loose = True
             out[size - 1, 2] = 1.0
             if size + held > out.shape[0]:
@@ -249,6 +273,9 @@ def tighten(marks, string, n):
             for k in range(1, held):
                 out[size, 0], out[size, 1], out[size, 2] = chain[k, 0], chain[k, 1], 1.0
                 size += 1
+
+            # The chain ends with the next bend, which waits for the next round: no two neighbours
+            # are released in one.
             i += 2
         string, out, n = out, string, size
     return string, n

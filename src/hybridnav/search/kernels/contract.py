@@ -297,11 +297,16 @@ def contract(kinds, first, arcs, follow, effort):
     most_settled, most_looked = effort
     begin, size, room, pool, used = _pool_of(first, arcs)
     level, taken = np.zeros(n, np.int64), np.empty(n, np.int32)
+
+    # Keys that are not known lie below all others: every corner is rated before the first is
+    # removed.
     queue = np.empty((n, 2), np.int64)
     most = np.int64(1)
     for node in range(n):
         push(queue, node, _UNKNOWN + size[node], node)
         most = max(most, size[node])
+
+    # A witness search queues the arcs of the corners that it settles, at most `most` for each.
     records = np.zeros((n, 3), np.int64)
     heap = np.empty((most_settled * most + 1, 2), np.int64)
     pairs = np.empty((most, 2), np.int64)
@@ -311,31 +316,49 @@ def contract(kinds, first, arcs, follow, effort):
     while waiting > 0:
         node = pop(queue, waiting)
         waiting -= 1
+
+        # Estimate what the witness searches will look at before they run: a graph on which they
+        # take too long is given up in time.
         legs = np.int64(0)
         for arc in range(begin[node], begin[node] + size[node]):
             legs += pool[arc, 2] & 0xFFFFFFFF
             looked += size[node] + most_settled * size[pool[arc, 1] >> HEAD_SHIFT]
+
+        # The result has 16 bits for a position among the arcs of a corner: hence the last limit.
         if is_given_up or looked > most_looked or size[node] > _MOST_ARCS:
             size[:] = 0
             return *_packed_arcs(begin, size, pool), taken
+
+        # Shortcuts gave corners more arcs than the graph did: the work arrays follow.
         if most_settled * most >= heap.shape[0]:
             heap = np.empty((2 * most_settled * most + 1, 2), np.int64)
         if size[node] * size[node] > pairs.shape[0]:
             pairs = np.empty((2 * size[node] * size[node], 2), np.int64)
         graph, work = (begin, size, pool, kinds, follow), (records, heap, most_settled)
         n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, pairs)
+
+        # Prefer corners whose removal adds few arcs and legs for those that it takes away. The
+        # level spreads removals over the map, so that the hierarchy stays flat.
         key = 1000 * level[node]
         if size[node] > 0:
             key += 1000 * n_pairs // size[node] + 1000 * n_legs // legs
+
+        # Keys age as neighbours are removed: a corner that is now clearly worse than the next one
+        # waits again.
         if waiting > 0 and key > queue[0, 0] + SLACK:
             push(queue, waiting, key, node)
             waiting += 1
             continue
+
+        # The corner keeps its own arcs: they lead only to corners removed later, up the hierarchy.
         taken[n - waiting - 1] = node
         _take_out(begin, size, pool, node)
         for arc in range(begin[node], begin[node] + size[node]):
             other = pool[arc, 1] >> HEAD_SHIFT
             level[other] = max(level[other], level[node] + 1)
+
+        # A shortcut takes the class at each of its ends from the arc there, so `follow` holds for
+        # it too, and its legs from both. Each comes with its reverse.
         for i in range(n_pairs):
             one, two = pairs[i, 0], pairs[i, 1]
             cost = pool[one, 0] + pool[two, 0]

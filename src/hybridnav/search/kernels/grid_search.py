@@ -143,23 +143,35 @@ def astar(
     count = np.zeros(BUCKETS, np.int64)
     room = waiting.size // BUCKETS
     left = 0
+
+    # The cell in hand; no move led to the start, which direction 8 states.
     bucket = slot = np.int64(0)
     cell, cost, k = np.int64(start), np.int64(0), np.int64(8)
     row, col = cell // cols, cell % cols
+
+    # No f is below that of the start, from which the buckets count.
     origin = octile_cost(row - goal_row, col - goal_col)
     per_col = 1.0 / cols
     records[start] = stamp
+
+    # Only an f below the bound counts: the limit, later the cost of the best path found.
     bound = np.int64(limit)
     if start == goal:
         bound = np.int64(0)
     expanded = 0
     while cell >= 0:
         expanded += 1
+
+        # Left out are moves that paths without this cell replace (see `grid_search.move_tables`);
+        # those whose other path leaves the corridor are put back.
         index = k << 8 | np.int64(moves[np.uint64(cell)])
         todo = np.int64(successors[np.uint64(index)])
         if field_of is not None:
             spared = np.int64(detours[np.uint64(index)])
             todo = _with_detours(todo, spared, k, cell, cols, field_of, in_corridor)
+
+        # The newest successor in the current bucket. It would be taken out next, so it never goes
+        # in.
         following = np.int64(-1)
         following_row = following_col = following_cost = following_k = np.int64(0)
         while todo != 0:
@@ -170,6 +182,9 @@ def astar(
             if field_of is not None and not in_corridor[field_of[to]]:
                 continue
             new_cost = cost + STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
+
+            # The exclusive or clears the generation of this search: a record of another one stays
+            # large.
             known = np.int64(records[np.uint64(to)]) ^ stamp
             if known < _SAME_GENERATION and is_no_gain(
                 known, _DIRECTION_BITS, _COST_MASK, new_cost
@@ -180,9 +195,14 @@ def astar(
             if estimate >= bound:
                 continue
             records[np.uint64(to)] = stamp | (new_cost & _COST_MASK) << _DIRECTION_BITS | k
+
+            # The goal never waits: it lowers the bound, which ends the search when nothing lies
+            # below.
             if to == goal:
                 bound = new_cost
                 continue
+
+            # A newer successor in the current bucket sends the one before it into the bucket.
             into = estimate - origin >> _BUCKET_SHIFT
             entry = to
             if into == bucket:
@@ -194,10 +214,15 @@ def astar(
             if not put(waiting, count, room, into & BUCKETS - 1, entry):
                 return BUCKET_FULL, expanded
             left += 1
+
+        # A successor of the current bucket comes before all waiting cells.
         if following >= 0:
             cell, cost, k = following, following_cost, following_k
             row, col = following_row, following_col
             continue
+
+        # Otherwise the newest waiting cell of the first bucket. A wrap of the ring is safe: all
+        # waiting cells lie less than a round ahead.
         cell = np.int64(-1)
         while left > 0:
             if count[np.uint64(slot)] == 0:
@@ -213,6 +238,9 @@ def astar(
             # Exact: half a cell off any multiple, and far fewer than 2^50 cells.
             row = np.int64((waits + 0.5) * per_col)
             col = waits - row * cols
+
+            # The bucket determines the full cost. An entry whose cell was improved since lies
+            # outside its bucket, or is as good as the newer one.
             estimate = octile_cost(row - goal_row, col - goal_col)
             least = origin + (bucket << _BUCKET_SHIFT) - estimate
             cost = full_cost(record, _DIRECTION_BITS, _COST_MASK, least)
@@ -302,21 +330,33 @@ def weighted_astar(
     count = np.zeros(n_buckets, np.int64)
     room = waiting.size // n_buckets
     left = 0
+
+    # The cell in hand; no move led to the start, which direction 8 states.
     bucket = slot = np.int64(0)
     cell, cost, k = np.int64(start), np.int64(0), np.int64(8)
     row, col = cell // cols, cell % cols
+
+    # Lengths times twice the least factor are a lower bound: no f is below that of the start.
     origin = octile_cost(row - goal_row, col - goal_col) * scale
     per_col = 1.0 / cols
     records[start] = stamp
+
+    # Only an f below the bound counts: the limit, later the cost of the best path found.
     bound = np.int64(limit)
     if start == goal:
         bound = np.int64(0)
     expanded = 0
     while cell >= 0:
         expanded += 1
+
+        # Factors decide which path is cheapest, so unlike in `astar` only moves that turn back are
+        # left out. An improved cell loses the mark with its old record, and may be expanded again.
         records[np.uint64(cell)] |= _EXPANDED
         todo = np.int64(successors[np.uint64(k << 8 | np.int64(moves[np.uint64(cell)]))])
         own = np.int64(units[np.uint64(cell)])
+
+        # The newest successor in the current bucket. It would be taken out next, so it never goes
+        # in.
         following = np.int64(-1)
         following_row = following_col = following_cost = following_k = np.int64(0)
         while todo != 0:
@@ -326,6 +366,8 @@ def weighted_astar(
             to = cell + row_step * cols + col_step
             if field_of is not None and not in_corridor[field_of[to]]:
                 continue
+
+            # The sum of both factors, twice their mean, keeps costs whole.
             length = STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
             new_cost = cost + length * (own + np.int64(units[np.uint64(to)]))
             known = records[np.uint64(to)] ^ stamp
@@ -338,9 +380,14 @@ def weighted_astar(
             if estimate >= bound:
                 continue
             records[np.uint64(to)] = stamp | (new_cost & _WIDE_COST_MASK) << _WIDE_LOW_BITS | k
+
+            # The goal never waits: it lowers the bound, which ends the search when nothing lies
+            # below.
             if to == goal:
                 bound = new_cost
                 continue
+
+            # A newer successor in the current bucket sends the one before it into the bucket.
             into = estimate - origin >> shift
             entry = to
             if into == bucket:
@@ -352,10 +399,14 @@ def weighted_astar(
             if not put(waiting, count, room, into & n_buckets - 1, entry):
                 return BUCKET_FULL, expanded
             left += 1
+
+        # A successor of the current bucket comes before all waiting cells.
         if following >= 0:
             cell, cost, k = following, following_cost, following_k
             row, col = following_row, following_col
             continue
+
+        # Otherwise the newest waiting cell of the first bucket that holds one.
         cell = np.int64(-1)
         while left > 0:
             if count[np.uint64(slot)] == 0:
@@ -368,11 +419,16 @@ def weighted_astar(
             left -= 1
             waits = np.int64(waiting[np.uint64(slot * room + count[np.uint64(slot)])])
             record = np.int64(records[np.uint64(waits)])
+
+            # Each improvement left an entry: another one had the cell expanded at its present cost.
             if record & _EXPANDED != 0:
                 continue
             # Exact: half a cell off any multiple, and far fewer than 2^50 cells.
             row = np.int64((waits + 0.5) * per_col)
             col = waits - row * cols
+
+            # The bucket determines the full cost; an entry whose cell was improved since lies
+            # outside it, or is as good as the newer one.
             estimate = octile_cost(row - goal_row, col - goal_col) * scale
             least = origin + (bucket << shift) - estimate
             cost = full_cost(record, _WIDE_LOW_BITS, _WIDE_COST_MASK, least)

@@ -30,6 +30,9 @@ def blocks_of(first, twins, polygon_of):
     up = np.full(n, -1, np.int32)
     component = np.full(n, -1, np.int32)
     depth = np.zeros(n, np.int32)
+
+    # `number` is the order of visits; `low` the earliest number that a side leads back to from a
+    # polygon or from the tree below it.
     number = np.full(n, -1, np.int32)
     low = np.zeros(n, np.int32)
     at = first[:-1].copy()
@@ -37,6 +40,8 @@ def blocks_of(first, twins, polygon_of):
     path = np.empty(n, np.int32)
     waiting = np.empty(len(twins) // 2 + 1, np.int32)  # slots of seen sides, one of each pair
     n_waiting = n_blocks = n_components = clock = 0
+
+    # Depth first, with the path in an array: recursion would be as deep as the mesh is long.
     for root in range(n):
         if number[root] >= 0:
             continue
@@ -51,9 +56,15 @@ def blocks_of(first, twins, polygon_of):
                 slot = at[here]
                 at[here] += 1
                 twin = twins[slot]
+
+                # Only the side of arrival is passed over: another side between both polygons makes
+                # a cycle.
                 if twin < 0 or twin == came_by[here]:
                     continue
                 other = polygon_of[twin]
+
+                # A side waits for its block once: when it leads to a new polygon, or back to an
+                # earlier one. Seen from that one, it is known.
                 if number[other] < 0:
                     waiting[n_waiting] = slot
                     n_waiting += 1
@@ -68,11 +79,16 @@ def blocks_of(first, twins, polygon_of):
                     n_waiting += 1
                     low[here] = min(low[here], number[other])
                 continue
+
+            # All sides are seen: what this polygon leads back to, its parent does.
             size -= 1
             if size == 0:
                 break
             parent = path[size - 1]
             low[parent] = min(low[parent], low[here])
+
+            # No side from below leads back past the parent: the sides that wait since the step from
+            # the parent are a block, which hangs from it.
             if low[here] >= number[parent]:
                 while True:
                     n_waiting -= 1

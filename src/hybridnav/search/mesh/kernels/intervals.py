@@ -176,13 +176,20 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
     polygon = polygon_of[entry]
     low, high = first[polygon], first[polygon + 1]
     a, b = begins[entry], finishes[entry]
+
+    # From an end of the side, the root sees the whole polygon, which is convex.
     if root in (a, b):
         return _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n)
+
+    # A path may bend round an end of the interval that is a corner: only so does it reach what the
+    # rays leave hidden.
     lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
     turns_right = marks & _RIGHT and turns(kinds[b], cx[b] - x, cy[b] - y, -1)
     turns_left = marks & _LEFT and turns(kinds[a], cx[a] - x, cy[a] - y, 1)
     g_right = g + math.hypot(cx[b] - x, cy[b] - y) if turns_right else math.inf
     g_left = g + math.hypot(cx[a] - x, cy[a] - y) if turns_left else math.inf
+
+    # The goal is seen, or hidden behind the one end that a path to it bends round.
     if is_goal:
         to_right, to_left = turn_of(x, y, rx, ry, tx, ty), turn_of(x, y, lx, ly, tx, ty)
         if to_right >= 0 and to_left <= 0:
@@ -191,6 +198,9 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
             n = _put_goal(nodes, n, b, node, g_right + math.hypot(tx - cx[b], ty - cy[b]))
         elif to_left > 0 and turns_left:
             n = _put_goal(nodes, n, a, node, g_left + math.hypot(tx - cx[a], ty - cy[a]))
+
+    # Counter-clockwise from the right end of the entry. A turn above zero means left of the ray;
+    # those of the far end w serve as those of the near end u of the next side.
     right_u, left_u = 0 if marks & _RIGHT else -1, -1
     slot = entry
     for _ in range(high - low - 1):
@@ -199,6 +209,8 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
         ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
         right_w = turn_of(x, y, rx, ry, wx, wy)
         left_w = turn_of(x, y, lx, ly, wx, wy)
+
+        # Walls lead nowhere, closed blocks only to dead ends (see `blocks_of`).
         if twin >= 0 and is_open[block_of[slot]]:
             if right_w > 0 and left_u < 0:
                 # Seen from the root, between the rays.
@@ -210,19 +222,26 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
                     prx, pry, seen = ux, uy, seen | _RIGHT
                 n = put(nodes, n, twin, root, node, seen, g, plx, ply, prx, pry)
             elif right_u == 0 and right_w == 0:
+                # On the line of the right ray, which passes the end u first: there a path bends.
                 if (u == b and turns_right) or (u != b and turns(kinds[u], ux - x, uy - y, -1)):
                     cost = g + math.hypot(ux - x, uy - y)
                     n = put(nodes, n, twin, u, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
             elif left_u == 0 and left_w == 0:
+                # On the line of the left ray, which passes the end w first.
                 if (w == a and turns_left) or (w != a and turns(kinds[w], wx - x, wy - y, 1)):
                     cost = g + math.hypot(wx - x, wy - y)
                     n = put(nodes, n, twin, w, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
+
+            # Hidden on the right, wholly or in part: a path comes round b. Where the right ray cuts
+            # the side, it limits the interval, continued behind b.
             if turns_right and (right_u < 0 or (u == b and right_w < 0)):
                 by, more, seen = _hidden(mesh, b, u, w, right_w > 0, -1)
                 if by >= 0:
                     plx, ply = (wx, wy) if right_w <= 0 else (2 * cx[b] - x, 2 * cy[b] - y)
                     seen = seen if seen < 0 else seen | _RIGHT
                     n = put(nodes, n, twin, by, node, seen, g_right + more, plx, ply, ux, uy)
+
+            # The same on the left, from a.
             if turns_left and (left_w > 0 or (w == a and left_u > 0)):
                 by, more, seen = _hidden(mesh, a, w, u, left_u < 0, 1)
                 if by >= 0:

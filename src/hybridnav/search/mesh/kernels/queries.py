@@ -78,6 +78,9 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
     counts, bounds = nodes[6], nodes[7]
     upper, factor, limit = effort
     none = np.empty((0, 2))
+
+    # Not begun. Endpoints in different components or in one polygon need no search, and leave
+    # nothing to clean up.
     if not counts[BEGUN]:
         counts[:] = 0
         counts[LAST] = -1
@@ -91,6 +94,9 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
         if how == MET:
             bounds[:] = math.hypot(endpoints[2] - endpoints[0], endpoints[3] - endpoints[1])
             return DONE, path_to(mesh, endpoints, nodes[0], -1)
+
+        # A shortest path stays in the blocks between its endpoints (see `open_blocks`). An endpoint
+        # on a side lies in several polygons: the blocks of all pairs are opened.
         n = 0
         for start in starts[: counts[STARTS]]:
             for goal in goals[: counts[GOALS]]:
@@ -99,14 +105,21 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
         counts[BEGUN] = _OPENED
     entered = (blocks, is_open)
     status = DONE
+
+    # Opened. Without room for the first nodes the stage stays, and the next call writes them anew.
     if counts[BEGUN] == _OPENED:
         status = seed(mesh, entered, endpoints, starts[: counts[STARTS]], nodes)
         if status == DONE:
             counts[BEGUN] = _SEEDED
+
+    # Seeded. Each call resumes the search; the stage stays until the answer is good enough.
     if status == DONE and limit >= 0:
         status = advance(mesh, entered, endpoints, goals[: counts[GOALS]], nodes, factor, limit)
     if status != DONE:
         return status, none
+
+    # Done. Only what the query touched is reset, so its cost does not depend on the size of the
+    # mesh.
     best, touched = nodes[4], nodes[5]
     for k in range(counts[TOUCHED]):
         best[touched[k]] = np.inf
@@ -300,16 +313,21 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     _, _, _, records, touched, heaps, counts, bounds = work
     sx, sy, tx, ty = endpoints
     to_start, to_goal, n_touched = counts[SIZE], counts[MARKED], counts[TOUCHED]
+
+    # The cost to beat, in units: of the best path so far, or of the one known before the search.
     best = FAR if bounds[UPPER] * UNITS >= FAR else np.int64(bounds[UPPER] * UNITS)
     if counts[LAST] >= 0:
         best = records[counts[LAST], 0] + records[counts[LAST], 1]
     status = DONE
     while True:
+        # A better path passes a waiting corner, at an estimate that is no higher than its cost.
         low_start = heaps[0][0, 0] if to_start > 0 else FAR
         low_goal = heaps[1][0, 0] if to_goal > 0 else FAR
         least = min(low_start, low_goal)
         if least == FAR or least * factor >= best:
             break
+
+        # Only look at the entry: a run that ends here leaves it in the heap for the next run.
         direction = 0 if low_start <= low_goal else 1
         heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
@@ -324,11 +342,21 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         size -= 1
         x, y, cost = cx[node], cy[node], records[node, direction]
         from_x, from_y, to_x, to_y = (tx, ty, sx, sy) if direction else (sx, sy, tx, ty)
+
+        # An entry that its corner's record no longer matches is out of date: a better one waits or
+        # was expanded.
         if least == cost + cost_of(x, y, to_x, to_y):
             counts[EXPANDED] += 1
+
+            # A corner reached from both ends completes a path; with `FAR` from the other end it is
+            # none.
             if cost + records[node, 1 - direction] < best:
                 best = cost + records[node, 1 - direction]
                 counts[LAST] = node
+
+            # Leave out arcs that bend away from the blocked cell. An arc of arrival states its
+            # class here; the first segment comes from an end, and an end on the corner rules
+            # nothing out.
             by, may_follow = records[node, 2 + direction], np.int64(-1)
             if by != NO_ARC:
                 may_follow = follow[kinds[node], arcs[by & 0xFFFFFFFF, 1] & 63]
@@ -343,6 +371,8 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
                 estimate = further + cost_of(cx[other], cy[other], to_x, to_y)
                 if estimate >= best:
                     continue
+
+                # Noted once, by whichever direction comes first: the clean-up resets both.
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1

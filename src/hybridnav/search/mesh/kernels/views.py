@@ -250,11 +250,18 @@ def _spread(mesh, x, y, target, room, n, found):
         lx, ly, rx, ry = real[n, 0], real[n, 1], real[n, 2], real[n, 3]
         polygon = polygon_of[entry]
         low, high = first[polygon], first[polygon + 1]
+
+        # A polygon adds at most one corner and one interval a side: checked once, not in the loop.
         if found + high - low > len(seen) or n + high - low > len(whole):
             return -1, False
+
+        # All of a convex polygon that lies between the rays is seen, hence a target there too.
         for goal in goals:
             if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
                 is_target_seen = is_target_seen or turn_of(x, y, lx, ly, tx, ty) <= 0
+
+        # The first end is the right one of the entry. It lies on the right ray or right of it, so
+        # the ray itself limits the first interval.
         right_u = left_u = -1
         bends_u = 0
         ux, uy = lx, ly
@@ -266,11 +273,17 @@ def _spread(mesh, x, y, target, room, n, found):
             bends_w = kinds[w] < _BENDING
             right_w = turn_of(x, y, rx, ry, wx, wy)
             left_w = turn_of(x, y, lx, ly, wx, wy) if right_w >= 0 else -1
+
+            # The last end is the left one of the entry, noted with the polygon before. A corner on
+            # a ray that comes from a corner at which paths may bend is behind that corner.
             if bends_w and left_over and right_w >= 0 >= left_w:
                 is_behind = (right_w == 0 and marks & _RIGHT) or (left_w == 0 and marks & _LEFT)
                 if not is_behind and touches(kinds[w], wx - x, wy - y):
                     seen[found] = w
                     found += 1
+
+            # An end between the rays limits the next interval. One on a ray replaces it only if
+            # paths may bend there, as it then hides what is behind it.
             if right_w > 0 > left_u and twins[slot] >= 0:
                 plx, ply, prx, pry, kept = lx, ly, rx, ry, marks
                 if left_w < 0 or (left_w == 0 and bends_w):
@@ -278,6 +291,8 @@ def _spread(mesh, x, y, target, room, n, found):
                 if right_u > 0 or (right_u == 0 and bends_u):
                     prx, pry, kept = ux, uy, (kept & _LEFT) | _RIGHT * bends_u
                 n = _pend(room, n, twins[slot], kept, plx, ply, prx, pry)
+
+            # Counter-clockwise, all further ends lie left of the left ray too.
             if left_w > 0:
                 break
             ux, uy, bends_u, right_u, left_u = wx, wy, bends_w, right_w, left_w

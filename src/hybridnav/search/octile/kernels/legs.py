@@ -363,6 +363,8 @@ def shortest(graph, endpoints, is_contracted, work):
     tables, places, _, follow, (first, arcs) = graph
     records, heaps, touched, found = work
     width = tables[3]
+
+    # Two cells with a free leg between them need no corner cell, and no path is shorter.
     rows, cols = (
         endpoints[1] // width - endpoints[0] // width,
         endpoints[1] % width - endpoints[0] % width,
@@ -371,14 +373,20 @@ def shortest(graph, endpoints, is_contracted, work):
         return octile_cost(rows, cols), FROM_START, 0, 0
     if is_direct(tables, endpoints[1], endpoints[0]):
         return octile_cost(rows, cols), FROM_GOAL, 0, 0
+
+    # The corner cells at the goal get their costs even if no search starts there: by these, A* from
+    # the start completes its paths.
     to_goal, n_touched, goal_part = _begin(graph, endpoints, 1, work, is_contracted)
     rest = records, heaps, touched[n_touched:], found
     to_start, n_more, start_part = _begin(graph, endpoints, 0, rest, True)
     n_touched += n_more
+
+    # Corner cells in different components, or none at an end: no search would find a path.
     if start_part != goal_part or goal_part < 0:
         return FAR, FROM_START, 0, n_touched
     best, meeting, expanded = FAR, np.int64(FROM_START), 0
     while True:
+        # A direction ends when its least estimate, a lower bound, is no better than the best path.
         if to_start > 0 and heaps[0][0, 0] >= best:
             to_start = 0
         if to_goal > 0 and heaps[1][0, 0] >= best:
@@ -395,12 +403,20 @@ def shortest(graph, endpoints, is_contracted, work):
         estimate = heap[0, 0]
         node = pop(heap, size)
         size -= 1
+
+        # An entry that its record no longer matches is out of date: the cell was reached at less.
         row, col, kind = row_col_kind(places[node])
         cost = records[node, direction]
         if estimate == cost + octile_cost(row - aim_row, col - aim_col):
             expanded += 1
+
+            # Reached from both ends, a corner cell completes a path; `FAR` from the other end is
+            # none.
             if cost + records[node, 1 - direction] < best:
                 best, meeting = cost + records[node, 1 - direction], node
+
+            # What may follow depends on the leg of arrival, walked backwards: the class of the arc
+            # at this cell, or that of the leg from the end. An end on this cell rules nothing out.
             by = records[node, 2 + direction]
             if by != NO_ARC:
                 may_follow = follow[kind, arcs[by & 0xFFFFFFFF, 1] & 63]
@@ -421,6 +437,8 @@ def shortest(graph, endpoints, is_contracted, work):
                 estimate = further + octile_cost(row - aim_row, col - aim_col)
                 if estimate >= best:
                     continue
+
+                # Noted once, by whichever direction comes first: the caller resets both.
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1

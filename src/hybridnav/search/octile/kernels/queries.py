@@ -214,14 +214,21 @@ def shortest_patched(graph, endpoints, work):
     start, goal = endpoints
     goal_row, goal_col = goal // width, goal % width
     rows, cols = goal_row - start // width, goal_col - start % width
+
+    # Two cells with a free leg between them need no corner cell, and no path is shorter.
     if is_direct_patched(tables, patch, start, goal):
         return octile_cost(rows, cols), np.int64(FROM_START), 0
     if is_direct_patched(tables, patch, goal, start):
         return octile_cost(rows, cols), np.int64(FROM_GOAL), 0
+
+    # Each corner cell at the goal knows the cost of the last leg: expanded, it completes a path.
     n_goals = _joined_to(graph, goal, found)
     for k in range(n_goals):
         row, col, _ = row_col_kind(places[found[k]])
         records[found[k], 1] = octile_cost(row - goal_row, col - goal_col)
+
+    # The start is expanded first, as node -1. From here on `found` holds the heads of the arcs from
+    # the cell (row, col), reached at `cost`.
     best, last, expanded, size = FAR, np.int64(FROM_START), 0, 0
     node, cost, row, col = np.int64(-1), np.int64(0), start // width, start % width
     n_found = _joined_to(graph, start, found)
@@ -229,6 +236,9 @@ def shortest_patched(graph, endpoints, work):
         for k in range(n_found):
             other = np.int64(found[k])
             to_row, to_col, _ = row_col_kind(places[other])
+
+            # An arc is a free leg, whose cost is the octile distance: arcs of new corner cells need
+            # no stored one.
             further = cost + octile_cost(to_row - row, to_col - col)
             estimate = further + octile_cost(to_row - goal_row, to_col - goal_col)
             if further >= records[other, 0] or estimate >= best:
@@ -238,6 +248,8 @@ def shortest_patched(graph, endpoints, work):
                 heap = np.concatenate((heap, heap))
             push(heap, size, estimate, other)
             size += 1
+
+        # The estimates are lower bounds: nothing that waits is part of a better path.
         if size == 0 or heap[0, 0] >= best:
             break
         estimate = heap[0, 0]
@@ -245,6 +257,8 @@ def shortest_patched(graph, endpoints, work):
         size -= 1
         row, col, _ = row_col_kind(places[node])
         cost, n_found = records[node, 0], 0
+
+        # An entry that is out of date is dropped: without heads, the next turn takes another one.
         if estimate != cost + octile_cost(row - goal_row, col - goal_col):
             continue
         expanded += 1

@@ -126,6 +126,7 @@ def look_ahead(number, width, index, ahead):
         the next cell that is a corner cell or sees one along either side of that diagonal, or minus
         the number of legal moves.
     """
+    # Sides come first, because they decide where a diagonal stops.
     for flip in (1, -1):
         first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
         # Upwards, the cells to the west and south are done before; downwards, those to the north
@@ -137,6 +138,8 @@ def look_ahead(number, width, index, ahead):
                 continue
             for k, step in towards:
                 there = number[cell + step]
+
+                # The neighbour knows the way ahead: one move more, and its sign stays.
                 if there == BLOCKED:
                     ahead[here, k] = 0
                 elif is_corner(index, cell + step):
@@ -144,6 +147,8 @@ def look_ahead(number, width, index, ahead):
                 else:
                     seen = ahead[there, k]
                     ahead[here, k] = seen + 1 if seen > 0 else seen - 1
+
+    # In the same two orders, each diagonal neighbour is done before.
     for flip in (1, -1):
         first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
         diagonals = (
@@ -166,6 +171,7 @@ def look_ahead(number, width, index, ahead):
                     or ahead[there, k - 1] > 0
                     or ahead[there, k + 1 & 7] > 0
                 ):
+                    # A path may turn off the diagonal where a side leads to a corner cell.
                     ahead[here, k] = 1
                 else:
                     seen = ahead[there, k]

@@ -230,6 +230,9 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
     size, expanded = 0, 0
     best, found = np.int64(limit), np.int64(-1)
     work.counts[:] = 0
+
+    # The start reaches the nodes of its field inside it. Here as below, what is not below the best
+    # distance, at first the limit, is dropped.
     first, goals = levels.node_at[fields[0]], levels.node_at[fields[1]]
     for node in range(first, levels.node_at[fields[0] + 1]):
         value = reaches[0][node - first]
@@ -241,15 +244,22 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
             push(heap, size, key, node)
             size += 1
             distance[node], before[node] = value, START
+
+    # The least key is a lower bound on every path not found yet; `epsilon` allows it to lie a
+    # little below the best distance.
     while size > 0 and heap[0, 0] * (1.0 + epsilon) < best:
         key = heap[0, 0]
         node = pop(heap, size)
         size -= 1
         value = distance[node]
+
+        # An entry whose node was reached at less since is out of date.
         if key != value + work.ahead[node]:
             continue
         expanded += 1
         field = levels.field_of[node]
+
+        # From a node of the goal's field, the way inside it completes a path.
         if field == fields[1] and value + reaches[1][node - goals] < best:
             best, found = value + reaches[1][node - goals], node
         begin, end = levels.move_at[node], levels.move_at[node + 1]
@@ -257,6 +267,8 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
         # A distance over a clique is never improved by the same clique.
         count = levels.node_at[field + 1] - inside if before[node] >= 0 else 0
         heap = with_room(heap, size, count + end - begin)
+
+        # First the clique of the field, marked by the inverted node, then the moves out of it.
         for k in range(count + end - begin):
             if k < count:
                 place = levels.clique_at[field] + clique_place(node - inside, k)
@@ -264,6 +276,8 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
             else:
                 move = begin + k - count
                 other, cost, mark = np.int64(levels.move_to[move]), levels.move_cost[move], node
+
+                # On the whole map, a cell counts as its highest node whose field is not stale.
                 if is_whole:
                     other = np.int64(_active(levels, other))
                 elif other < span[0] or other >= span[1]:
@@ -281,6 +295,8 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
             distance[other], before[other] = offered, mark
             push(heap, size, key, other)
             size += 1
+
+    # Every node with a distance has a bound, hence a place in `seen`: this clears both.
     for i in range(work.counts[0]):
         distance[work.seen[i]], work.ahead[work.seen[i]] = NO_PATH, -1
     proved = min(best, heap[0, 0]) if size > 0 else best

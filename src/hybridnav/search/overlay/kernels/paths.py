@@ -247,11 +247,14 @@ def _over_marked(levels, ground, low, high, nodes, n):
         `nodes`, in a new array if there was no room, and their number, -1 if no path is as long as
         the costs state.
     """
+    # The mark of a node is bit `row + node`: a row of bits for each node at which paths end.
     field = levels.field_of[high]
     span, first = inside_of(levels, field), levels.node_at[field]
     begin, width = np.int64(span[0]), np.int64(span[1] - span[0])
     marks = levels.marks[levels.marks_at[field] : levels.marks_at[field + 1]]
     row = (high - first) * width - begin
+
+    # The stored distance is what the path costs: all that costs more is dropped.
     limit = np.int64(
         levels.clique[levels.clique_at[field] + clique_place(high - first, low - first)]
     )
@@ -260,6 +263,8 @@ def _over_marked(levels, ground, low, high, nodes, n):
     heap, size, goal_cell = np.empty((64, 2), np.int64), 1, levels.cell_of[goal]
     push(heap, 0, np.int64(0), start)
     distance[start - begin], before[start - begin] = 0, start
+
+    # Only nodes that a move reaches wait: after a step over a clique comes a move, or the goal.
     while size > 0 and distance[goal - begin] > limit:
         entry = heap[0, 1]
         pop(heap, size)
@@ -268,6 +273,8 @@ def _over_marked(levels, ground, low, high, nodes, n):
         inside = levels.node_at[own]
         for node in range(inside, levels.node_at[own + 1]):
             bit = row + node
+
+            # The goal itself has no mark: paths are marked up to it.
             if not marks[bit >> 3] >> (bit & 7) & 1 and node != goal:
                 continue
             offered = value
@@ -277,6 +284,9 @@ def _over_marked(levels, ground, low, high, nodes, n):
                 if offered > limit or offered >= distance[node - begin]:
                     continue
                 distance[node - begin], before[node - begin] = offered, entry
+
+            # The bound from here also ranks the far ends of the moves, as their order need not be
+            # exact.
             ahead = least_cost(levels.cell_of[node], goal_cell, ground.cols, ground.least_units)
             if offered + ahead > limit:
                 continue
@@ -293,8 +303,12 @@ def _over_marked(levels, ground, low, high, nodes, n):
                     distance[other - begin], before[other - begin] = total, node
                     push(heap, size, rank(total, ahead), other)
                     size += 1
+
+    # No path has the stored distance: the caller returns no nodes rather than wrong ones.
     if distance[goal - begin] > limit:
         return nodes, -1
+
+    # Back from the goal, without either end: the caller appends these.
     node = np.int64(before[goal - begin])
     while node != start:
         nodes = append(nodes, n, node)

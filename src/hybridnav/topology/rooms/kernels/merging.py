@@ -126,6 +126,9 @@ def measure_segments(label_of, reaching, clearance, n):
     """Measure free cells, peaks, moments and rims of segments, and their hulls one after the
     other."""
     rows, cols = label_of.shape
+
+    # Areas and clearance are those of free cells. Shape and rim include the reach into walls, so
+    # that segments on both sides of a thin wall touch.
     free, peaks, rims = np.zeros(n), np.zeros(n), np.zeros(n)
     moments = np.zeros((n, 6))
     low, high = np.full(n, rows), np.full(n, -1)
@@ -138,6 +141,8 @@ def measure_segments(label_of, reaching, clearance, n):
             u = reaching[row, col]
             if u < 0:
                 continue
+
+            # Sums, not means: when two segments merge, theirs add up.
             at = moments[u]
             at[0] += 1
             at[1] += row
@@ -147,10 +152,15 @@ def measure_segments(label_of, reaching, clearance, n):
             at[5] += col * col
             low[u] = min(low[u], row)
             high[u] = row
+
+            # A side counts where another segment, no segment or the end of the map is beyond it.
             for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):
                 r, c = row + step[0], col + step[1]
                 if not (0 <= r < rows and 0 <= c < cols) or reaching[r, c] != u:
                     rims[u] += 1
+
+    # Only the first and the last cell of a segment in a row can be on its hull: one place for each
+    # row.
     begins = np.zeros(n + 1, np.int64)
     for u in range(n):
         begins[u + 1] = begins[u] + max(0, high[u] - low[u] + 1)
@@ -162,6 +172,8 @@ def measure_segments(label_of, reaching, clearance, n):
                 k = begins[u] + row - low[u]
                 left[k] = min(left[k], col)
                 right[k] = col
+
+    # A hull has at most as many corners as points go in, four a row.
     hulls = np.empty((4 * begins[n] + 16, 2))
     hull_begins, sizes = np.zeros(n, np.int64), np.zeros(n, np.int64)
     areas, diameters = np.zeros(n), np.zeros(n)
@@ -173,10 +185,14 @@ def measure_segments(label_of, reaching, clearance, n):
             if right[k] < 0:
                 continue
             row = low[u] + k - begins[u]
+
+            # The corners of both cells, not their centres: a hull then holds the area of its cells.
             for up in range(2):
                 points[count] = float(row + up), float(left[k])
                 points[count + 1] = float(row + up), float(right[k] + 1)
                 count += 2
+
+        # The hulls lie one behind the other, as `merge_pair` appends further ones.
         corners = np.empty((2 * count + 2, 2))
         sizes[u], areas[u] = hull_of(points, count, corners)
         hulls[used : used + sizes[u]] = corners[: sizes[u]]
@@ -234,15 +250,21 @@ def merge_pair(state, pair):
     """Let the larger segment of a pair take the other; return both."""
     endpoints = state.endpoints
     u, v = endpoints[pair, 0], endpoints[pair, 1]
+
+    # The larger segment keeps its number.
     if state.free[u] < state.free[v]:
         u, v = v, u
     n, border = state.open_sides[pair], max(state.border_sides[pair], state.open_sides[pair])
+
+    # The hull of both goes behind the others; the two old ones are not used any more.
     corners, size, area = union_hull(state, u, v)
     begin = state.hulls_used[0]
     state.hulls[begin : begin + size] = corners[:size]
     state.hulls_used[0] = begin + size
     state.hull_begins[u], state.hull_sizes[u] = begin, size
     state.hull_areas[u], state.diameters[u] = area, diameter_of(corners, size)
+
+    # The sides between both counted once for each, and are inside now.
     state.opened[u] += state.opened[v] - 2 * n
     state.rims[u] += state.rims[v] - 2 * border
     state.free[u] += state.free[v]
@@ -251,8 +273,13 @@ def merge_pair(state, pair):
     state.versions[u] += 1
     state.versions[v] = -1
     endpoints[pair, 0] = -1
+
+    # Mark each segment that touches u with the pair: the sum of both ends less u is that segment.
     for other in pairs_of_both(state, u):
         state.mark[endpoints[other, 0] + endpoints[other, 1] - u] = other
+
+    # Where both touch the same segment, two pairs become one; any other pair of v becomes one of u.
+    # A half pair is twice its pair, plus 1 for the second end.
     half = state.first_half[v]
     while half >= 0:
         following, at = state.next_half[half], half >> 1
@@ -268,6 +295,8 @@ def merge_pair(state, pair):
                 state.next_half[half] = state.first_half[u]
                 state.first_half[u] = half
         half = following
+
+    # All marked segments still touch u: this clears their marks for the next merge.
     left = pairs_of_both(state, u)
     state.degrees[u] = len(left)
     for other in left:

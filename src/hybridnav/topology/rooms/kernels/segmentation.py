@@ -234,6 +234,7 @@ def opening_of(state, pair, reach, found):
     Span, deviation, sides along the axis, lower and higher jamb, share of wall inside, direction,
     longest run, lower, higher and mean share of walls that run on square to it.
     """
+    # First and second moments of the middles of the sides; how many lie along the columns.
     wall = state.wall
     n, upright = 0, 0.0
     row = col = rr = rc = cc = 0.0
@@ -247,15 +248,23 @@ def opening_of(state, pair, reach, found):
         run = state.next_run[run]
     row, col = row / n, col / n
     rr, rc, cc = rr / n - row * row, rc / n - row * col, cc / n - col * col
+
+    # Eigenvalues of the covariance: the spread along and across the main axis, whose direction is
+    # the eigenvector of the greater one.
     half = math.sqrt(max(0.0, (rr - cc) ** 2 / 4 + rc * rc))
     major, minor = (rr + cc) / 2 + half, max(0.0, (rr + cc) / 2 - half)
     by_row, by_col = rc, major - rr
     norm = math.hypot(by_row, by_col)
+
+    # Few or close sides have no clear main axis: the direction of most decides. The vector vanishes
+    # where the axis is that of the rows.
     if n < 3 or major < 0.3:
         by_row, by_col, norm = (0.0, 1.0, 1.0) if 2 * upright >= n else (1.0, 0.0, 1.0)
     elif norm < 1e-9:
         by_row, by_col, norm = (1.0, 0.0, 1.0) if rr >= cc else (0.0, 1.0, 1.0)
     by_row, by_col = by_row / norm, by_col / norm
+
+    # From end to end along the axis; a side is one cell long, hence the one added.
     low, high = np.inf, -np.inf
     run = state.head[pair]
     while run >= 0:
@@ -264,6 +273,8 @@ def opening_of(state, pair, reach, found):
             low, high = min(low, at), max(high, at)
         run = state.next_run[run]
     span = high - low + 1.0
+
+    # Sides in the same place along the axis count once: a ragged border is no wider opening.
     covered = np.zeros(int(span) + 2, np.bool_)
     run = state.head[pair]
     while run >= 0:
@@ -271,6 +282,8 @@ def opening_of(state, pair, reach, found):
             at = (state.sides[i, 0] - row) * by_row + (state.sides[i, 1] - col) * by_col
             covered[int(at - low)] = True
         run = state.next_run[run]
+
+    # Wall in line with the opening: beyond both ends, as beside a door, and between them.
     before = behind = inside = 0
     for k in range(1, reach + 1):
         before += is_wall(wall, row + by_row * (low - k), col + by_col * (low - k))
@@ -278,12 +291,17 @@ def opening_of(state, pair, reach, found):
     for k in range(int(span)):
         at = low + k + 0.5
         inside += is_wall(wall, row + by_row * at, col + by_col * at)
+
+    # Runs of covered places are the openings of which the border consists.
     total = runs = longest = length = 0
     for k in range(len(covered)):
         length = length + 1 if covered[k] else 0
         total += covered[k]
         runs += length == 1
         longest = max(longest, length)
+
+    # Walls that run on square to the opening, by end and hand. A hand is flush only where both ends
+    # have such a wall: the lesser arm counts.
     arms = np.empty((2, 2))
     for end in range(2):
         at, sign = (low, -1.0) if end == 0 else (high, 1.0)
@@ -318,34 +336,54 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
     for k in range(len(pairs)):
         pair, row = pairs[k], evidence[k]
         u, v = state.endpoints[pair, 0], state.endpoints[pair, 1]
+
+        # By size, as `EVIDENCE` asks: the numbers of segments must not change a judgement.
         if state.free[u] > state.free[v]:
             u, v = v, u
         opening_of(state, pair, jamb, found)
+
+        # The border with the reach into walls, but at least the open sides: their share is at most
+        # 1.
         n, border = state.open_sides[pair], max(state.border_sides[pair], state.open_sides[pair])
         _corners, _size, hull_area = union_hull(state, u, v)
+
+        # Two parts of one convex room fill the hull of both.
         area_u, area_v = state.moments[u, 0], state.moments[v, 0]
         solid_u, solid_v = area_u / state.hull_areas[u], area_v / state.hull_areas[v]
         solid = (area_u + area_v) / hull_area
         long_u, axis_u = axes_of(state.moments[u])
         long_v, axis_v = axes_of(state.moments[v])
         long_both, _ = axes_of(state.moments[u] + state.moments[v])
+
+        # Mean breadth: the area over the greatest length, without the reach into both walls.
         broad_u = max(1.0, area_u / max(1.0, state.diameters[u]) - 2 * reach)
         broad_v = max(1.0, area_v / max(1.0, state.diameters[v]) - 2 * reach)
         rim_u, rim_v = state.rims[u], state.rims[v]
         rim = max(1.0, rim_u + rim_v - 2 * border)
         widest, peak_u, peak_v = state.widest[pair], state.peaks[u], state.peaks[v]
         width, axis = found[2], atan2(found[7], found[6])
+
+        # The opening. Lengths are in metres, so that maps of all resolutions share one forest.
         row[0], row[1], row[2] = width * resolution, found[0] * resolution, width / found[0]
         row[3], row[4] = found[1] * resolution, found[1] / found[0]
         row[5], row[6], row[7] = found[3], found[4], found[5]
+
+        # Clearance on it, and against the clearest cells of both segments: a door is narrow for
+        # both.
         row[8], row[9] = widest * resolution, state.clearances[pair] / n * resolution
         row[10] = widest / max(1.0, min(peak_u, peak_v))
         row[11] = widest / max(1.0, peak_u, peak_v)
+
+        # How much of the border and of each rim it takes; how open both are now, and as one.
         row[12], row[13], row[14] = n / border, n / rim_u, n / rim_v
         row[15], row[16] = min(1.0, state.opened[u] / rim_u), min(1.0, state.opened[v] / rim_v)
         row[17] = min(1.0, (state.opened[u] + state.opened[v] - 2 * n) / rim)
+
+        # How convex both are, and what merging gains over their mean by area.
         row[18], row[19], row[20] = solid_u, solid_v, solid
         row[21] = solid - (area_u * solid_u + area_v * solid_v) / (area_u + area_v)
+
+        # Sizes, shapes and directions of both, and of the opening against them.
         row[22], row[23] = peak_u * resolution, peak_v * resolution
         row[24], row[25] = broad_u * resolution, broad_v * resolution
         row[26], row[27], row[28] = long_u, long_v, long_both
@@ -353,6 +391,9 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
         row[31], row[32] = abs(cos(axis_u - axis_v)), abs(sin(axis - axis_u))
         row[33] = abs(sin(axis - axis_v))
         row[34], row[35] = state.degrees[u], state.degrees[v]
+
+        # A divided or ragged opening is wider than the clearance on it allows. Then its parts, and
+        # the walls flush with it.
         row[36] = width * resolution / max(0.3, 2 * widest * resolution)
         row[37], row[38] = found[8], found[9] * resolution
         row[39], row[40], row[41] = found[10], found[11], found[12]
