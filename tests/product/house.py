@@ -139,6 +139,23 @@ def loaded_by_a_picture(target: Path) -> list[str]:
     return _told(_LOADED, str(target))
 
 
+def bare_kernels() -> list[str]:
+    """Return the kernels of more than 40 lines of code with less than a comment in ten of these."""
+    found = []
+    for path in SRC.rglob("kernels/*.py"):
+        text = path.read_text()
+        tokens = list(tokenize.generate_tokens(StringIO(text).readline))
+        comments = {one.start[0] for one in tokens if one.type == tokenize.COMMENT}
+        written = {one.start[0] for one in tokens if one.type not in _NO_CODE}
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef) and node.end_lineno is not None:
+                first = node.body[0].end_lineno if ast.get_docstring(node) else node.lineno
+                body = set(range((first or 0) + 1, node.end_lineno + 1))
+                if len(body & written) > max(40, 10 * len(body & comments)):
+                    found.append(f"{path.relative_to(SRC)}: {node.name}")
+    return found
+
+
 def figures(target: Path) -> dict[str, float]:
     """Return the figures of the house by name."""
     files = sources()
@@ -165,6 +182,7 @@ def figures(target: Path) -> dict[str, float]:
         "lines visited by paper": sum(path.read_text().count("\n") for path in visited),
         "modules of a plan and a picture": len(loaded_by_a_picture(target)),
         "imports, % of the code": round(100 * sum(one.import_lines for one in files) / code, 1),
+        "long kernels without headings": len(bare_kernels()),
         "names at the root": len(re.findall(r" as \w+", (SRC / "__init__.pyi").read_text())) - 2,
         "parameters of commands, shared ones once": sum(
             len(re.findall(r"typer\.(?:Option|Argument)\(", path.read_text()))

@@ -20,6 +20,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import BUCKET_FULL, legal_moves, trace_cells
 from hybridnav._base.threads import Pool
 from hybridnav.search.kernels import grid_search as _kernels
+from hybridnav.search.kernels import waypoints as _waypoint_kernels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -335,7 +336,7 @@ def cheapest_waypoints(
     for number, goals in enumerate(sets[1:], start=2):
         is_target = np.zeros(moves.size, dtype=np.bool_)
         is_target[goals] = True
-        cost, came = _kernels.spread(
+        cost, came = _waypoint_kernels.spread(
             moves, weights, enterable.shape[1], sources, costs, is_target, number < len(sets)
         )
         reached = goals[cost[goals] >= 0]
@@ -367,7 +368,7 @@ def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> L
     is_target[targets] = True
     source = np.array([cell[0] * cols + cell[1]])
     start_cost = np.zeros(1, dtype=np.int64)
-    costs: LongArray = _kernels.spread(
+    costs: LongArray = _waypoint_kernels.spread(
         moves.ravel(), None, cols, source, start_cost, is_target, True
     )[0]
     return costs

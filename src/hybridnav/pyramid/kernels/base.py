@@ -240,13 +240,13 @@ def select_joins(origin, base_edge, joins, level, parent, kernel_dart):
     Parameters
     ----------
     origin, base_edge
-        See `_kernels.contractible`.
+        See `decimation.contractible`.
     joins
         uint8 by base edge, the level at which its two cells join, 0 for never.
     level
         Number of the level.
     parent, kernel_dart
-        int32 (n_vertices,), changed; see `_kernels.select_stars`, whose stars have no vertex in
+        int32 (n_vertices,), changed; see `decimation.select_stars`, whose stars have no vertex in
         common with these. A centre has a kernel dart of its own only while this runs.
     """
     leaves = 0
@@ -277,7 +277,7 @@ def let_survive(origin, keys, cells, cols, survivors, survivors_of_edge):
     Parameters
     ----------
     origin, keys, survivors_of_edge
-        See `_kernels.contractible`; the last is changed.
+        See `decimation.contractible`; the last is changed.
     cells
         int32 (n_vertices, 2), the surviving cells of the level.
     cols

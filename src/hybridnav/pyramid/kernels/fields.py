@@ -132,7 +132,6 @@ def find_cracks(field_of, rows, cols):
         root[i] = i
     for i in range(count):
         cell = cracks[i] >> 1
-        # Every pair of cracks is met in the block whose lower-left cell is this one.
         for back in range(2):
             # A crack borders on two blocks: that whose lower-left cell is its first cell, and the
             # one west or south of that.

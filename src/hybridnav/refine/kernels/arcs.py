@@ -1,6 +1,6 @@
 """Kernels that round the bends of a line by arcs, where free space and costs allow it.
 
-Positions are those of `_taut_kernels`.
+Positions are those of `refine.kernels.taut`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Kernels that shorten a path of cells to a line of positions without raising its cost.
 
-Positions are those of `_taut_kernels`. A line has `costs`, float64 (n,), that of the segment, or of
+Positions are those of `taut`. A line has `costs`, float64 (n,), that of the segment, or of
 the part of a path, before each of its points; and `at`, int64 (n,), where on the path of cells each
 point lies.
 """
@@ -205,7 +205,7 @@ def shorten(free, factors, path):
 
 # The cost of a segment and the test whether it is legal, in one walk over its cells.
 #
-# Positions are those of `_taut_kernels`.
+# Positions are those of `taut`.
 
 _FREE = 1
 _LEGAL_SLACK = 1e-12

@@ -1,6 +1,6 @@
 """Kernel of the any-angle finish: from a cell path to a short string.
 
-Positions are those of `_taut_kernels`.
+Positions are those of `refine.kernels.taut`.
 """
 
 import math
@@ -91,7 +91,7 @@ def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
 
 # Kernels that lead parts of a taut string past the other sides of obstacles.
 #
-# Positions are those of `_taut_kernels`.
+# Positions are those of `refine.kernels.taut`.
 
 _ROUND = 2.0**20
 _WIDEST = 8

@@ -1,6 +1,6 @@
 """The exact test of a segment against the cells of a grid.
 
-Positions are those of `_taut_kernels`: (row, col) in grid units, rounded to 2^-24 of a cell.
+Positions are those of `refine.kernels.taut`: (row, col) in grid units, rounded to 2^-24 of a cell.
 """
 
 import math

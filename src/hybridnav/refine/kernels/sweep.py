@@ -1,6 +1,6 @@
 """Kernels of bodies in motion: the areas swept by convex polygons and points, against cells.
 
-Positions are those of `_taut_kernels`; angles are counter-clockwise from the axis of the columns to
+Positions are those of `taut`; angles are counter-clockwise from the axis of the columns to
 that of the rows. A motion moves the base along a straight line while the heading turns evenly
 (`radius` 0), or along an arc about a fixed centre, to the left where its signed `radius` in cells
 is positive.

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.ext.live.kernels.cells import (
-    beside_of,
-    is_within,
-    join_each_other,
-    join_nearest,
-    look_again,
-    step_to,
-)
+from hybridnav.ext.live.kernels.cells import join_each_other, join_nearest
+from hybridnav.ext.live.kernels.near import beside_of, is_within, look_again, step_to
 
 _NO, _YES, _BEYOND = 0, 1, 2
 _FEW_CELLS = 256

@@ -245,7 +245,7 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
     cost_of, previous
         Work arrays, one entry a node: integer cost and previous node.
     mark, generation
-        As in `_weighted_kernels.dijkstra`, by node.
+        As in `weighted.dijkstra`, by node.
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1

@@ -410,8 +410,7 @@ def shortest(graph, endpoints, is_contracted, work):
         if estimate == cost + octile_cost(row - aim_row, col - aim_col):
             expanded += 1
 
-            # Reached from both ends, a corner cell completes a path; `FAR` from the other end is
-            # none.
+            # Reached from both ends, a corner cell completes a path; `FAR` is not reached.
             if cost + records[node, 1 - direction] < best:
                 best, meeting = cost + records[node, 1 - direction], node
 
@@ -437,7 +436,6 @@ def shortest(graph, endpoints, is_contracted, work):
                 estimate = further + octile_cost(row - aim_row, col - aim_col)
                 if estimate >= best:
                     continue
-
                 # Noted once, by whichever direction comes first: the caller resets both.
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
