@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+import hybridnav as hn
+from hybridnav.harness.methods import baseline_spec, prepare
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.search.found import Found
@@ -85,3 +87,18 @@ def test_a_search_method_is_asked_and_judged_like_any_other(
     if method is Unsure:
         statuses = {record["status"] for record in outcome.records}
         assert statuses == {"no path, and no proof of none"}
+
+
+def test_a_search_method_is_closed_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[ByCells] = []
+
+    def close(method: ByCells) -> None:
+        closed.append(method)
+
+    monkeypatch.setattr(ByCells, "close", close, raising=False)
+    grid = hn.OccupancyGrid(np.zeros((3, 4), np.float32), robot_radius_m=0)
+    method = prepare(baseline_spec(name_of(ByCells)), grid)
+    assert method.solve((0, 0), (2, 3)).is_path
+    assert not closed
+    method.close()
+    assert len(closed) == 1

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.baselines import Solver
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Metric, PlanResult, Preset
+    from hybridnav.planner import Metric, PlanResult, PlanStats, Preset
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -69,11 +69,8 @@ class HybridMethod:
             arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
             bound=1 + result.gap if is_factor else np.inf,
             by_costs=claim,
-            expanded=stats.expanded,
-            expanded_nodes=stats.expanded_places,
-            expanded_border_cells=stats.expanded_border_cells,
-            expanded_intervals=stats.expanded_intervals,
             seconds=_stages(result),
+            **_counts(stats),
         )
 
     def close(self) -> None:
@@ -114,13 +111,7 @@ class FoundMethod:
         ends = self._frame.points_of(np.array([start, goal]))
         found = self._method.find(search.Query((start, goal), (ends[0], ends[1])))
         stats, cost_m, least_m = found.stats, found.cost_m, found.lower_bound_m
-        counts: dict[str, Any] = {
-            "expanded": stats.expanded,
-            "expanded_nodes": stats.expanded_places,
-            "expanded_border_cells": stats.expanded_border_cells,
-            "expanded_intervals": stats.expanded_intervals,
-            "seconds": stats.seconds,
-        }
+        counts = _counts(stats) | {"seconds": stats.seconds}
         if not found.has_path:
             gave_up = "" if math.isinf(least_m) else "no path, and no proof of none"
             return MethodResult(None, gave_up=gave_up, **counts)
@@ -132,6 +123,27 @@ class FoundMethod:
             return MethodResult(found.cells, by_costs=claim, **counts)
         bound = cost_m / least_m if least_m > 0 else math.inf
         return MethodResult(found.cells, bound=bound if cost_m > 0 else 1.0, **counts)
+
+    def close(self) -> None:
+        """End the processes of the method."""
+        close_method(self._method)
+
+
+def close_method(method: object) -> None:
+    """End the processes of a method, if it has a `close`."""
+    close = getattr(method, "close", None)
+    if callable(close):
+        close()
+
+
+def _counts(stats: PlanStats) -> dict[str, Any]:
+    """Return what a search took from its queues, under the names of the harness."""
+    return {
+        "expanded": stats.expanded,
+        "expanded_nodes": stats.expanded_places,
+        "expanded_border_cells": stats.expanded_border_cells,
+        "expanded_intervals": stats.expanded_intervals,
+    }
 
 
 LINE_METRICS: frozenset[Metric] = frozenset({"any-angle", "any-angle-weighted"})
@@ -258,6 +270,4 @@ class OnOwnGrid:
 
     def close(self) -> None:
         """End the processes of the method."""
-        close = getattr(self._method, "close", None)
-        if callable(close):
-            close()
+        close_method(self._method)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid
+from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid, close_method
 from hybridnav.harness.names import baseline_name, class_of, source_hash
 from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
@@ -262,9 +262,7 @@ class Prepared:
 
     def close(self) -> None:
         """End the processes of the method, which answers no more."""
-        close = getattr(self.method, "close", None)
-        if callable(close):
-            close()
+        close_method(self.method)
 
 
 def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = None) -> Prepared:

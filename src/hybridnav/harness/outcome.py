@@ -183,7 +183,7 @@ class Outcome:
             "reference_expansions": sum((self._known(key, 0) for key in EXPANSIONS), 0.0),
             "seconds": np.where(solved, seconds, math.nan),
             "reference_seconds": self._known("seconds"),
-            # Of the answers themselves, without those in the metric layer.
+            # Seconds of the answers, without those that the metric layer took of them.
             "coarse_seconds": np.where(solved, answered, math.nan) - refined,
             "spreads": np.array([_spread(one.get("repeats") or ()) for one in own], dtype=float),
         }

@@ -93,13 +93,13 @@ class HybridPlanner:
         grid, settings = topology.grid, self.preset.planner
         check_radius(grid, self.preset)
         by = PlannerCosts(grid, self.preset, costs)
-        site = KnownMap(grid, topology, by.layer, prepared)
-        method, ompl = make_method(site, settings), None
+        known = KnownMap(grid, topology, by.layer, prepared)
+        method, ompl = make_method(known, settings), None
         if isinstance(settings, OmplPlannerSettings):
             # Loads modules for these presets only, or reports which one to install.
             from hybridnav.planner.methods.ompl import ompl_planner  # noqa: PLC0415
 
-            ompl = ompl_planner(site, method, settings)
+            ompl = ompl_planner(known, method, settings)
         self._now = Planning(self.preset, grid, topology, method, by, ompl)
         self._turns, self._preparing = Turns(), Turns()
         self._begun: Callable[[], Planning] | None = None

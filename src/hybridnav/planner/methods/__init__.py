@@ -22,7 +22,7 @@ _METHODS = {
 """Module and class of each method; only that of a preset is loaded."""
 
 
-def make_method(site: KnownMap, settings: PlannerSettings) -> Method:
+def make_method(known: KnownMap, settings: PlannerSettings) -> Method:
     """Make the method that some settings name.
 
     Raises
@@ -36,12 +36,12 @@ def make_method(site: KnownMap, settings: PlannerSettings) -> Method:
     if settings.method not in _METHODS:
         from hybridnav.planner.methods.own_method import own_method  # noqa: PLC0415 - for these alone
 
-        return own_method(site, settings)
+        return own_method(known, settings)
     module, _, name = _METHODS[settings.method].partition(":")
-    made: Method = getattr(import_module(f"{__name__}.{module}"), name)(site, settings)
-    if site.prepared is not None and made.prepared is not site.prepared:
+    made: Method = getattr(import_module(f"{__name__}.{module}"), name)(known, settings)
+    if known.prepared is not None and made.prepared is not known.prepared:
         raise InvalidValueError(
-            f"method {settings.method} plans on nothing like a {type(site.prepared).__name__}: "
+            f"method {settings.method} plans on nothing like a {type(known.prepared).__name__}: "
             "prepared must come from a planner of the same preset"
         )
     return made

@@ -39,18 +39,18 @@ class OverOverlay(Method):
 
     Parameters
     ----------
-    site
+    known
         The map with its places, whose pyramid has the fields of the overlay, and its costs.
     settings
         Whether unexplored cells may be entered, and the accepted distance from the optimum.
     """
 
-    def __init__(self, site: KnownMap, settings: CheapestSettings) -> None:
-        assert site.topology is not None  # noqa: S101 - no method of places is made without
-        self._topology, self._settings = site.topology, settings
+    def __init__(self, known: KnownMap, settings: CheapestSettings) -> None:
+        assert known.topology is not None  # noqa: S101 - no method of places is made without
+        self._topology, self._settings = known.topology, settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon = settings.epsilon or 0.0
-        self._take(site)
+        self._take(known)
         self._built: tuple[Overlay, OverlaySearch] | None = None
         self._is_too_long = False
         """Whether the costs of paths inside a field do not fit, as with factors of hundreds."""
@@ -65,8 +65,8 @@ class OverOverlay(Method):
         free = self._topology.grid.enterable(allow_unexplored=self._allow_unexplored)
         return _WORTH * int(free.sum())
 
-    def _take(self, site: KnownMap) -> None:
-        self._whole_map = WholeMap(site, self._settings)
+    def _take(self, known: KnownMap) -> None:
+        self._whole_map = WholeMap(known, self._settings)
         self._refiner, _ = self._whole_map.refiners
         self.metric: Metric = self._whole_map.metric
 

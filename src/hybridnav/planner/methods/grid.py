@@ -91,15 +91,15 @@ class WholeMap(Method):
 
     Parameters
     ----------
-    site
+    known
         The map and its costs.
     settings
         Whether unexplored cells may be entered, and the refiner, used where nothing is closed.
     """
 
-    def __init__(self, site: KnownMap, settings: PlannerSettings) -> None:
-        self.metric: Metric = "octile" if site.costs is None else "weighted"
-        self.refiners = site.refiner(settings), own_refiner(site.grid, settings)
+    def __init__(self, known: KnownMap, settings: PlannerSettings) -> None:
+        self.metric: Metric = "octile" if known.costs is None else "weighted"
+        self.refiners = known.refiner(settings), own_refiner(known.grid, settings)
         """The search of cells, with the costs; and that of the user's own, None for none."""
 
     def prepare(self, progress: Progress = no_progress) -> object:

@@ -35,7 +35,7 @@ class OverJumps(Method):
 
     Parameters
     ----------
-    site
+    known
         The map, and the search of its graph, if it is built already.
     settings
         Whether unexplored cells may be entered.
@@ -43,14 +43,14 @@ class OverJumps(Method):
 
     metric: Metric = "octile"
 
-    def __init__(self, site: KnownMap, settings: PlannerSettings) -> None:
-        self._grid, self._settings = site.grid, settings
+    def __init__(self, known: KnownMap, settings: PlannerSettings) -> None:
+        self._grid, self._settings = known.grid, settings
         self._allow_unexplored = settings.allow_unexplored
-        self._whole_map = WholeMap(site, settings)
+        self._whole_map = WholeMap(known, settings)
         self._refiner, _ = self._whole_map.refiners
-        self._search = site.prepared if isinstance(site.prepared, JumpSearch) else None
+        self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
         self._building = threading.RLock()  # a progress callback may plan
-        self._frame = site.grid.frame.for_kernels
+        self._frame = known.grid.frame.for_kernels
 
     @property
     def prepared(self) -> JumpSearch | None:

@@ -47,7 +47,7 @@ class OmplPlan:
     search: Search | None = None
 
 
-def ompl_planner(site: KnownMap, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
+def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
     """Make a planner with OMPL along the paths of a method.
 
     Raises
@@ -55,9 +55,9 @@ def ompl_planner(site: KnownMap, method: Method, settings: OmplPlannerSettings) 
     OmplError
         When OMPL is not installed, refuses the settings, or its process does not start.
     """
-    grid, field_of = site.grid, None
-    if settings.along != "grid-astar" and site.topology is not None:
-        field_of = site.topology.level.field_of
+    grid, field_of = known.grid, None
+    if settings.along != "grid-astar" and known.topology is not None:
+        field_of = known.topology.level.field_of
     free = np.argwhere(grid.enterable(allow_unexplored=settings.allow_unexplored))[:1]
     if len(free):  # kernels loaded at the first query would use up its budget
         cell, (point,) = (int(free[0, 0]), int(free[0, 1])), grid.frame.points_of(free)

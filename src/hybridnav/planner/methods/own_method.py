@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from hybridnav.planner import PlannerSettings
     from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.refine import GridRefiner
-    from hybridnav.search.found import Prepared, Query
+    from hybridnav.search.found import Query
 
 
-def own_method(site: KnownMap, settings: PlannerSettings) -> Method:
+def own_method(known: KnownMap, settings: PlannerSettings) -> Method:
     """Import the class that settings name as their method, and make a method of it.
 
     The class is called with the grid, the keywords `costs` and `allow_unexplored`, and those of
@@ -35,9 +35,9 @@ def own_method(site: KnownMap, settings: PlannerSettings) -> Method:
         When the module cannot be imported, has no such class, or the class makes no method.
     """
     own = class_of(settings.method, "planner.method")
-    keywords = {"costs": site.costs, "allow_unexplored": settings.allow_unexplored}
+    keywords = {"costs": known.costs, "allow_unexplored": settings.allow_unexplored}
     try:
-        made = own(site.grid, **keywords, **settings.settings)
+        made = own(known.grid, **keywords, **settings.settings)
         metric, find = made.metric, made.find
     except Exception as error:
         why = (
@@ -48,7 +48,7 @@ def own_method(site: KnownMap, settings: PlannerSettings) -> Method:
     if metric not in _METRICS or not callable(find):
         why = f"its metric is {brief(metric)}, expected one of {', '.join(_METRICS)}"
         raise refused(settings.method, why, "planner.method")
-    return OwnMethod(settings.method, made, site.refiner(settings))
+    return OwnMethod(settings.method, made, known.refiner(settings))
 
 
 _METRICS = ("octile", "weighted", "any-angle")
@@ -63,11 +63,6 @@ class OwnMethod(Method):
         self.metric = own.metric
         self._is_prepared = not callable(getattr(own, "prepare", None))
         self._preparing = threading.RLock()  # a progress callback may plan
-
-    @property
-    def prepared(self) -> Prepared | None:
-        """None: a model keeps no structures of others; see `Method`."""
-        return None
 
     def prepare(self, progress: Progress = no_progress) -> object:
         """Prepare the user's method, once, if it has that ability; see `Method`."""
@@ -85,7 +80,8 @@ class OwnMethod(Method):
         PresetError
             When the answer is no `Found`, or its path does not lead from start to goal.
         """
-        self.prepare()
+        if not self._is_prepared:
+            self.prepare()
         began = time.perf_counter()
         found = self._own.find(query)
         if not isinstance(found, Found):

@@ -36,17 +36,17 @@ class MaxDistance(Method):
 
     Parameters
     ----------
-    site
+    known
         The map with its places, and its costs.
     settings
         Whether unexplored cells may be entered, the corridor, and the refiner.
     """
 
-    def __init__(self, site: KnownMap, settings: PaperSettings) -> None:
-        assert site.topology is not None  # noqa: S101 - no method of places is made without
-        self.metric: Metric = "octile" if site.costs is None else "weighted"
-        self._topology, self._settings = site.topology, settings
-        self._whole_map = WholeMap(site, settings)
+    def __init__(self, known: KnownMap, settings: PaperSettings) -> None:
+        assert known.topology is not None  # noqa: S101 - no method of places is made without
+        self.metric: Metric = "octile" if known.costs is None else "weighted"
+        self._topology, self._settings = known.topology, settings
+        self._whole_map = WholeMap(known, settings)
         self._refiner, self._own = self._whole_map.refiners
         self._search: MaxDistanceSearch | None = None
         self._building = threading.RLock()  # a progress callback may plan

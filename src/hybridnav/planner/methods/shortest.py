@@ -50,7 +50,7 @@ class OverMesh(Method):
 
     Parameters
     ----------
-    site
+    known
         The map, without corner cutting, and the search of its mesh, if it is built already.
     settings
         Whether unexplored cells may be entered, the accepted distance from the optimum, and the
@@ -64,8 +64,8 @@ class OverMesh(Method):
 
     metric: Metric = "any-angle"
 
-    def __init__(self, site: KnownMap, settings: ShortestSettings) -> None:
-        grid, search = site.grid, site.prepared
+    def __init__(self, known: KnownMap, settings: ShortestSettings) -> None:
+        grid, search = known.grid, known.prepared
         if grid.corner_cutting:
             raise InvalidValueError(
                 "shortest any-angle paths do not pass between two blocked cells that meet at a "
@@ -73,7 +73,7 @@ class OverMesh(Method):
                 "preset grid-astar"
             )
         self._grid, self._frame = grid, grid.frame
-        self._refiner = site.refiner(settings)
+        self._refiner = known.refiner(settings)
         self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
