@@ -11,9 +11,9 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.extension import extension
-from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, answer, complain, progress_bar, stage, timings
-from hybridnav.cli.options import MapOrBuildingArgument
+from hybridnav.cli.options import MapOrBuildingArgument, OutOption, PresetOption, RoomsOption
 from hybridnav.cli.reading import (
     MapOptions,
     check_model,
@@ -26,21 +26,6 @@ from hybridnav.cli.reading import (
 )
 from hybridnav.errors import ModelError
 
-OutOption = Annotated[
-    Path, typer.Option("-o", "--out", metavar="MODEL", help=f"The file, ending in {MODEL_SUFFIX}.")
-]
-PresetsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--preset",
-        metavar="NAME|FILE",
-        help="What to prepare; may be given several times, the first is the model's own.",
-        show_default="shortest",
-    ),
-]
-RoomsOption = Annotated[
-    Path | None, typer.Option("--rooms", metavar="FILE", help="Rooms as YAML, kept in the model.")
-]
 FindRoomsOption = Annotated[
     bool, typer.Option("--find-rooms", help="Find rooms, and keep them in the model.")
 ]
@@ -56,17 +41,18 @@ CompressOption = Annotated[
 )
 def build(
     map_file: MapOrBuildingArgument,
-    out: OutOption,
-    preset: PresetsOption = None,
+    out: OutOption[Path],
+    preset: PresetOption[list[str] | None] = None,
     rooms_file: RoomsOption = None,
     find_rooms: FindRoomsOption = False,
     compress: CompressOption = False,
     *,
     reading: MapOptions,
 ) -> None:
-    """Prepare MAP for planning, and write it to a model, which other commands take as MAP.
+    """Prepare MAP for planning, and write it to a model (.hnm), which other commands take as MAP.
 
-    MAP may be a building; `hybridnav plan` takes its model.
+    --preset says what to prepare; it may be given several times, the first is the model's own.
+    Rooms of --rooms are kept in the model. MAP may be a building; `hybridnav plan` takes its model.
     """
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")

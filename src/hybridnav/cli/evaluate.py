@@ -10,8 +10,8 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, answer, complain, progress_bar
-from hybridnav.cli.options import GraphFloorOption, MaxCellsOption, parsed_costs
 from hybridnav.cli.reading import read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     from hybridnav.harness.run import RunSettings
     from hybridnav.harness.yardstick import Yardstick
 
-MapsArgument = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="MAP...", help="ROS maps (.yaml), MovingAI maps (.map) or models (.hnm)."
-    ),
-]
-PresetsOption = Annotated[
-    list[str] | None,
-    typer.Option("--preset", metavar="NAME|FILE", help="A preset; may be given several times."),
-]
 BaselinesOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -73,7 +63,6 @@ LatticeOption = Annotated[
 ScenariosOption = Annotated[
     Path | None, typer.Option("--scen", metavar="FILE", help="The pairs of a scenario file.")
 ]
-SeedOption = Annotated[int, typer.Option("--seed", metavar="S", help="Seed of the sampler.")]
 RepeatOption = Annotated[
     int,
     typer.Option(
@@ -91,21 +80,6 @@ SchedulerOption = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler instead."),
 ]
-OutOption = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where records go.")]
-RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--robot-radius",
-        metavar="R",
-        help="In metres; else 0.25, 0 for MovingAI maps, and a model's own.",
-    ),
-]
-DistanceOption = Annotated[
-    float | None,
-    typer.Option(
-        "--merge-distance", metavar="U", help="U_d in metres; else the preset's, 40 for MovingAI."
-    ),
-]
 CornersOption = Annotated[
     bool, typer.Option("--corner-cutting", help="Let diagonals cut corners: breaks consistency.")
 ]
@@ -118,6 +92,7 @@ LimitOption = Annotated[
         "--limit", metavar="S", help="Seconds for a method on a map; pairs left are not asked."
     ),
 ]
+RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")]
 MetricOption = Annotated[
     str,
     typer.Option(
@@ -128,51 +103,44 @@ MetricOption = Annotated[
         "weighted, both).",
     ),
 ]
-EvaluateCostsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--costs",
-        metavar="WHAT",
-        help="Plan and judge by costs, written as for `hybridnav plan`; may be repeated.",
-    ),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override one key of every preset."),
-]
 
 
 def evaluate(
-    map_files: MapsArgument,
-    out: OutOption,
-    preset: PresetsOption = None,
+    map_files: options.MapArgument[list[Path]],
+    out: options.OutOption[Path],
+    preset: options.PresetOption[list[str] | None] = None,
     baseline: BaselinesOption = None,
     methods: MethodsOption = None,
     graph: GraphsOption = None,
-    floor: GraphFloorOption = None,
+    floor: options.GraphFloorOption = None,
     clear_edges: ClearEdgesOption = False,
     pairs: PairsOption = None,
     all_pairs: LatticeOption = None,
     scen: ScenariosOption = None,
-    seed: SeedOption = 0,
+    seed: options.SeedOption[int] = 0,
     repeat: RepeatOption = 0,
     workers: WorkersOption = 1,
     scheduler: SchedulerOption = None,
-    overrides: SetOption = None,
-    robot_radius_m: RadiusOption = None,
-    merge_distance_m: DistanceOption = None,
+    overrides: options.SetOption = None,
+    robot_radius_m: options.RadiusOption = None,
+    merge_distance_m: options.MergeDistanceOption[float | None] = None,
     corner_cutting: CornersOption = False,
-    costs: EvaluateCostsOption = None,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    costs: options.CostsOption = None,
+    max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     timeout_s: TimeoutOption = 600.0,
     limit_s: LimitOption = None,
     metric: MetricOption = "both",
 ) -> None:
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
 
-    Records go to DIR/records.jsonl; a run that was stopped goes on where it was. Exits with 1 when
-    a counter-example was found, a method could not be made, or nothing was checked. Queries in
-    which a method raised are counted on stderr, and do not change that.
+    Records go to records.jsonl in the folder --out; a run that was stopped goes on where it was.
+    --preset may be given several times, shortest where no method is named; --set holds for all of
+    them. --seed is that of sampled pairs. --costs is what methods plan and are judged by. Robot
+    radii of presets do not count. On MovingAI maps the radius is 0 unless stated, and the size of
+    places 40 m.
+
+    Exits with 1 when a counter-example was found, a method could not be made, or nothing was
+    checked. Queries in which a method raised are counted on stderr, and do not change that.
     """
     if all_pairs is not None and (scen is not None or pairs is not None):
         raise UsageError(
@@ -183,7 +151,7 @@ def evaluate(
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
     yardstick = _yardstick(metric)
-    if not parsed_costs(costs) and yardstick == "weighted":
+    if not options.parsed_costs(costs) and yardstick == "weighted":
         raise UsageError("--metric weighted goes with --costs: state them, or take another metric")
     if yardstick == "any-angle" and corner_cutting:
         raise UsageError(
@@ -285,8 +253,8 @@ def _run(settings: RunSettings, out: Path) -> None:
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="DIR", help="A run.")],
-    second: Annotated[Path, typer.Argument(metavar="DIR", help="Another run.")],
+    first: RunArgument,
+    second: RunArgument,
     metric: MetricOption = "both",
 ) -> None:
     """Set two runs side by side, pair by pair, with the significance of the difference."""

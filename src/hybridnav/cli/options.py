@@ -1,4 +1,7 @@
-"""Arguments and options that several commands take, with what `--costs` and `--blocked` mean."""
+"""Arguments and options that several commands take, with what `--costs` and `--blocked` mean.
+
+One declaration each: what a command makes of it stands in the command's own text.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -18,8 +21,11 @@ if TYPE_CHECKING:
     import hybridnav as hn
     from hybridnav.maps.costs.files import CostSpec
 
+T = TypeVar("T")
+"""What a command takes: one value or several, with a default or without."""
+
 MapArgument = Annotated[
-    Path,
+    T,
     typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm)."),
 ]
 MapOrBuildingArgument = Annotated[
@@ -31,7 +37,7 @@ MapOrBuildingArgument = Annotated[
     ),
 ]
 PresetOption = Annotated[
-    str | None,
+    T,
     typer.Option(
         "--preset",
         metavar="NAME|FILE",
@@ -48,17 +54,34 @@ SetOption = Annotated[
 RadiusOption = Annotated[
     float | None,
     typer.Option(
-        "--robot-radius", metavar="R", help="Robot radius in metres; else the model's or preset's."
+        "--robot-radius",
+        metavar="R",
+        help="Robot radius in metres; else the model's, or 0.25 where no preset states another.",
     ),
 ]
 SeedOption = Annotated[
-    int | None,
+    T,
     typer.Option(
-        "--seed", metavar="N", help="Seed of the pyramid; else the model's or the preset's."
+        "--seed",
+        metavar="N",
+        help="Seed of what is random: pyramid, sampled pairs or noise; else the model's, the "
+        "preset's or 0.",
     ),
+]
+OutOption = Annotated[
+    T, typer.Option("-o", "--out", metavar="PATH", help="Where to write the result.")
 ]
 PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")
+]
+AnimationOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--plot", metavar="FILE", help="Write an animation of places, rooms and doors: .gif."
+    ),
+]
+FramesOption = Annotated[
+    int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 SmoothOption = Annotated[
@@ -87,7 +110,35 @@ OccupiedOption = Annotated[
 ]
 GraphFloorOption = Annotated[
     str | None,
-    typer.Option("--floor", metavar="NAME", help="The floor to read of a graph with several."),
+    typer.Option(
+        "--floor",
+        metavar="NAME",
+        help="Name of the floor in the graph's file: to read one of several, or to write it.",
+    ),
+]
+NoStairsOption = Annotated[
+    bool, typer.Option("--no-stairs", help="For a building: the robot takes no stairs.")
+]
+FrameOption = Annotated[
+    T, typer.Option("--frame", metavar="NAME", help="Name of the map's frame in the file.")
+]
+ResolutionOption = Annotated[
+    T,
+    typer.Option(
+        "--resolution",
+        metavar="R",
+        help="Side of a cell in metres, of the map of a log.",
+        show_default="0.05",
+    ),
+]
+MergeDistanceOption = Annotated[
+    T, typer.Option("--merge-distance", metavar="U", help="Size of places, U_d, in metres.")
+]
+RegionsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--regions", metavar="N", min=1, help="Also regions above places, of at most N cells."
+    ),
 ]
 LeastIslandOption = Annotated[
     float,
@@ -100,22 +151,14 @@ LeastIslandOption = Annotated[
 ]
 MaxCellsOption = Annotated[
     int,
-    typer.Option(
-        "--max-cells", metavar="N", min=1, help="The most cells that a map may have to be read."
-    ),
+    typer.Option("--max-cells", metavar="N", min=1, help="The most cells that a map may have."),
 ]
 RoomsOption = Annotated[
     Path | None,
     typer.Option(
         "--rooms",
         metavar="FILE",
-        help="Rooms as YAML; without it they are found, or are those of a model.",
-    ),
-]
-BesideRoomsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--rooms", metavar="FILE", help="Rooms as YAML; else rooms.yaml beside the map, if there."
+        help="Rooms as YAML, in place of a model's or of those that are found.",
     ),
 ]
 

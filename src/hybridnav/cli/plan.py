@@ -9,20 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hybridnav._base.extension import extension
+from hybridnav.cli import options
 from hybridnav.cli.build import KeepInOption, KeepOption, Source
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_output, check_picture
-from hybridnav.cli.options import (
-    PRESET,
-    BesideRoomsOption,
-    BlockedOption,
-    CostsOption,
-    JsonOption,
-    MapOrBuildingArgument,
-    PlotOption,
-    SmoothOption,
-    parsed_closing,
-    parsed_costs,
-)
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import (
     AlternativesOption,
@@ -130,9 +119,6 @@ BagOption = Annotated[
         help="Write path and map as a new bag of ROS: NAME.bag of ROS 1, else a folder of ROS 2.",
     ),
 ]
-NoStairsOption = Annotated[
-    bool, typer.Option("--no-stairs", help="In a building: the robot takes no stairs.")
-]
 CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
@@ -145,51 +131,53 @@ CompareOption = Annotated[
     alone=("no_stairs",),
 )
 def plan(
-    map_file: MapOrBuildingArgument,
+    map_file: options.MapOrBuildingArgument,
     start: StartOption = None,
     goal: GoalOption = None,
     origin: FromOption = None,
     to: ToOption = None,
     via: ViaOption = None,
     at: AtOption = "anywhere",
-    rooms_file: BesideRoomsOption = None,
+    rooms_file: options.RoomsOption = None,
     alternatives: AlternativesOption = 1,
     by: ByOption = None,
     max_overlap: OverlapOption = None,
     max_stretch: StretchOption = None,
     inside_rooms: InsideOption = False,
     least_hole_m2: LeastHoleOption = None,
-    blocked: BlockedOption = None,
-    no_stairs: NoStairsOption = False,
-    costs: CostsOption = None,
-    smooth: SmoothOption = None,
+    blocked: options.BlockedOption = None,
+    no_stairs: options.NoStairsOption = False,
+    costs: options.CostsOption = None,
+    smooth: options.SmoothOption = None,
     keep: KeepOption = False,
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
-    plot: PlotOption = None,
+    plot: options.PlotOption = None,
     poses: PosesOption = None,
     bag: BagOption = None,
     language: LanguageOption = "en",
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
     *,
     reading: MapOptions,
 ) -> None:
     """Plan a route on MAP, or over the floors of a building, from a point or room to another.
+
+    Without --rooms, rooms are those of rooms.yaml beside the map, if there.
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     del no_stairs  # of a building
     _check_files(plot, poses, bag)
     where = checked_at(at)
-    given = parsed_costs(costs)
+    given = options.parsed_costs(costs)
     check_language(language)
     settings = reading.settings(
         map_file,
-        preset=PRESET if given else None,
+        preset=options.PRESET if given else None,
         overrides=given.overrides,
         smooth=smooth,
     )
-    closing = parsed_closing(blocked)
+    closing = options.parsed_closing(blocked)
     first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")

@@ -40,10 +40,10 @@ _SMOOTH = ("none", "line-of-sight", "arcs")
 class MapOptions:
     """How a command reads its map, and the preset that it takes for it: one group of options."""
 
-    preset: PresetOption = None
+    preset: PresetOption[str | None] = None
     overrides: SetOption = None
     robot_radius_m: RadiusOption = None
-    seed: SeedOption = None
+    seed: SeedOption[int | None] = None
     free_threshold: FreeOption = None
     occupied_threshold: OccupiedOption = None
     least_island_m2: LeastIslandOption = 0.0

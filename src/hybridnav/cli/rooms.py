@@ -22,7 +22,7 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.options import JsonOption, MapArgument, PlotOption, RoomsOption
+from hybridnav.cli.options import JsonOption, MapArgument, OutOption, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import Segmentation, read_point
@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.topology.rooms.files.text import RoomMeasures
 
-OutOption = Annotated[
-    Path | None,
-    typer.Option("--out", "-o", metavar="FILE", help="Write the rooms as YAML, to be edited."),
-]
 MethodOption = Annotated[
     str | None,
     typer.Option(
@@ -82,8 +78,8 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existin
 
 @with_map(before="at")
 def rooms(
-    map_file: MapArgument,
-    out: OutOption = None,
+    map_file: MapArgument[Path],
+    out: OutOption[Path | None] = None,
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
@@ -96,7 +92,10 @@ def rooms(
     *,
     reading: MapOptions,
 ) -> None:
-    """Find the rooms of MAP, or read them from a file, and list them with their doors."""
+    """Find the rooms of MAP, or read them from a file, and list them with their doors.
+
+    --out writes them as YAML, to be edited.
+    """
     check_picture(plot)
     asked = _asked_point(at, out, plot)
     if out is not None and out.exists() and not force:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,7 +17,7 @@ from hybridnav.cli.common import (
     islands_line,
     timings,
 )
-from hybridnav.cli.options import MapArgument, PlotOption
+from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption
 from hybridnav.cli.reading import MapOptions, grow_topology, load_model, read_preset, with_map
 
 LevelOption = Annotated[
@@ -25,15 +26,6 @@ LevelOption = Annotated[
         "--level",
         metavar="N",
         help="Level to describe and draw: 0 the base, -1 the apex; else the apex, or the regions.",
-    ),
-]
-RegionsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--regions",
-        metavar="N",
-        min=1,
-        help="Go on above the places: to regions of at most N cells, then to the apex.",
     ),
 ]
 GuessOption = Annotated[
@@ -51,7 +43,7 @@ GuessOption = Annotated[
 
 @with_map()
 def show(
-    map_file: MapArgument,
+    map_file: MapArgument[Path],
     level: LevelOption = None,
     regions: RegionsOption = None,
     guess_below: GuessOption = None,

@@ -11,6 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     UsageError,
@@ -19,13 +20,6 @@ from hybridnav.cli.common import (
     check_picture,
     stage,
     timings,
-)
-from hybridnav.cli.options import (
-    GraphFloorOption,
-    JsonOption,
-    MapOrBuildingArgument,
-    PlotOption,
-    RoomsOption,
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
@@ -73,9 +67,6 @@ PairsOption = Annotated[
         max=1_000_000,
         help="For a building: pairs of points whose routes are compared.",
     ),
-]
-NoStairsOption = Annotated[
-    bool, typer.Option("--no-stairs", help="For a building: the robot takes no stairs.")
 ]
 
 
@@ -181,10 +172,6 @@ GraphArgument = Annotated[
         "node-link JSON, or a file of Open-RMF, OpenStreetMap or VDMA's LIF.",
     ),
 ]
-PageOption = Annotated[
-    Path | None,
-    typer.Option("-o", "--out", metavar="FILE", help="Write one page with a picture, .html."),
-]
 LinesOption = Annotated[
     bool,
     typer.Option(
@@ -206,26 +193,27 @@ IgnoreOption = Annotated[
     alone=("align", "match", "pairs", "no_stairs"),
 )
 def check(
-    map_file: MapOrBuildingArgument,
+    map_file: options.MapOrBuildingArgument,
     graph_file: GraphArgument,
-    out: PageOption = None,
-    floor: GraphFloorOption = None,
+    out: options.OutOption[Path | None] = None,
+    floor: options.GraphFloorOption = None,
     ignore: IgnoreOption = None,
     fail_on: FailOnOption = FAIL_ON,
     along_lines: LinesOption = False,
-    rooms_file: RoomsOption = None,
+    rooms_file: options.RoomsOption = None,
     align: AlignOption = False,
     match: MatchOption = None,
     pairs: PairsOption = 400,
-    no_stairs: NoStairsOption = False,
-    as_json: JsonOption = False,
-    plot: PlotOption = None,
+    no_stairs: options.NoStairsOption = False,
+    as_json: options.JsonOption = False,
+    plot: options.PlotOption = None,
     *,
     reading: MapOptions,
 ) -> None:
     """Find what is wrong with GRAPH on MAP: edges through walls, nodes in walls, parts that are not
     connected, doors that no edge passes, damaged entries. On a building, find that on all floors
-    and links, and compare routes over all floors with the shortest ones.
+    and links, and compare routes over all floors with the shortest ones. --out writes one page with
+    a picture, .html.
 
     Exits with 0 when no error or warning is found, with 1 otherwise (--fail-on), with 2 when it is
     called wrongly, and with 3 when a file cannot be read.

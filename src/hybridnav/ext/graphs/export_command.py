@@ -12,6 +12,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import (
     UsageError,
     answer,
@@ -21,14 +22,12 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.options import JsonOption, MapOrBuildingArgument, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     AnchorOption,
     Fleet,
-    FloorOption,
     NoDoorsOption,
     VehiclesOption,
 )
@@ -53,16 +52,6 @@ _NEAR_M, _FAR_M = 1.0, 2.0
 long edges."""
 _MOST_PAIRS = 1_000_000
 
-OutOption = Annotated[
-    Path,
-    typer.Option(
-        "-o",
-        "--out",
-        metavar="FILE",
-        help="The file: .geojson; for rmf .yaml, for osm .osm, for lif .json; of rooms and places "
-        "also .csv.",
-    ),
-]
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
 ]
@@ -105,9 +94,6 @@ PolylinesOption = Annotated[
         help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
     ),
 ]
-FrameOption = Annotated[
-    str, typer.Option("--frame", metavar="NAME", help="Name of the map frame in the file.")
-]
 ReportOption = Annotated[
     int | None,
     typer.Option(
@@ -126,28 +112,31 @@ ReportOption = Annotated[
     reads=("preset", "robot_radius_m", "seed", "max_cells"),
 )
 def export(
-    map_file: MapOrBuildingArgument,
-    out: OutOption,
+    map_file: options.MapOrBuildingArgument,
+    out: options.OutOption[Path],
     kind: FormatOption = "nav2",
     nodes: NodesOption = None,
     spacing_m: SpacingOption = None,
     stretch: StretchOption = _STRETCH,
     lanes_m: LanesOption = None,
     polylines: PolylinesOption = False,
-    frame: FrameOption = "map",
-    floor: FloorOption = None,
+    frame: options.FrameOption[str] = "map",
+    floor: options.GraphFloorOption = None,
     anchor: AnchorOption = None,
     vehicles: VehiclesOption = None,
     no_doors: NoDoorsOption = False,
     report: ReportOption = None,
-    rooms_file: RoomsOption = None,
-    as_json: JsonOption = False,
-    plot: PlotOption = None,
+    rooms_file: options.RoomsOption = None,
+    as_json: options.JsonOption = False,
+    plot: options.PlotOption = None,
     *,
     reading: MapOptions,
 ) -> None:
     """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
     5050, or its rooms or places.
+
+    The file ends in .geojson; for rmf in .yaml, for osm in .osm, for lif in .json; that of rooms
+    and places in .geojson or .csv. In rmf, osm and lif the floor is called 0 without --floor.
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """

@@ -22,15 +22,6 @@ ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", "
 _FEWEST, _MOST = 2, 3
 """Numbers of an anchor: latitude, longitude, and the heading if there is one."""
 
-FloorOption = Annotated[
-    str | None,
-    typer.Option(
-        "--floor",
-        metavar="NAME",
-        help="Name of the floor in rmf, osm and lif.",
-        show_default="0",
-    ),
-]
 AnchorOption = Annotated[
     str | None,
     typer.Option(

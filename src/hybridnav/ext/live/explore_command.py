@@ -11,6 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import (
     UsageError,
     answer,
@@ -20,7 +21,6 @@ from hybridnav.cli.common import (
     progress_bar,
     timings,
 )
-from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption
 from hybridnav.cli.reading import check_room_to_be, load_numba
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.names import read_point
@@ -37,10 +37,6 @@ StartOption = Annotated[
         show_default="the point farthest from walls",
     ),
 ]
-OutOption = Annotated[
-    Path | None,
-    typer.Option("-o", "--out", metavar="MAP", help="Write the robot's map, a ROS map (.yaml)."),
-]
 SensorOption = Annotated[
     str, typer.Option("--sensor", metavar="KIND", help="laser, all round, or sonar, a ring of 16.")
 ]
@@ -55,18 +51,6 @@ RangeOption = Annotated[
 ]
 NoiseOption = Annotated[
     float, typer.Option("--noise", metavar="S", help="Standard deviation of readings in metres.")
-]
-RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--robot-radius",
-        metavar="R",
-        help="Robot radius in metres; else the model's.",
-        show_default="0.25",
-    ),
-]
-SeedOption = Annotated[
-    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the noise and the pyramid.")
 ]
 ByOption = Annotated[
     str,
@@ -86,32 +70,28 @@ GoalsOption = Annotated[
         help="End after N choices: of goals, of drives back, of looks again.",
     ),
 ]
-AnimationOption = Annotated[
-    Path | None,
-    typer.Option("--plot", metavar="FILE", help="Write an animation of places and rooms: .gif."),
-]
-FramesOption = Annotated[
-    int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
-]
 
 
 def explore(
-    map_file: MapArgument,
+    map_file: options.MapArgument[Path],
     start: StartOption = None,
-    out: OutOption = None,
+    out: options.OutOption[Path | None] = None,
     sensor: SensorOption = "laser",
     range_m: RangeOption = None,
     noise_m: NoiseOption = 0.01,
-    robot_radius_m: RadiusOption = None,
-    seed: SeedOption = 0,
+    robot_radius_m: options.RadiusOption = None,
+    seed: options.SeedOption[int] = 0,
     by: ByOption = "path",
     most_goals: GoalsOption = None,
-    plot: AnimationOption = None,
-    frames: FramesOption = 60,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
-    as_json: JsonOption = False,
+    plot: options.AnimationOption = None,
+    frames: options.FramesOption = 60,
+    max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
+    as_json: options.JsonOption = False,
 ) -> None:
-    """Let a simulated robot explore MAP, and print what it drove and knows."""
+    """Let a simulated robot explore MAP, and print what it drove and knows.
+
+    --out writes the robot's map, a ROS map (.yaml).
+    """
     point = None if start is None else _point(start)
     check_output(out, "--out", (".yaml", ".yml"))
     if out is not None:

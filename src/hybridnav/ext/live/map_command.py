@@ -11,8 +11,8 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
-from hybridnav.cli.options import JsonOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -71,21 +71,6 @@ TopicOption = Annotated[
         help="Topic of a bag: of scans, or of a map, whose last message is written.",
     ),
 ]
-FrameOption = Annotated[
-    str | None,
-    typer.Option(
-        "--frame",
-        metavar="NAME",
-        help="Frame of a bag in which the robot moves.",
-        show_default="map, odom or the root",
-    ),
-]
-OutOption = Annotated[
-    Path, typer.Option("-o", "--out", metavar="MAP", help="ROS map (.yaml); beside it the image.")
-]
-ResolutionOption = Annotated[
-    float, typer.Option("--resolution", metavar="R", help="Side of a cell in metres.")
-]
 MaxRangeOption = Annotated[
     float,
     typer.Option("--max-range", metavar="R", help="Readings of R metres or more are no obstacles."),
@@ -122,18 +107,12 @@ LeastOption = Annotated[
         "alike.",
     ),
 ]
-CellsOption = Annotated[
-    int,
-    typer.Option(
-        "--max-cells", metavar="N", min=1, help="Scans that need more cells are left out."
-    ),
-]
 
 
 def map(  # noqa: A001 - the command's name
     log_file: LogArgument,
-    out: OutOption,
-    resolution_m: ResolutionOption = 0.05,
+    out: options.OutOption[Path],
+    resolution_m: options.ResolutionOption[float] = 0.05,
     max_range_m: MaxRangeOption = 30.0,
     min_range_m: MinRangeOption = 0.0,
     clear_range_m: ClearRangeOption = 0.0,
@@ -141,12 +120,16 @@ def map(  # noqa: A001 - the command's name
     when_hit: HitOption = 0.988,
     when_passed: PassOption = 0.19,
     least: LeastOption = 0.0,
-    max_cells: CellsOption = DEFAULT_MAX_CELLS,
+    max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     topic: TopicOption = None,
-    frame: FrameOption = None,
-    as_json: JsonOption = False,
+    frame: options.FrameOption[str | None] = None,
+    as_json: options.JsonOption = False,
 ) -> None:
-    """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map."""
+    """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map.
+
+    It is a ROS map (.yaml), beside it the image. Scans that need more cells than --max-cells are
+    left out. The robot of a bag moves in --frame, else in map, odom or the root.
+    """
     if out.suffix.lower() not in {".yaml", ".yml"}:
         raise UsageError(f"--out must end in .yaml or .yml, got '{printable(out)}'")
     for file in (out, out.with_suffix(".pgm")):

@@ -11,6 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     EXIT_SOLVED,
@@ -19,7 +20,6 @@ from hybridnav.cli.common import (
     check_output,
     progress_bar,
 )
-from hybridnav.cli.options import JsonOption, MaxCellsOption
 from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.ext.live.map_command import open_log
@@ -40,18 +40,6 @@ FilesArgument = Annotated[
         help="A CARMEN log (.log, or packed by gzip), a bag of ROS, or map files (.yaml) in order.",
     ),
 ]
-ResolutionOption = Annotated[
-    float | None,
-    typer.Option(
-        "--resolution", metavar="R", help="Side of a cell in metres, of a log.", show_default="0.05"
-    ),
-]
-RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--robot-radius", metavar="R", help="Robot radius in metres.", show_default="0.25"
-    ),
-]
 EveryOption = Annotated[
     int,
     typer.Option("--every", metavar="N", min=1, help="Scans of a log from one map to the next."),
@@ -66,49 +54,27 @@ RoomsEveryOption = Annotated[
         "--rooms-every", metavar="N", min=1, help="Maps from one update of the rooms to the next."
     ),
 ]
-RoomsFileOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--rooms",
-        metavar="FILE",
-        help="Rooms of the first map as YAML, whose names are followed.",
-        show_default="found",
-    ),
-]
-RegionsOption = Annotated[
-    int | None,
-    typer.Option("--regions", metavar="N", min=1, help="Follow regions of at most N cells, too."),
-]
-MergeOption = Annotated[
-    float, typer.Option("--merge-distance", metavar="D", help="Size of places, U_d, in metres.")
-]
-AnimationOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--plot", metavar="FILE", help="Write an animation of places, rooms and doors: .gif."
-    ),
-]
-FramesOption = Annotated[
-    int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
-]
 
 
 def replay(
     files: FilesArgument,
     every: EveryOption = 1,
     scans: ScansOption = None,
-    resolution_m: ResolutionOption = None,
-    robot_radius_m: RadiusOption = None,
-    merge_distance_m: MergeOption = 4.0,
+    resolution_m: options.ResolutionOption[float | None] = None,
+    robot_radius_m: options.RadiusOption = None,
+    merge_distance_m: options.MergeDistanceOption[float] = 4.0,
     rooms_every: RoomsEveryOption = 10,
-    rooms_file: RoomsFileOption = None,
-    regions: RegionsOption = None,
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
-    plot: AnimationOption = None,
-    frames: FramesOption = 60,
-    as_json: JsonOption = False,
+    rooms_file: options.RoomsOption = None,
+    regions: options.RegionsOption = None,
+    max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
+    plot: options.AnimationOption = None,
+    frames: options.FramesOption = 60,
+    as_json: options.JsonOption = False,
 ) -> None:
-    """Follow a map that changes: a log scan by scan, or GRIDS one after the other."""
+    """Follow a map that changes: a log scan by scan, or GRIDS one after the other.
+
+    Rooms of --rooms are those of the first map, and their names are followed.
+    """
     check_output(plot, "--plot", (".gif",))
     is_log = _is_log(files)
     if not is_log and (scans is not None or every != 1 or resolution_m is not None):

@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Self
 import typer
 
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_output
-from hybridnav.cli.options import (
-    PRESET,
-    BesideRoomsOption,
-    CostsOption,
-    MapOrBuildingArgument,
-    parsed_costs,
-)
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
@@ -64,24 +58,25 @@ BrowserOption = Annotated[
 
 @with_map(over_floors=lambda: _view_over_floors)
 def view(
-    map_file: MapOrBuildingArgument,
+    map_file: options.MapOrBuildingArgument,
     save: SaveOption = None,
     routes: RouteOption = None,
     port: PortOption = 0,
     browser: BrowserOption = True,
-    rooms_file: BesideRoomsOption = None,
-    costs: CostsOption = None,
+    rooms_file: options.RoomsOption = None,
+    costs: options.CostsOption = None,
     *,
     reading: MapOptions,
 ) -> None:
     """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it.
 
-    MAP may be a building: the page then has its floors.
+    Without --rooms, rooms are those of rooms.yaml beside the map, if there. MAP may be a building:
+    the page then has its floors.
     """
     _check_save(save, routes)
     for text in routes or ():
         _ends(text, ("",))
-    page = MapPage.read(map_file, rooms_file, parsed_costs(costs), reading)
+    page = MapPage.read(map_file, rooms_file, options.parsed_costs(costs), reading)
     _show(page, save, routes, port, browser=browser)
 
 
@@ -151,7 +146,7 @@ class MapPage:
         import hybridnav as hn  # noqa: PLC0415
         from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415
 
-        preset = PRESET if costs else None
+        preset = options.PRESET if costs else None
         settings = reading.settings(file, preset=preset, overrides=costs.overrides)
         model = load_model(file, settings, {}, reading)
         check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
