@@ -14,16 +14,12 @@ from tests.strategies import Scene
 
 Cell = tuple[int, int]
 
-_OVERLAY = "planner.method=cheapest"
 CHOICES = [
     ("paper", ()),
     ("grid-astar", ()),
     ("octile", ()),
-    ("octile", (_OVERLAY,)),
-    ("octile", (_OVERLAY, "planner.epsilon=0.01")),
-    ("octile", (_OVERLAY, "planner.epsilon=0.1")),
 ]
-"""Presets and settings: every point of the trade-off, from no proof to the exact optimum."""
+"""Presets whose paths are paths of cells by length, and settings."""
 
 DIRECTIONS = tuple(move for move in itertools.product((-1, 0, 1), repeat=2) if move != (0, 0))
 
@@ -38,7 +34,7 @@ def planners_of(topology: hn.TopologicalMap, *overrides: str) -> list[hn.HybridP
     presets = [hn.load_preset(name, overrides=[*own, *overrides]) for name, own in choices]
     planners = [hn.HybridPlanner(topology, preset=preset) for preset in presets]
     for planner in planners:
-        planner.prepare()  # before that, an overlay is not searched
+        planner.prepare()
     return planners
 
 
@@ -47,13 +43,7 @@ def planned(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanResult:
     return planner.plan(*planner.grid.frame.points_of([start, goal]))
 
 
-ROUNDING = 1e-4
-"""Share of a length by which the overlay's integers may miss the least one."""
-
-
-def assert_proved(
-    result: hn.PlanResult, optimum: float, epsilon: float | None, rounding: float = 0.0
-) -> None:
+def assert_proved(result: hn.PlanResult, optimum: float, *, is_exact: bool) -> None:
     """A result against the length of a shortest path in metres, infinite where there is none."""
     assert result.metric == "octile"
     if math.isinf(optimum):
@@ -71,10 +61,8 @@ def assert_proved(
     # Distinct cells are a cell apart at least, and so much every preset knows.
     assert result.lower_bound > 0
     assert result.gap == pytest.approx(result.cost / result.lower_bound - 1, abs=1e-12)
-    if epsilon is not None:
-        assert result.gap <= epsilon + rounding + 1e-9
-    if epsilon == 0:
-        assert result.gap <= rounding
+    if is_exact:
+        assert result.gap == 0
         assert result.cost == pytest.approx(optimum, rel=1e-9)
 
 
@@ -82,9 +70,8 @@ def check_plan(planner: hn.HybridPlanner, start: Any, goal: Any, optimum: float)
     """Plan, and hold the answer against the optimum, the legal moves and the preset's promise."""
     grid, setting = planner.grid, planner.preset.planner
     result = planned(planner, start, goal)
-    # All presets but the paper's promise the optimum, or what epsilon leaves of it.
-    epsilon = None if setting.method == "paper" else getattr(setting, "epsilon", None) or 0
-    assert_proved(result, optimum, epsilon, ROUNDING if setting.method == "cheapest" else 0.0)
+    # All presets but the paper's promise the optimum.
+    assert_proved(result, optimum, is_exact=setting.method != "paper")
     if result.path is not None:
         enterable = grid.enterable(allow_unexplored=setting.allow_unexplored)
         cells = result.path.cells

@@ -214,8 +214,7 @@ def _ask(
 
 def _columns_of(result: hn.PlanResult, us: float) -> tuple[float, ...]:
     stats = result.stats
-    expanded = stats.expanded + stats.expanded_border_cells
-    return us, result.cost, result.lower_bound, expanded, result.metric == "any-angle"
+    return us, result.cost, result.lower_bound, stats.expanded, result.metric == "any-angle"
 
 
 def _faults(grid: hn.OccupancyGrid, pair: Pair, result: hn.PlanResult) -> list[str]:

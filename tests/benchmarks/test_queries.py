@@ -83,7 +83,7 @@ def test_a_broken_promise_is_counted_and_named(
         result = plan(planner, *endpoints)
         if planner.preset.name != "paper" or not result.solved:
             return result
-        return replace(result, lower_bound=1.01 * result.cost)
+        return replace(result, bound_source=1.01 * result.cost)
 
     monkeypatch.setattr(hn.HybridPlanner, "plan", boast)
     rows = rows_of(None, "paper")

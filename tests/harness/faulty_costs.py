@@ -134,8 +134,7 @@ class ArcsSaidCheap(WithArcs):
     def with_fault(
         self, answer: MethodResult, line: AnyAngleResult, claim: CostClaim
     ) -> MethodResult:
-        lower_m = min(claim.lower_bound_m, 0.97 * claim.cost_m)
-        dear = replace(claim, cost_m=0.97 * claim.cost_m, lower_bound_m=lower_m)
+        dear = replace(claim, cost_m=0.97 * claim.cost_m, lower_bound_m=0.0)
         return replace(answer, any_angle=line, by_costs=dear)
 
 

@@ -160,16 +160,12 @@ def test_arcs_are_judged_as_they_are_driven(folder: Any, study: Any) -> None:
     turned = [len(set(np.round(record["headings_rad"], 6).tolist())) > 1 for record in curved]
     assert len(curved) == sum(record["status"] == "solved" for record in robot.records)
     assert sum(turned) > N_PAIRS / 3
-    assert np.isfinite(robot.grid_gaps).sum() == len(curved)
-    assert np.nanmax(robot.grid_gaps) <= 0.0101
-    assert (robot.grid_gaps >= robot.losses - 1e-9)[np.isfinite(robot.grid_gaps)].all()
+    assert np.isnan(robot.grid_gaps).all()  # its bound is on paths at any angle
+    assert np.nanmax(robot.losses) <= 0.01
     assert np.isnan(best.grid_gaps).all()
-    rows: dict[str, Any] = {str(row["method"]): row for row in rows_of_study(study)}
-    assert rows["robot"]["gap to cells mean %"] == pytest.approx(100 * robot.grid_gaps.mean())
-    assert rows["robot"]["gap to cells p99 %"] <= 1.01
     frame = to_frame(load_study(folder))
     own = frame[frame["method"] == "robot"]
-    within = own["cost_grid_bound_m"] <= own["weighted_optimum_m"] * (1 + 1e-9)
+    within = own["cost_lower_bound_m"] <= own["weighted_optimum_m"] * (1 + 1e-9)
     assert within[own["cost_m"].notna()].all()
 
 

@@ -15,7 +15,6 @@ from hybridnav.ext.live import OnlinePyramid, carry_costs
 from hybridnav.harness.judges import CheapestCost
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.maps.files import load_movingai_map, load_ros_map
-from hybridnav.search.overlay import OverlayOptions, prepare_overlay
 from tests.layers import layer_of
 
 GRID = hn.OccupancyGrid(np.zeros((3, 5), np.float32), robot_radius_m=0)
@@ -24,8 +23,6 @@ TOPOLOGY = hn.TopologicalMap(PYRAMID)
 ONLINE: Any = OnlinePyramid.of(PYRAMID)
 JUDGE: Any = CheapestCost(GRID)
 JUDGES: Any = CheapestCost
-OPTIONS: Any = OverlayOptions
-PREPARE: Any = prepare_overlay
 PLANNERS: Any = hn.HybridPlanner
 BUILD: Any = hn.ext.graphs
 MAPS: Any = hn
@@ -45,11 +42,6 @@ CALLS: dict[str, Callable[[], object]] = {
     "no place 'hall'": lambda: ONLINE.receptive_field("hall"),
     "no place None": lambda: ONLINE.receptive_field(None),
     "no place 1.5": lambda: ONLINE.receptive_field(1.5),
-    "field_cells": lambda: OPTIONS(field_cells=None),
-    "region_cells": lambda: OPTIONS(region_cells="many"),
-    "top_bytes_per_cell": lambda: OPTIONS(top_bytes_per_cell="all"),
-    "options is": lambda: PREPARE(TOPOLOGY, options=300),
-    "topology is": lambda: PREPARE(GRID),
     "graph is": lambda: BUILD.judge_route_graph("graph"),
     "graph is None": lambda: BUILD.export_nav2(None, "graph.geojson"),
     "pairs is 1000": lambda: BUILD.judge_route_graph(GRAPH, pairs=10**20),

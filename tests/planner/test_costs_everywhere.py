@@ -71,7 +71,8 @@ class Scene(NamedTuple):
         assert result.solved == np.isfinite(least_m)
         if result.path is None:
             return
-        assert_legal(result.path.cells, self.grid.enterable())
+        if result.metric == "weighted":
+            assert_legal(result.path.cells, self.grid.enterable())
         along = cost_along(self.grid, self.layer, result.path.points)
         assert result.cost == pytest.approx(along, rel=1e-6)
         assert result.lower_bound <= result.cost * (1 + 1e-9)
@@ -154,7 +155,8 @@ def plan_many(scene: Scene, preset: str, _tmp: Any) -> None:
         least_m = scene.least_m(pair)
         assert (batch.status[number] == "solved") == np.isfinite(least_m)
         if np.isfinite(least_m):
-            assert batch.cost[number] >= least_m * (1 - 1e-9)
+            if preset != "robot":  # whose paths are none of cells
+                assert batch.cost[number] >= least_m * (1 - 1e-9)
             assert batch.lower_bound[number] <= least_m * (1 + 1e-9)
             if HONOUR[preset]:
                 assert batch.cost[number] == pytest.approx(least_m, rel=1e-9)
@@ -182,7 +184,7 @@ def named_rooms(scene: Scene, preset: str, _tmp: Any) -> None:
     least_m = float(costs.min()) * scene.grid.resolution_m
     assert result.solved == np.isfinite(least_m)
     if result.path is not None:
-        assert result.cost >= least_m * (1 - 1e-9)
+        assert result.lower_bound <= least_m * (1 + 1e-9)
         if HONOUR[preset]:
             assert result.cost == pytest.approx(least_m, rel=1e-9)
 
@@ -286,8 +288,8 @@ def test_the_commands_plan_and_judge_by_costs(
         least_m = distances(graph, grid.shape, pair[0])[pair[1]] * grid.resolution_m
         assert done.code == (0 if np.isfinite(least_m) else 1)
         if np.isfinite(least_m):
-            cost_m = json.loads(done.out)["cost"]
-            assert cost_m >= least_m * (1 - 1e-9)
+            cost_m, bound_m = (json.loads(done.out)[name] for name in ("cost", "lower_bound"))
+            assert bound_m <= least_m * (1 + 1e-9)
             if HONOUR[preset]:
                 assert cost_m == pytest.approx(least_m, rel=1e-9)
     run = RunSettings(maps=(str(path),), presets=(preset,), pairs=2, costs=(CLEARANCE,))

@@ -1,5 +1,5 @@
-"""The preset `robot`: arcs that a differential robot can follow, inside free space, no dearer than
-the path of cells, with a bound on all paths of cells."""
+"""The preset `robot`: arcs that a differential robot can follow, inside free space, hardly dearer
+than the line that they round, with a bound on all paths."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) 
 
 @given(class_grids(max_side=24), seeds, st.booleans(), st.sampled_from([0.1, 0.5, 2.0]))
 @settings(max_examples=examples(100), deadline=None)
-def test_arcs_stay_in_free_space_and_below_the_cost_of_the_cells(
+def test_arcs_stay_in_free_space_and_near_the_cost_of_the_line(
     classes: Any,
     seed: int,
     off_centre: bool,  # noqa: FBT001 - drawn
@@ -104,8 +104,8 @@ def test_arcs_stay_in_free_space_and_below_the_cost_of_the_cells(
     assert result.metric == "any-angle-weighted"
     assert (result.path.points[[0, -1]] == ends[[0, -1]]).all() or start == goal
     over_cells = np.concatenate([ends[:1], cells.path.points[1:-1], ends[1:]])
-    assert result.cost <= cost_along(grid, layer, over_cells) + 1e-6
-    assert result.cost <= line.cost * 1.01 + 1e-6
+    assert line.cost <= cost_along(grid, layer, over_cells) + 1e-6
+    assert result.cost <= line.cost * 1.005 + 1e-6
     assert result.cost >= result.path.length_m * (1 - 1e-9)
     poses = result.path.poses(grid.resolution_m / 200)[:, :2]
     low, high = near_costs(grid, layer, poses, radius_m)
@@ -113,7 +113,7 @@ def test_arcs_stay_in_free_space_and_below_the_cost_of_the_cells(
     least = optimum_m(grid, layer, is_open, start)[goal]
     assert result.grid_bound == line.grid_bound == pytest.approx(least, rel=1e-9, abs=1e-9)
     if not off_centre:
-        assert result.grid_gap <= 1e-9
+        assert line.grid_gap <= 1e-9
     assert result.lower_bound <= line.cost * (1 + 1e-9)
     if len(result.path.points) > 1:
         check(grid, is_open, result.path, radius_m)
@@ -153,11 +153,10 @@ def test_where_no_arc_fits_the_robot_turns_on_the_spot() -> None:
     assert len(np.unique(poses[:, 2].round(6))) == 2
 
 
-def test_robot_is_within_its_epsilon_of_the_cheapest_path_of_cells_on_the_office() -> None:
+def test_robot_is_no_dearer_than_the_cheapest_path_of_cells_on_the_office() -> None:
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     topology = topology_of(grid)
     robot = hn.HybridPlanner(topology, preset="robot")
-    robot.prepare()
     exact = hn.HybridPlanner(topology, preset="grid-astar", costs=hn.CostLayer.clearance(grid))
     rng = np.random.default_rng(3)
     free = np.argwhere(grid.enterable())
@@ -168,10 +167,9 @@ def test_robot_is_within_its_epsilon_of_the_cheapest_path_of_cells_on_the_office
         assert result.solved == least.solved
         if result.path is None:
             continue
-        assert result.grid_bound is not None
-        assert result.grid_bound <= least.cost * (1 + 1e-9)
-        assert result.cost <= 1.01 * least.cost
-        assert result.grid_gap <= 0.0101
+        assert result.lower_bound <= least.cost * (1 + 1e-9)
+        assert result.cost <= least.cost
+        assert result.gap <= 0.2
         assert result.path.max_curvature_per_m <= 1 / 0.3 + 1e-4
         spots += len(result.path.spot_turns)
         bends += int(arc_steps(result.path)[0].sum())
@@ -179,7 +177,7 @@ def test_robot_is_within_its_epsilon_of_the_cheapest_path_of_cells_on_the_office
 
 
 def test_no_share_of_the_path_of_cells_bounds_paths_between_posts() -> None:
-    """The counterexample of the page on costs: a straight line between posts in two rows."""
+    """A straight line between posts in two rows: paths over corners of cells bound it."""
     probability = np.zeros((2, 42))
     probability[1, 2::4] = probability[0, 4::4] = 1.0
     grid = grid_of(probability, hn.Frame(1.0), robot_radius_m=0)
@@ -191,6 +189,7 @@ def test_no_share_of_the_path_of_cells_bounds_paths_between_posts() -> None:
     assert (round(line.cost, 1), cells.cost, cells.lower_bound) == (41.2, 61.0, 61.0)
     smooth = planner.plan(*ends, smooth="line-of-sight")
     assert smooth.lower_bound <= line.cost <= smooth.cost < cells.cost
+    assert smooth.gap < 0.1
 
 
 def test_lengths_know_no_arcs() -> None:
@@ -210,7 +209,7 @@ def test_the_command_line_writes_poses(cli: Any, tmp_path: Path, ending: str) ->
     done = cli(*query, "--poses", str(file), "--json")
     assert done.code == 0
     figures = json.loads(done.out)
-    assert figures["cost"] <= figures["grid_bound"] * 1.01
+    assert figures["lower_bound"] <= figures["cost"] <= figures["lower_bound"] * 1.2
     if ending == "csv":
         with file.open(encoding="utf-8") as opened:
             names, *rows = list(csv.reader(opened))

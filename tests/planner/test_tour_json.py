@@ -57,7 +57,7 @@ def test_a_tour_has_the_keys_of_a_plan_for_the_whole_way(preset: str, smooth: An
     assert walked == pytest.approx(tour.length_m, abs=1e-5)
     for part in parts:
         assert all(point in told["points"] for point in part["points"])
-    for counted in ("expanded", "expanded_border_cells", "expanded_intervals"):
+    for counted in ("expanded", "expanded_intervals"):
         assert told[counted] == sum(part[counted] for part in parts)
     assert told["settings"] == parts[0]["settings"]
     assert told["legs"][0]["room"] == "west"

@@ -153,7 +153,7 @@ def behaviour() -> dict[str, str]:
                 "| the places of the `TopologicalMap` |": "chosen on places",
                 "| the corner cells at which shortest paths of cells turn |": "read off the path",
                 "| a convex mesh of free space": "read off the path",
-                "| costs between the border cells": "read off the path",
+                "| a lattice of cheap lines over the cells": "read off the path",
                 "| the cells of the whole grid |": "read off the path",
             },
         ),

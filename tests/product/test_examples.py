@@ -43,8 +43,6 @@ RETURNED = {
     "harness.judges.RoomAgreement",
     "harness.judges.Summary",
     "harness.judges.Verdict",
-    "search.overlay.Overlay",
-    "search.overlay.OverlayPath",
     "pyramid.DualGraph",
     "pyramid.FaceKind",
     "refine.Refiner",

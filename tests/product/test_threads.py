@@ -76,9 +76,6 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
     grid = grid_with_rooms(seed=1)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0))
     planner = hn.HybridPlanner(topology, preset=preset)
-    by_overlay = planner.preset.planner.method == "cheapest"
-    if by_overlay:  # before that, A* may choose another one of equally good paths
-        planner.prepare()
     pairs = free_pairs(grid, 24, seed=2)
     closed = [
         hn.Blocked(cells=np.unique(part, axis=0)) for part in free_pairs(grid, 40, 3).swapaxes(0, 1)
@@ -96,10 +93,9 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
     ]
     alone = [each() for each in jobs]
     assert sum(answer[0] is hn.PlanStatus.SOLVED for answer in alone) > len(jobs) / 2
-    fresh = hn.HybridPlanner(topology, preset=preset)
-    if by_overlay:
-        fresh.prepare()
-    planner = fresh  # its caches are filled by whichever thread comes first
+    planner = hn.HybridPlanner(
+        topology, preset=preset
+    )  # its caches are filled by whichever thread comes first
     for answers in by_threads(jobs, repeats=4):
         assert answers == alone
 

@@ -10,15 +10,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from hybridnav._base.kernels.exact import is_legal
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.maps.costs.integral import segment_cost
+from hybridnav.maps.costs.integral import legal_cost, segment_cost
 from hybridnav.maps.files import load_map
 from hybridnav.refine.grid import LineOfSight
 from hybridnav.refine.kernels.arcs import round_bends
-from hybridnav.refine.kernels.cost_line import legal_cost
-from hybridnav.refine.kernels.segments import is_legal
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points
 from tests.strategies import MAX_SIDE, class_grids, drawn, examples, framed, occupancy_grid

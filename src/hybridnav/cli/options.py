@@ -41,7 +41,7 @@ PresetOption = Annotated[
     typer.Option(
         "--preset",
         metavar="NAME|FILE",
-        help="A preset's name or its YAML file; else the model's.",
+        help="A preset's name or its YAML file.",
         show_default="shortest",
     ),
 ]
@@ -56,7 +56,7 @@ RadiusOption = Annotated[
     typer.Option(
         "--robot-radius",
         metavar="R",
-        help="Robot radius in metres; else the model's, or 0.25 where no preset states another.",
+        help="Robot radius in metres.",
     ),
 ]
 SeedOption = Annotated[

@@ -115,11 +115,13 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         for key in ("places", "arcs"):
             ids = figures[key]
             lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
-    expanded = [
-        f"{n:,} {what.replace('_', ' ')}"
-        for what in ("cells", "places", "border_cells", "intervals")
-        if (n := figures["expanded" if what == "cells" else f"expanded_{what}"])
-    ]
+    by_lattice = figures["settings"].get("planner", {}).get("method") == "cheapest"
+    counts = {
+        "nodes" if by_lattice else "cells": figures["expanded"],
+        "places": figures["expanded_places"],
+        "intervals": figures["expanded_intervals"],
+    }
+    expanded = [f"{n:,} {what}" for what, n in counts.items() if n]
     if expanded:
         lines.append(f"expanded   {', '.join(expanded)}")
     return lines + _whole_grid_lines(figures)

@@ -159,8 +159,6 @@ def start(*jobs: str) -> subprocess.Popen[bytes] | None:
 _PLANS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
 _ENDPOINTS = ((2, 2), (60, 60))
-_LARGE = 160
-"""Rows of a map on which the overlay has all that those of buildings have."""
 _CHANGED = (1.0, 1.0, 2.0, 2.0)
 
 
@@ -206,14 +204,13 @@ def compile_plan(preset: str) -> None:
     alone."""
     import numpy as np  # noqa: PLC0415
 
-    grid = small_grid(_LARGE if preset == "robot" else 64)
+    grid = small_grid()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     if preset in _PLANS:
         endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
         planner = hn.HybridPlanner(topology, preset=preset)
         planner.plan(*endpoints).to_dict()
-        if preset == "robot":  # whose first plans need no overlay
-            planner.prepare()
+        if preset == "robot":
             path = planner.plan(*endpoints, smooth="line-of-sight").path
             assert path is not None  # noqa: S101 - the rooms have doors
             planner.plan(*endpoints, blocked={"cells": path.cells[len(path.cells) // 2][None]})

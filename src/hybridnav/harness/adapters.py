@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,7 +59,8 @@ class HybridMethod:
         by_costs = self._planner.costs is not None
         claim = None
         if by_costs and result.solved:
-            claim = CostClaim(result.cost, result.lower_bound, result.grid_bound)
+            bound = partial(getattr, result, "lower_bound")
+            claim = CostClaim(result.cost, bound, result.grid_bound)
         is_factor = result.solved and line is None and not by_costs
         return MethodResult(
             None if path is None or line is not None else path.cells,
@@ -141,7 +142,6 @@ def _counts(stats: PlanStats) -> dict[str, Any]:
     return {
         "expanded": stats.expanded,
         "expanded_nodes": stats.expanded_places,
-        "expanded_border_cells": stats.expanded_border_cells,
         "expanded_intervals": stats.expanded_intervals,
     }
 

@@ -216,10 +216,9 @@ def to_frame(study: Study) -> pd.DataFrame:
         `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
         uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
         `reference_seconds` of A* on the whole grid; `expanded` cells,
-        border cells, intervals and nodes together. In a run with costs
-        also `costs`, their text; `cost_m`, `weighted_optimum_m`, `cost_lower_bound_m` and, for
-        any-angle paths with a bound on paths of cells, `cost_grid_bound_m`; `weighted_loss`, `gap`
-        and `grid_gap`, as shares.
+        intervals and nodes together. In a run with costs also `costs`, their text; `cost_m`,
+        `weighted_optimum_m`, `cost_lower_bound_m` and, for any-angle paths with a bound on paths of
+        cells, `cost_grid_bound_m`; `weighted_loss`, `gap` and `grid_gap`, as shares.
 
     Raises
     ------

@@ -86,7 +86,7 @@ _SOLVED = {
 }
 EFFICIENCY_COLUMNS = {
     "expansions": "mean over the pairs that all methods solved of the things taken from the queue "
-    "of a search: cells, border cells, intervals of the mesh, nodes; maps.csv has each kind by "
+    "of a search: cells, intervals of the mesh, nodes; maps.csv has each kind by "
     "itself. They differ in price: see the next two columns",
     "an expansion in cells": "price of one such thing, with its look-ups in tables, tests of sight "
     "and unpacking: time of all queries over all expansions, divided by the same ratio of the "

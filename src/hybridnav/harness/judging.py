@@ -296,7 +296,8 @@ class CostJudge:
         faults = []
         of_cells: Record = {}
         if claim is not None:
-            bound_m = claim.lower_bound_m
+            stated = claim.lower_bound_m
+            bound_m = stated() if callable(stated) else stated
             if not abs(claim.cost_m - cost_m) <= slack_m:
                 faults.append(f"the cost is {cost_m:.6f} m, not {claim.cost_m:.6f} m as reported")
             if not bound_m <= cost_m + slack_m:

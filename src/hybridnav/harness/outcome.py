@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 EXPANSIONS = {
     "expanded": "cells expanded",
     "expanded_nodes": "nodes expanded",
-    "expanded_border_cells": "border cells expanded",
     "expanded_intervals": "intervals expanded",
 }
 """Fields of records that count things taken from the queue of a search, and their columns."""

@@ -319,7 +319,6 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         **({} if answer.any_angle is None else _of_line(answer.any_angle)),
         "expanded": int(answer.expanded),
         "expanded_nodes": int(answer.expanded_nodes),
-        "expanded_border_cells": int(answer.expanded_border_cells),
         "expanded_intervals": int(answer.expanded_intervals),
         "seconds": seconds,
         "stages": {stage: float(value) for stage, value in answer.seconds.items()},

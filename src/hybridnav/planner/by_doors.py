@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
@@ -23,11 +24,17 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanResult
     from hybridnav.planner.guide.legs import Leg
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
     from hybridnav.route import DoorGraph, DoorRoute
     from hybridnav.topology.rooms import Door
+
+
+def _least_bound(whole: PlanResult, cost_m: float) -> float:
+    """Return the bound of a plan for a dearer path between the same endpoints."""
+    return min(whole.lower_bound, cost_m)
 
 
 # How much of a path another one shares.
@@ -281,7 +288,7 @@ class DoorTours:
         result = self._planner.plan(whole.start, whole.goal, blocked=ClosedCells(shut))
         if not result.solved:
             return None
-        result = replace(result, lower_bound=min(whole.lower_bound, result.cost))
+        result = replace(result, bound_source=partial(_least_bound, whole, result.cost))
         return tour_of(self._planner, [result], self._waypoints)
 
     def _candidates(self, limits: RouteLimits) -> Iterator[DoorRoute]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.planner import PlannerSettings, Preset
+    from hybridnav.search.found import Query
 
 
 @copies_alike
@@ -186,10 +187,31 @@ class CostFinish:
         self, cells: LongArray, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None
     ) -> tuple[Path, float]:
         """Return the same path with rounded bends, and its cost in metres."""
-        line, radius_m = self._line_for(closed), self._turning_radius_m
-        found = line.arcs(cells, poses[0][:2], poses[1][:2], radius_m=radius_m)
+        line = self._line_for(closed)
+        points = line.shorten(cells, poses[0][:2], poses[1][:2])
+        return self.arcs_along(cells, points, closed)
+
+    def arcs_along(
+        self, cells: LongArray, points: FloatArray, closed: ClosedCells | None
+    ) -> tuple[Path, float]:
+        """Return an any-angle path, which passes some cells, with rounded bends, and its cost in
+        metres."""
+        found = self._line_for(closed).arcs(points, radius_m=self._turning_radius_m)
         path = Path(cells, found.points, found.length_m, found.headings_rad, is_curved=True)
         return path, max(found.cost_m, found.length_m)
+
+    def bound(self, query: Query, cost_m: float) -> float:
+        """Return a lower bound on the cost of all any-angle paths of a query, in metres, at most
+        the cost of a path that is known."""
+        # Loads modules that plans whose bound nobody reads do not need.
+        from hybridnav.search.lattice import cost_bound  # noqa: PLC0415
+
+        line, frame = self._line_for(query.closed), self._grid.frame
+        first, last = (frame.position_of(*point.tolist()) for point in query.points)
+        per_cell = frame.resolution_m
+        known = cost_m / per_cell
+        found = cost_bound(line.free, line.factors, (first, last), query.cells, known) * per_cell
+        return min(max(found, query.straight_m), cost_m)
 
     def _line_for(self, closed: ClosedCells | None) -> CostLine:
         """Return the shortener of paths; with closed cells, one for this query."""

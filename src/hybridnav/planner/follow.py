@@ -99,7 +99,7 @@ def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     if places is None and settings.needs_places:
         raise InvalidValueError(
             f"preset {now.preset.name} plans on the places of its map, and only a grid is given: "
-            "call update with topology too, or take preset shortest, octile or grid-astar"
+            "call update with topology too, or take another preset than paper"
         )
     if places is not None:
         if grid is not None and not np.array_equal(grid.classes, places.grid.classes):

@@ -141,7 +141,7 @@ class HybridPlanner:
     @property
     def prepared(self) -> Prepared | None:
         """The structure built for queries: a mesh or a jump-point graph; None before that, and
-        with presets that build none or, as the overlay does, one that changes with the costs."""
+        with presets that build none or, as the lattice is, one that changes with the costs."""
         return self._now.method.prepared
 
     @property
@@ -268,7 +268,7 @@ class HybridPlanner:
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
-        or overlay.
+        or lattice.
 
         Structures that exist already are kept; what `update` has made stale is renewed. Threads may
         call this, and plan meanwhile: each structure is built once.

@@ -23,7 +23,7 @@ from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, Query
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -202,7 +202,7 @@ class Planning:
         made = partial(self.result, request, query, found)
         if not found.has_path or self.ompl is not None or request.smooth != "none":
             return PlanDraft.of(made())
-        bound = min(found.lower_bound_m, found.cost_m)
+        bound = self._bound(query, found, found.cost_m)
         return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
 
     def result(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
@@ -211,11 +211,13 @@ class Planning:
         if not found.has_path:
             bound, stats = found.lower_bound_m, found.stats
             status = PlanStatus.NO_PATH
-            return self._answer(status, request, metric=metric, lower_bound=bound, stats=stats)
+            return self._answer(status, request, metric=metric, bound_source=bound, stats=stats)
         if self.ompl is not None:
             result = self._by_ompl(self.ompl, request, query, found)
         elif self._by_costs is not None:
-            result = self._cheapest(self._by_costs, request, query, found)
+            by_cells = metric == "weighted"
+            finished = self._cheapest if by_cells else self._rounded
+            result = finished(self._by_costs, request, query, found)
         elif metric == "octile" and request.smooth == "line-of-sight":
             result = self._in_sight(request, query, found)
         else:
@@ -225,7 +227,8 @@ class Planning:
             if metric != "octile" and not length_m > 0:
                 points = points[:1]
             path = Path(found.cells, points, length_m)
-            result = self._solved(request, found, path, found.lower_bound_m, metric=metric)
+            least = self._bound(query, found, length_m)
+            result = self._solved(request, found, path, least, metric=metric)
         if result.path is None or not result.solved or self.guide is None:
             return result
         source = self.guide.of(result.path, request.goal, request.poses[0].tolist())
@@ -267,9 +270,38 @@ class Planning:
         finish = costs.arcs if request.smooth == "arcs" else costs.line
         path, cost_m = finish(found.cells, request.poses, request.closed)
         found.stats.seconds["smooth"] = time.perf_counter() - began
-        bound, of_cells = query.straight_m, found.lower_bound_m
+        bound, of_cells = self._cost_bound(query, cost_m), found.lower_bound_m
         metric: Any = "any-angle-weighted"
         return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
+
+    def _rounded(
+        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a cheapest any-angle path, with arcs if the request says so."""
+        points, cost_m = found.points, found.cost_m
+        assert points is not None  # noqa: S101 - any-angle methods state them
+        if request.smooth == "arcs":
+            began = time.perf_counter()
+            path, cost_m = costs.arcs_along(found.cells, points, request.closed)
+            found.stats.seconds["arcs"] = time.perf_counter() - began
+        else:
+            length_m = polyline_length(points)
+            path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
+        bound = self._cost_bound(query, cost_m)
+        metric = self.method.metric
+        return self._solved(request, found, path, bound, metric=metric, weighted_cost=cost_m)
+
+    def _bound(self, query: Query, found: Found, cost_m: float) -> float | Callable[[], float]:
+        """Return the bound of a path, or how to find it where it takes a search of its own."""
+        if self.method.metric == "any-angle-weighted":
+            return self._cost_bound(query, cost_m)
+        return min(found.lower_bound_m, cost_m)
+
+    def _cost_bound(self, query: Query, cost_m: float) -> Callable[[], float]:
+        """Return how to find a bound on the cost of all any-angle paths, when somebody reads it."""
+        costs = self._by_costs
+        assert costs is not None  # noqa: S101 - the plan is by costs
+        return partial(costs.bound, query, cost_m)
 
     def _by_ompl(
         self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
@@ -295,7 +327,7 @@ class Planning:
             metric=refined.metric,
             path=path,
             route_source=self._route_of(path),
-            lower_bound=bound,
+            bound_source=bound,
             weighted_cost=refined.weighted_cost,
             refinement=refined.refinement,
             stats=found.stats,
@@ -304,7 +336,12 @@ class Planning:
     # Results: with their routes, and the settings that they were planned by.
 
     def _solved(
-        self, request: PlanRequest, found: Found, path: Path, bound_m: float, **outcome: Any
+        self,
+        request: PlanRequest,
+        found: Found,
+        path: Path,
+        bound: float | Callable[[], float],
+        **outcome: Any,
     ) -> PlanResult:
         """Return the result of a path, whose bound is at most its cost."""
         cost_m = outcome.get("weighted_cost", path.length_m)
@@ -313,7 +350,7 @@ class Planning:
             request,
             path=path.turned_at_ends(*request.poses),
             route_source=found.route or self._route_of(path),
-            lower_bound=min(bound_m, cost_m),
+            bound_source=bound if callable(bound) else min(bound, cost_m),
             stats=found.stats,
             **outcome,
         )

@@ -154,9 +154,9 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
 
     Examples
     --------
-    >>> preset = hn.load_preset("robot", overrides=["planner.epsilon=0.02"])
-    >>> preset.planner.epsilon
-    0.02
+    >>> preset = hn.load_preset("robot", overrides=["planner.turning_radius_m=0.5"])
+    >>> preset.planner.turning_radius_m
+    0.5
     """
     is_gone = not isinstance(source, Preset) and os.fspath(source) == "portals"
     found = "octile" if is_gone else source

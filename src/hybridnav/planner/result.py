@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
@@ -102,8 +102,8 @@ class PlanResult:
     path: Path | None = None
     route_source: RouteSource | Route | None = field(default=None, repr=False)
     """The route, or the data to find it from; nothing of the planner."""
-    lower_bound: float = math.inf
-    """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
+    bound_source: float | Callable[[], float] = field(default=math.inf, repr=False)
+    """The lower bound, or how to find it."""
     stats: PlanStats = field(default_factory=PlanStats)
     settings: dict[str, Any] = field(default_factory=dict)
     """Preset, and settings of the pyramid."""
@@ -120,6 +120,16 @@ class PlanResult:
     """Proved bound on the cost of all paths of cells, metres, of an any-angle path by costs."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
+
+    @cached_property
+    def lower_bound(self) -> float:
+        """A proved bound on the optimum in the metric, metres; infinite where there is no path.
+
+        That of an any-angle path by costs is found when it is read first, in the time of a search
+        of cells without preparation: see `search.lattice.cost_bound`.
+        """
+        source = self.bound_source
+        return source() if callable(source) else source
 
     @cached_property
     def route(self) -> Route | None:
@@ -141,9 +151,13 @@ class PlanResult:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with what is found on demand, so that copies hold no map."""
-        found = {"route", "instructions"}
+        found = {"route", "instructions", "lower_bound"}
         state = {name: value for name, value in vars(self).items() if name not in found}
-        return state | {"route_source": self.route, "instruction_source": self.instructions}
+        return state | {
+            "route_source": self.route,
+            "instruction_source": self.instructions,
+            "bound_source": self.lower_bound,
+        }
 
     @property
     def solved(self) -> bool:
@@ -210,7 +224,6 @@ class PlanResult:
             "steps": list(self.refinement.steps) if self.refinement else None,
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
-            "expanded_border_cells": self.stats.expanded_border_cells,
             "expanded_intervals": self.stats.expanded_intervals,
             "corridor_cells": self.stats.corridor_cells,
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
@@ -225,7 +238,8 @@ class PlanDraft:
     status: PlanStatus
     cost: float
     """As in `PlanResult`."""
-    lower_bound: float
+    bound_source: float | Callable[[], float]
+    """The lower bound, or how to find it."""
     stats: PlanStats
     result: Callable[[], PlanResult]
     """Makes the result."""
@@ -233,7 +247,13 @@ class PlanDraft:
     @classmethod
     def of(cls, result: PlanResult) -> Self:
         """Return the draft of a result that is made already."""
-        return cls(result.status, result.cost, result.lower_bound, result.stats, lambda: result)
+        bound = partial(getattr, result, "lower_bound")
+        return cls(result.status, result.cost, bound, result.stats, lambda: result)
+
+    @property
+    def lower_bound(self) -> float:
+        """As in `PlanResult`."""
+        return self.bound_source() if callable(self.bound_source) else self.bound_source
 
     def __reduce__(self) -> tuple[Callable[[PlanResult], PlanDraft], tuple[PlanResult]]:
         """Make the result, with which copies travel without the planner and its map."""

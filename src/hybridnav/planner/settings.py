@@ -205,11 +205,10 @@ class OctileSettings(PlannerSettings):
 
 class _ByCosts(PlannerSettings):
     smooth: Finish = "none"
-    """Whether the path is shortened to an any-angle one; `arcs`, which goes with costs, also rounds
-    its bends."""
+    """Whether a path of cells is moved to a cheaper one at any angle; `arcs`, which goes with
+    costs, also rounds the bends."""
     turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
-    """With `smooth: arcs`, the least radius of an arc in metres; where none fits, the robot turns
-    on the spot."""
+    """With `smooth: arcs`, the least radius of an arc, metres; else the robot turns on the spot."""
     costs: CostSettings | None = None
     """Factors by which metres cost more; the path is the cheapest one. null makes costs lengths."""
 
@@ -237,8 +236,8 @@ class _ByCosts(PlannerSettings):
 
 
 class CheapestSettings(_ByCosts):
-    """Method `cheapest`: the cheapest path of cells, on exact costs between the border cells of
-    fields on several levels of the pyramid.
+    """Method `cheapest`: the cheapest path at any angle, on a lattice that is laid over the cells,
+    moved to where it costs least.
 
     Examples
     --------
@@ -248,11 +247,14 @@ class CheapestSettings(_ByCosts):
     """
 
     method: Literal["cheapest"] = "cheapest"
-    epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """The search ends once no path can be better by more than this part; null or 0 for the
-    optimum."""
 
-    needs_places: ClassVar[bool] = True
+    @model_validator(mode="before")
+    @classmethod
+    def _without_epsilon(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("epsilon") is not None:
+            gone = "planner.epsilon is gone from method cheapest: result.gap says what is proved"
+            warnings.warn(gone, FutureWarning, stacklevel=2)
+        return {key: given[key] for key in given if key != "epsilon"}
 
 
 class _Refined(_ByCosts):

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 _COUNTS = (
     "expanded",
     "expanded_places",
-    "expanded_border_cells",
     "expanded_intervals",
     "corridor_cells",
 )

@@ -1,4 +1,4 @@
-"""Any-angle finish for costs: a cell path cut short wherever that is no dearer."""
+"""Any-angle finish for costs: a line that settles where it costs least, and arcs at its bends."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
 
-_TOLERANCE = 0.01
+_SPARE = 0.005
 """Most that arcs may add to the cost of a line, as a part of it."""
+_GRAIN = 2.0**24
 
 
 class ArcLine(NamedTuple):
@@ -38,14 +39,13 @@ class ArcLine(NamedTuple):
 
 @copies_alike
 class CostLine:
-    """Shortener of cell paths of one grid that never raises their cost; it holds a byte a cell.
+    """Finisher of paths by costs, on one grid: it moves a path to where it costs least.
 
-    The points of the new path are start, goal, and centres of cells of the old path. A dynamic
-    program finds the cheapest path whose bends are six cells of the old one apart, or multiples of
-    that up to 24. Then bends move along the old path where that is cheaper, and the dynamic program
-    leaves out up to three at a time, in turn. Costs are exact integrals of the factors along the
-    segments (`costs.cost_along`), and new segments are tested exactly, so a path never leaves the
-    union of the closed squares of the enterable cells.
+    The path becomes a chain of points some three cells apart that is pulled taut by its own cost:
+    all points move to their sides at a time, by Newton's method on the integral of the factors,
+    until none would move any more. So the line passes obstacles on the sides that the path takes,
+    and lines that begin near each other end in the same place. New segments are tested exactly: a
+    line never leaves the union of the closed squares of the enterable cells.
 
     Parameters
     ----------
@@ -55,6 +55,10 @@ class CostLine:
         Costs of its cells; closed ones are never entered.
     allow_unexplored
         Whether unexplored cells may be entered.
+
+    Notes
+    -----
+    S. Quinlan, O. Khatib: Elastic bands, 1993, is the idea; here the whole chain moves at a time.
 
     Examples
     --------
@@ -76,22 +80,23 @@ class CostLine:
     ) -> None:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting
-        self._factors = layer.factors
+        self.factors: AnyArray = layer.factors
+        """float32 (rows, cols), >= 1."""
         free = open_cells(grid, layer.inflated(grid).closed_flat, allow_unexplored=allow_unexplored)
-        self._free = free.view(np.uint8)
+        self.free: AnyArray = free.view(np.uint8)
+        """uint8 (rows, cols), 1 where a cell may be entered."""
 
     def closing(self, closed: LongArray) -> CostLine:
-        """Return a shortener that does not enter some other cells either.
+        """Return a finisher that does not enter some other cells either.
 
         Parameters
         ----------
         closed
             int64 (n,), flat cells.
         """
-        free = self._free.copy()
-        free.flat[closed] = 0
         other = copy(self)
-        vars(other)["_free"] = free
+        other.free = self.free.copy()
+        other.free.flat[closed] = 0
         return other
 
     def shorten(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:
@@ -107,16 +112,40 @@ class CostLine:
         Returns
         -------
         FloatArray
-            float64 (m, 2), `(x, y)` in metres: `start`, centres of cells of the path, `goal`; one
-            point if the two are the same. Never dearer than the line from `start` over the centres
-            of the inner cells to `goal`; where corners may be cut, over those of all cells.
+            float64 (m, 2), `(x, y)` in metres, from `start` to `goal`; one point if the two are the
+            same. Never dearer than the line from `start` over the centres of the inner cells to
+            `goal`; where corners may be cut, over those of all cells.
         """
-        return self._in_metres(self._short(cells, start, goal)[0], start, goal)
+        position_of = self._frame.position_of
+        ends = np.array([position_of(*start.tolist()), position_of(*goal.tolist())])
+        path = kernels.line_of_cells(_read_only(cells), ends, self._corner_cutting)
+        return self.in_metres(self.settle(path), start, goal)
 
-    def arcs(
-        self, cells: LongArray, start: FloatArray, goal: FloatArray, *, radius_m: float
-    ) -> ArcLine:
-        """Shorten a cell path, and round its bends by arcs of circles.
+    def settle(self, path: FloatArray) -> FloatArray:
+        """Move a path to where it costs least.
+
+        Parameters
+        ----------
+        path
+            float64 (n, 2), n >= 1, positions (row, col) in grid units, multiples of 2^-24, no two
+            in a row equal, joined by legal segments.
+
+        Returns
+        -------
+        FloatArray
+            float64 (m, 2), positions with the same ends; never dearer.
+        """
+        found: FloatArray = kernels.settle(self.free, self.factors, path)[0]
+        return found
+
+    def in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
+        """Return the points of positions, the first and last being exact."""
+        points = self._frame.points_of_grid(line)
+        points[-1], points[0] = goal, start
+        return points
+
+    def arcs(self, points: FloatArray, *, radius_m: float) -> ArcLine:
+        """Round the bends of a line by arcs of circles.
 
         Bends that lie too close to each other are merged. An arc has the radius or up to four times
         that; no cell may be blocked that the box round any short piece of it meets.
@@ -124,46 +153,36 @@ class CostLine:
 
         Parameters
         ----------
-        cells, start, goal
-            As in `shorten`.
+        points
+            float64 (n, 2), `(x, y)` in metres, map frame, as `shorten` returns them.
         radius_m
             Least radius of an arc in metres, > 0.
 
         Returns
         -------
         ArcLine
-            Never dearer than the line over the centres of the cells (see `shorten`), and at most
-            1 % dearer than what `shorten` returns.
+            At most 0.5 % dearer than the line.
         """
-        line, least, whole = self._short(cells, start, goal)
-        if len(line) == 1:
-            return ArcLine(np.array([start], dtype=np.float64), np.zeros(1), 0.0, 0.0)
-        spare = max(min(whole - least, _TOLERANCE * least), 0.0)
+        if len(points) == 1:
+            return ArcLine(points, np.zeros(1), 0.0, 0.0)
+        line = np.rint(self._frame.positions_of(points) * _GRAIN) / _GRAIN
+        # Points on the rim of the map stay there.
+        line = np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
         per_cell = self._frame.resolution_m
-        points, ahead, cost, length = round_bends(
-            self._free, self._factors, line, radius_m / per_cell, spare
+        spare = _SPARE * kernels.cost_of(self.factors, line)
+        found, ahead, cost, length = round_bends(
+            self.free, self.factors, line, radius_m / per_cell, spare
         )
         headings = directions(ahead[:, 0], ahead[:, 1])
         if self._frame.yaw_rad != 0:
             headings = wrapped(headings + self._frame.yaw_rad)
-        found = self._in_metres(points, start, goal)
-        return ArcLine(found, headings, cost * per_cell, length * per_cell)
+        rounded = self.in_metres(found, points[0], points[-1])
+        return ArcLine(rounded, headings, cost * per_cell, length * per_cell)
 
-    def _short(
-        self, cells: LongArray, start: FloatArray, goal: FloatArray
-    ) -> tuple[FloatArray, float, float]:
-        """Return the positions of the short line, its cost in cells, and that of the cells."""
-        position_of = self._frame.position_of
-        ends = np.array([position_of(*start.tolist()), position_of(*goal.tolist())])
-        # Kernels are compiled for each memory layout, and again for read-only arrays.
-        cells = np.ascontiguousarray(cells).view()
-        cells.flags.writeable = False
-        path = kernels.line_of_cells(cells, ends, self._corner_cutting)
-        found: tuple[FloatArray, float, float] = kernels.shorten(self._free, self._factors, path)
-        return found
 
-    def _in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """Return the points of positions, the first and last being exact."""
-        points = self._frame.points_of_grid(line)
-        points[-1], points[0] = goal, start
-        return points
+def _read_only(cells: LongArray) -> LongArray:
+    """Return cells for kernels, which are compiled for each memory layout, and again for arrays
+    that may be written."""
+    view = np.ascontiguousarray(cells).view()
+    view.flags.writeable = False
+    return view

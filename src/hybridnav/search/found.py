@@ -47,11 +47,9 @@ class PlanStats:
     """Effort of a query."""
 
     expanded: int = 0
-    """Number of cells that the refiner expanded."""
+    """Number of cells that the refiner expanded, or nodes of the lattice."""
     expanded_places: int = 0
     """Number of places that the coarse search expanded."""
-    expanded_border_cells: int = 0
-    """Number of border cells that the search on the overlay expanded."""
     expanded_intervals: int = 0
     """Number of intervals that the search on the mesh expanded."""
     corridor_cells: int = 0

@@ -176,7 +176,7 @@ def test_regions_that_no_change_touches_keep_places_and_number():
     assert (again.born, again.died, again.changed) == ((), (), ())
 
 
-def test_an_overlay_is_made_from_regions_that_followed():
+def test_plans_are_made_on_regions_that_followed():
     office = hn.load_map(OFFICE, robot_radius_m=0.25)
     places = OnlinePyramid.of(hn.DualGraphPyramid.build(office))
     regions = OnlineRegions.of(places, 9000)
@@ -185,12 +185,9 @@ def test_an_overlay_is_made_from_regions_that_followed():
         places.update(with_classes(office, classes), changed=box).version
     ).version
     topology = hn.TopologicalMap(regions.pyramid)
-    over = hn.load_preset("octile", overrides=["planner.method=cheapest"])
-    planner = hn.HybridPlanner(topology, preset=over)
-    planner.prepare()
-    exact = hn.HybridPlanner(topology, preset="octile")
+    paper, exact = (hn.HybridPlanner(topology, preset=name) for name in ("paper", "octile"))
     ends = (2.0, 2.0), (40.0, 20.0)
-    assert planner.plan(*ends).cost == pytest.approx(exact.plan(*ends).cost)
+    assert exact.plan(*ends).cost <= paper.plan(*ends).cost <= 1.5 * exact.plan(*ends).cost
 
 
 def test_regions_follow_the_places_of_any_version_of_their_map():

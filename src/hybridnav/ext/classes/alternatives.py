@@ -219,7 +219,7 @@ class ClassTours:
             path=path.turned_at_ends(like.start, like.goal),
             route_source=RouteOfCells(topology, RouteFinder(topology), cells),
             instruction_source=(),
-            lower_bound=bound_m,
+            bound_source=bound_m,
         )
 
     def _like(
@@ -246,7 +246,7 @@ class ClassTours:
             found,
             metric=result.metric,
             path=Path(other.cells, points, length_m).turned_at_ends(result.start, result.goal),
-            lower_bound=min(bound_m, length_m),
+            bound_source=min(bound_m, length_m),
         )
 
     def _word_of(self, cells: LongArray) -> Word:

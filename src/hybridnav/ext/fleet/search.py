@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""
 
-COUNTS = ("expanded", "expanded_places", "expanded_border_cells", "expanded_intervals")
+COUNTS = ("expanded", "expanded_places", "expanded_intervals")
 """The counts of `PlanStats` that add up."""
 
 

@@ -17,6 +17,8 @@ from hybridnav.route.coarse import ArcSearch
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -203,9 +205,9 @@ class CostClaim:
     cost_m: float
     """Cost of the path: the integral of the factors along it, in metres. Arcs may be priced along
     chords of a quarter of a cell."""
-    lower_bound_m: float = 0.0
+    lower_bound_m: float | Callable[[], float] = 0.0
     """Proved lower bound on the costs of all paths of cells, or, beside an `any_angle` path, of all
-    any-angle paths, in metres."""
+    any-angle paths, in metres; or how to find it, which is no part of planning."""
     grid_bound_m: float | None = None
     """Proved lower bound on the costs of all paths of cells, beside an `any_angle` path, which may
     cost less; None for none."""
@@ -241,8 +243,6 @@ class MethodResult:
     """Cells expanded by the metric layer."""
     expanded_nodes: int = 0
     """Nodes expanded by the topological layer."""
-    expanded_border_cells: int = 0
-    """Border cells expanded by a search over tables of distances between them."""
     expanded_intervals: int = 0
     """Intervals expanded by a search on a mesh."""
     seconds: dict[str, float] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.costs.kernels.integral import line_cost, segment_cost
+from hybridnav.maps.costs.kernels.integral import legal_cost, line_cost, segment_cost
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import Frame, OccupancyGrid
     from hybridnav.maps.costs.layer import CostLayer
 
-__all__ = ["cost_along", "segment_cost"]
+__all__ = ["cost_along", "legal_cost", "segment_cost"]
 
 _QUANTUM = 2.0**-24
 _OFF = 1e-6

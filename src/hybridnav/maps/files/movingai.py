@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 _READING_BYTES = 50
 """Bytes per cell while a map is read and inflated; measured 42 on 16 million cells."""
 _PLANNING_BYTES = 300
-"""Most bytes per cell with pyramid and overlay; measured 240 on 4 million free cells."""
+"""Most bytes per cell with pyramid and a search structure; measured 240 on 4 million free cells,
+with the costliest one that there has been, exact costs between the border cells of fields."""
 _GB = 1e9
 
 

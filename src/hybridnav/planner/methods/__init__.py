@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _METHODS = {
     "shortest": "shortest:OverMesh",
     "octile": "octile:OverJumps",
-    "cheapest": "cheapest:OverOverlay",
+    "cheapest": "cheapest:OverLattice",
     "paper": "paper:MaxDistance",
     "grid-astar": "grid:WholeMap",
 }

@@ -1,191 +1,169 @@
-"""Method `cheapest`: cheapest cell paths on the multilevel overlay of the map."""
+"""Method `cheapest`: cheapest paths at any angle, on a lattice laid over the cells."""
 
 from __future__ import annotations
 
+import threading
 import time
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav._base.threads import Turns
-from hybridnav.planner.methods.grid import KnownMap, WholeMap, on_cells, round_closed
-from hybridnav.search.found import Method, PlanStats
-from hybridnav.search.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps.costs import CostLayer, cost_along
+from hybridnav.maps.geometry import cells_of_line
+from hybridnav.planner.methods.grid import KnownMap
+from hybridnav.refine import CostLine
+from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.lattice import LatticeSearch, build_lattice
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
-    from hybridnav._base.typing import AnyArray, BoolArray, LongArray
+    from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.maps.areas import Box
-    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner.settings import CheapestSettings
-    from hybridnav.search.found import Found, MapChange, Metric, Query
-    from hybridnav.search.overlay import Overlay
+    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query
 
-
-_WORTH = 20
-"""Times that queries expand all cells before the overlay is built: building it takes 3 to 7 us a
-cell, A* 0.2 us for each cell that it expands."""
+_GRAIN = 2.0**24
+_KEPT = 8
+"""Number of lattices round closed cells that are kept for queries with equal closures."""
 
 
 @copies_alike
-class OverOverlay(Method):
-    """Cheapest paths of cells; the overlay is built once queries have spent as much time without.
+class OverLattice(Method):
+    """Cheapest paths at any angle: a line over the lattice, moved to where it costs least.
 
-    Until then, and if corners may be cut, A* searches the whole map. Without costs the paths are
-    the shortest ones. It is not kept with a model: it belongs to costs, and these may change.
+    The lattice is built for the first query, in some 0.1 us a cell. It is not kept with a model: it
+    belongs to costs, and these may change. Equal queries have equal answers, bit for bit, whatever
+    was asked before.
 
     Parameters
     ----------
     known
-        The map with its places, whose pyramid has the fields of the overlay, and its costs.
+        The map, without corner cutting, and its costs; without costs a metre costs a metre.
     settings
-        Whether unexplored cells may be entered, and the accepted distance from the optimum.
+        Whether unexplored cells may be entered.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map allows corner cutting.
     """
 
     def __init__(self, known: KnownMap, settings: CheapestSettings) -> None:
-        assert known.topology is not None  # noqa: S101 - no method of places is made without
-        self._topology, self._settings = known.topology, settings
-        self._allow_unexplored = settings.allow_unexplored
-        self._epsilon = settings.epsilon or 0.0
-        self._take(known)
-        self._built: tuple[Overlay, OverlaySearch] | None = None
-        self._is_too_long = False
-        """Whether the costs of paths inside a field do not fit, as with factors of hundreds."""
-        self._overdue: Box | None = None
-        """Box of the cells that are other ones than in the overlay."""
-        self._expanded = 0
-        self._building = Turns()
-
-    @cached_property
-    def _worth(self) -> int:
-        """Number of expanded cells after which the overlay is built."""
-        free = self._topology.grid.enterable(allow_unexplored=self._allow_unexplored)
-        return _WORTH * int(free.sum())
-
-    def _take(self, known: KnownMap) -> None:
-        self._whole_map = WholeMap(known, self._settings)
-        self._refiner, _ = self._whole_map.refiners
-        self.metric: Metric = self._whole_map.metric
-
-    def prepare(self, progress: Progress = no_progress) -> None:
-        """Build the overlay, or renew what updates have made stale; see `Method`."""
-        self._building.alone(partial(self._build_or_renew, progress))
-        progress(1, 1)
-
-    def _build_or_renew(self, progress: Progress) -> None:
-        if self._built is not None:
-            self._built[0].renew(progress)
-        elif self._can_build:
-            self._build(progress)
-
-    @property
-    def _can_build(self) -> bool:
-        """Whether an overlay of the map could be built: one needs a cell that may be entered."""
-        grid = self._topology.grid
-        is_open = grid.enterable(allow_unexplored=self._allow_unexplored)
-        return not (self._is_too_long or grid.corner_cutting) and bool(is_open.any())
-
-    def _build(self, progress: Progress) -> None:
-        costs, allowed = self._refiner.costs, self._allow_unexplored
-        factor: Any = None if costs is None else costs.factors
-        try:
-            overlay = prepare_overlay(
-                self._topology, factor, allow_unexplored=allowed, progress=progress
+        grid = known.grid
+        if grid.corner_cutting:
+            raise InvalidValueError(
+                "cheapest any-angle paths do not pass between two blocked cells that meet at a "
+                "corner, and this map allows that (corner_cutting): load it without, or take "
+                "preset grid-astar"
             )
-            if costs is not None and len(costs.closed_flat):
-                overlay.update(
-                    factor, closed=costs.keepout, changed=_box_of(costs.closed_flat, costs.shape)
-                )
-                overlay.renew()
-            now = self._refiner.costs
-            if now is not costs and now is not None:  # a progress callback has changed them
-                new: Any = now.factors
-                overlay.update(new, closed=now.keepout)
-        except PathsTooLongError:
-            self._is_too_long = True
-            return
-        self._built = overlay, OverlaySearch(overlay)
+        self._grid, self._settings = grid, settings
+        self._take(known.costs)
+        self._search: LatticeSearch | None = None
+        self._around: dict[ClosedCells, tuple[LatticeSearch, CostLine]] = {}
+        self._building = threading.RLock()  # a progress callback may plan
 
-    def take_costs(self, costs: CostLayer, box: Box) -> bool:
-        """Plan by other costs from now on; see `Method`."""
-        self._building.alone(partial(self._take_costs, costs, box))
-        return True
+    def _take(self, costs: CostLayer | None) -> None:
+        self.metric: Metric = "any-angle" if costs is None else "any-angle-weighted"
+        self._layer = CostLayer(np.ones(self._grid.shape, np.float32)) if costs is None else costs
+        allowed = self._settings.allow_unexplored
+        self._line = CostLine(self._grid, self._layer, allow_unexplored=allowed)
 
-    def _take_costs(self, costs: CostLayer, box: Box) -> None:
-        self._take(KnownMap(self._topology.grid, self._topology, costs))
-        if self._built is None:
-            self._is_too_long = False
-            return
-        factor: Any = costs.factors
-        try:
-            self._built[0].update(factor, closed=costs.keepout, changed=box)
-        except PathsTooLongError:
-            self._built, self._is_too_long = None, True
+    def prepare(self, progress: Progress = no_progress) -> LatticeSearch:
+        """Build the lattice, once; see `Method`."""
+        if self._search is None:
+            with self._building:
+                if self._search is None:
+                    lattice = build_lattice(self._line.free, self._line.factors)
+                    self._search = LatticeSearch(lattice)
+        progress(1, 1)
+        return self._search
 
-    def changed(self, change: MapChange) -> OverOverlay:
-        """Return the method of a changed map, which takes the overlay over; see `Method`."""
-        other = OverOverlay(KnownMap(*change[:3]), self._settings)
-        other._built, other._expanded = self._built, self._expanded
-        if self._built is not None:
-            before, now = self._state(), other._state()
-            differs = np.logical_or.reduce([a != b for a, b in zip(before, now, strict=True)])
-            other._overdue = _box_of(np.flatnonzero(differs), differs.shape)
+    def changed(self, change: MapChange) -> OverLattice:
+        """Return the method of the changed map; blocks of cells that differ are laid anew. See
+        `Method`."""
+        other = OverLattice(KnownMap(*change[:3]), self._settings)
+        other._search = self._renewed(self._search, other._line)
         return other
 
-    def _state(self) -> tuple[AnyArray, BoolArray, BoolArray]:
-        """Return the factors of the cells, which may be entered, and which of these are closed."""
-        costs, grid = self._refiner.costs, self._topology.grid
-        enterable = grid.enterable(allow_unexplored=self._allow_unexplored)
-        closed = None if costs is None else costs.keepout
-        factors = np.ones(grid.shape, np.float32) if costs is None else costs.factors
-        return factors, enterable, np.zeros(grid.shape, np.bool_) if closed is None else closed
+    def take_costs(self, costs: CostLayer, box: Box) -> bool:  # noqa: ARG002 - all cells are compared
+        """Plan by other costs from now on; see `Method`."""
+        self._take(costs)
+        self._around.clear()
+        self._search = self._renewed(self._search, self._line)
+        return True
 
-    def catch_up(self) -> None:
-        """Take the changed cells into the overlay; see `Method`."""
-        self._building.alone(self._catch_up)
-
-    def _catch_up(self) -> None:
-        if self._built is None or self._overdue is None:
-            return
-        factors, enterable, closed = self._state()
-        factor: Any = factors
-        try:
-            self._built[0].update(factor, enterable=enterable, closed=closed, changed=self._overdue)
-        except PathsTooLongError:
-            self._built, self._is_too_long = None, True
-        self._overdue = None
+    @staticmethod
+    def _renewed(search: LatticeSearch | None, line: CostLine) -> LatticeSearch | None:
+        """Return the search of a lattice after cells changed, None for none."""
+        if search is None:
+            return None
+        was = search.lattice
+        differs = np.flatnonzero((was.free != line.free) | (was.factors != line.factors))
+        return LatticeSearch(was.renewed(line.free, line.factors, differs).with_landmarks())
 
     def find(self, query: Query) -> Found:
-        """Find a cheapest path, or one within epsilon of it; see `Method`."""
+        """Find a cheapest path between two points; see `Method`. Its cells are found when somebody
+        reads them. The bound is the distance of the two: see `PlanResult.lower_bound` for a better
+        one."""
         began = time.perf_counter()
         seconds = {}
-        if self._built is None and self._expanded >= self._worth:
+        if self._search is None:
             self.prepare()
-            seconds["overlay"] = time.perf_counter() - began
-        built = self._built
-        if built is None:
-            found = self._whole_map.find(query)
-            self._expanded += found.stats.expanded
-            return found
+            seconds["lattice"] = time.perf_counter() - began
         now = time.perf_counter()
-        path = built[1].path(*query.cells, epsilon=self._epsilon)
-        seconds["search"] = time.perf_counter() - now
-        stats = PlanStats(
-            expanded=path.expanded,
-            expanded_border_cells=path.expanded_border_cells,
-            seconds=seconds,
+        search, line = self.prepare(), self._line
+        if query.closed is not None:
+            search, line = self._round(query.closed)
+        first, last = (
+            self._position_in(cell, point)
+            for cell, point in zip(query.cells, query.points, strict=True)
         )
-        bound = path.lower_bound_cells
-        found = on_cells(self._refiner, path.cells, bound_cells=bound, stats=stats)
-        return round_closed(found, query, self._refiner)
+        found = search.line(first, last, query.cells)
+        seconds["search"] = time.perf_counter() - now
+        stats = PlanStats(expanded=found.expanded, seconds=seconds)
+        if found.positions is None:
+            return Found(None, stats=stats)
+        now = time.perf_counter()
+        positions = line.settle(found.positions)
+        seconds["settle"] = time.perf_counter() - now
+        points = line.in_metres(positions, *query.points)
+        cost_m = max(cost_along(self._grid, self._layer, points), query.straight_m)
+        passed = partial(self._passed, query, line, positions)
+        return Found(passed, cost_m, query.straight_m, points, stats=stats)
 
+    def _position_in(self, cell: tuple[int, int], point: FloatArray) -> tuple[float, float]:
+        """Return the position of a point in a cell, on the grain of exact tests."""
+        position = self._grid.frame.position_of(*point.tolist())
+        row, col = (
+            min(max(round(at * _GRAIN) / _GRAIN, float(low)), low + 1.0)
+            for at, low in zip(position, cell, strict=True)
+        )
+        return row, col
 
-def _box_of(flat: LongArray, shape: tuple[int, ...]) -> Box:
-    """Return the box that holds some flat cells, an empty one for none."""
-    if not len(flat):
-        return 0, 0, 0, 0
-    rows, cols = np.divmod(flat, shape[1])
-    return int(rows.min()), int(rows.max()) + 1, int(cols.min()), int(cols.max()) + 1
+    def _passed(self, query: Query, line: CostLine, positions: FloatArray) -> LongArray:
+        """Return the cells that a path passes, from start to goal."""
+        passed = cells_of_line(line.free.view(np.bool_), positions)
+        # For an end on a side, the cell behind the side may be listed.
+        parts = [passed]
+        if tuple(passed[0].tolist()) != query.cells[0]:
+            parts.insert(0, np.array([query.cells[0]]))
+        if tuple(passed[-1].tolist()) != query.cells[1]:
+            parts.append(np.array([query.cells[1]]))
+        return passed if len(parts) == 1 else np.concatenate(parts)
+
+    def _round(self, closed: ClosedCells) -> tuple[LatticeSearch, CostLine]:
+        """Return the search and the finisher round closed cells, which are cached."""
+        # By identity: `Planning.closed` returns the same object for equal closures.
+        found = self._around.get(closed)
+        if found is None:
+            line = self._line.closing(closed.flat)
+            shut = closed.flat[self._line.free.flat[closed.flat] != 0]
+            lattice = self.prepare().lattice.renewed(line.free, line.factors, shut)
+            found = self._around[closed] = LatticeSearch(lattice), line
+            for old in list(self._around)[:-_KEPT]:
+                self._around.pop(old, None)
+        return found

@@ -200,10 +200,9 @@ def save(
     ----------
     thing
         A planner, with its grid, its topological map, and what it has prepared so far, but the
-        overlay, which changes with the costs: call `HybridPlanner.prepare` first to include all.
-        Or several planners on one topological
-        map, such as those of several presets. Or only such a map, a grid or a `Model`. Or a
-        `Building`, which `load_building` loads.
+        lattice, which changes with the costs: call `HybridPlanner.prepare` first to include all.
+        Or several planners on one topological map, such as those of several presets. Or only
+        such a map, a grid or a `Model`. Or a `Building`, which `load_building` loads.
     path
         The file, which must end in `.hnm`. It is written whole or not at all; processes that have
         loaded the file it replaces keep the old one.

@@ -8,10 +8,9 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import is_legal
 from hybridnav._base.trig import atan2, cos, sin, tan
-from hybridnav.maps.costs.integral import segment_cost
-from hybridnav.refine.kernels.cost_line import legal_cost
-from hybridnav.refine.kernels.segments import is_legal
+from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 _FREE = 1
 _GRAIN = 2.0**24

@@ -1,8 +1,11 @@
-"""Kernels that shorten a path of cells to a line of positions without raising its cost.
+"""Kernels that settle a line where it costs least, at any angle.
 
-Positions are those of `taut`. A line has `costs`, float64 (n,), that of the segment, or of
-the part of a path, before each of its points; and `at`, int64 (n,), where on the path of cells each
-point lies.
+A line is moved as a chain that is pulled taut: its points shift to their sides, all at a time, by
+Newton's method on the integral of the factors, which are interpolated between the centres of cells
+for it. That integral has few local optima, so lines that begin near each other end on one. What a
+line costs, and whether it is legal, is decided on the cells themselves.
+
+Positions are those of `taut`.
 """
 
 import math
@@ -10,21 +13,36 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.exact import compare_products
-from hybridnav.maps.costs.integral import segment_cost
-from hybridnav.refine.kernels.segments import is_legal
+from hybridnav.maps.costs.integral import legal_cost, segment_cost
+from hybridnav.refine.kernels.chain import slopes_of, solve
 
 _GRAIN = 2.0**24
-_STRIDE = 6
-"""Cells from one point of the first line to the next."""
-_FIRST_SPANS = np.array([1, 2, 4], np.int64)
-"""Segments of the first line that one may replace."""
-_SPANS = np.array([2, 3, 4], np.int64)
-_FAR = 8
-"""Cells by which a point is moved along the path at most at a time."""
-_ROUNDS = 5
+_FINE = 2.0**12
+"""Points of a chain are rounded to this part of a cell."""
+_SPANS = np.array([2, 3, 4, 8, 16], np.int64)
+"""Segments of a line that one may replace."""
+_COARSE, _FINE_SPACING = 9.0, 3.0
+"""Cells from one point of a chain to the next: a coarse chain settles first, then a fine one."""
+_STEPS = 6
+"""Most steps of Newton's method in a round."""
+_ROUNDS = 4
+"""Most rounds of the fine chain: more than one where it is dearer than the line it came from."""
+_ALIKE = 1e-3
+"""Share by which costs differ that count as equal then."""
+_FARTHEST = 1.5
+"""Cells by which a point is moved in a step at most; half as many each time it turns back."""
+_STILL = 0.02
+"""Cells by which a chain that has settled may still move."""
+_HALVES, _SOLVED, _TRIES = 2, 5, 16
+"""Times that a step is tried because it leads off free cells. In the first ones points there make
+half of their way, later none; in the last ones the others are not solved for anew."""
 _SLACK = 1e-13
 """Rounding of a sum of costs, relative: of equal costs, the longer segment is taken."""
+_WORSE = 0.01
+"""Share by which a chain that has settled may be dearer than the line that it was: a limit that few
+meet, since lines that begin near each other are to end in one place."""
+_FLAT = 0.02
+"""Cells by which points may lie off a line that leaves them out."""
 
 
 @njit(cache=True, nogil=True)
@@ -60,121 +78,244 @@ def line_of_cells(cells, endpoints, corner_cutting):
 
 
 @njit(cache=True, nogil=True)
-def _costs_of_moves(factors, path):
-    """Return the cost of the path of cells up to each of its points."""
-    n = path.shape[0]
-    total = np.zeros(n)
-    for i in range(1, n):
-        row, col, to_row, to_col = path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1]
-        if i == 1 or i == n - 1:
-            cost = segment_cost(factors, row, col, to_row, to_col)
-        else:  # between centres of neighbours
-            cost = 0.5 * factors[math.floor(row), math.floor(col)]
-            cost += 0.5 * factors[math.floor(to_row), math.floor(to_col)]
-            if row != to_row and col != to_col:
-                cost *= math.sqrt(2.0)
-        total[i] = total[i - 1] + cost
-    return total
+def _costs_of(factors, line):
+    """Return the cost of each segment of a line, float64 (n,), the first being 0."""
+    costs = np.zeros(line.shape[0])
+    for i in range(1, line.shape[0]):
+        costs[i] = segment_cost(factors, line[i - 1, 0], line[i - 1, 1], line[i, 0], line[i, 1])
+    return costs
 
 
 @njit(cache=True, nogil=True)
-def _cheapest(free, factors, line, costs, spans):
-    """Find the cheapest lines that leave out points of a line, by dynamic programming.
+def cost_of(factors, line):
+    """Return the cost of a line, in cells."""
+    return _costs_of(factors, line).sum()
 
-    Return the cost up to each point, and the point before it; -1 if the part of the path before it
-    stays.
-    """
+
+@njit(cache=True, nogil=True)
+def _cut_short(free, factors, line):
+    """Return the cheapest line that leaves out points of a line, by dynamic programming."""
     n = line.shape[0]
-    total, before = np.zeros(n), np.full(n, -1, np.int64)
+    costs = _costs_of(factors, line)
+    total, before = np.zeros(n), np.arange(-1, n - 1)
     for j in range(1, n):
         row, col = line[j, 0], line[j, 1]
         least = total[j - 1] + costs[j]
-        for span in spans:
+        for span in _SPANS:
             i = j - span
             if i < 0:
                 break
-            from_row, from_col = line[i, 0], line[i, 1]
             most = (least - total[i]) * (1 + _SLACK)
             # No factor is below 1.
-            away = math.hypot(row - from_row, col - from_col)
+            away = math.hypot(row - line[i, 0], col - line[i, 1])
             if away == 0 or away > most:
                 continue
-            whole = legal_cost(free, factors, from_row, from_col, row, col, most)
+            whole = legal_cost(free, factors, line[i, 0], line[i, 1], row, col, most)
             if whole <= most:
                 least, before[j] = min(total[i] + whole, least), i
         total[j] = least
-    return total, before
+    kept, first, j = np.empty((n, 2)), n, n - 1
+    while j >= 0:
+        first -= 1
+        kept[first] = line[j]
+        j = before[j]
+    return kept[first:].copy()
 
 
 @njit(cache=True, nogil=True)
-def _first_line(free, factors, path):
-    """Return which points of a path of cells a first line keeps, its costs, and that of the path.
-
-    Every sixth point may be a bend; a part that no straight segment makes cheaper stays.
-    """
-    n = path.shape[0]
-    moves = _costs_of_moves(factors, path)
-    m = (n + _STRIDE - 2) // _STRIDE + 1
-    at = np.minimum(np.arange(m) * _STRIDE, n - 1)
-    costs = np.zeros(m)
-    for k in range(1, m):
-        costs[k] = moves[at[k]] - moves[at[k - 1]]
-    total, before = _cheapest(free, factors, path[at], costs, _FIRST_SPANS)
-    kept, parts = np.empty(n, np.int64), np.zeros(n)
-    first, j = n - 1, m - 1
-    kept[first] = n - 1
-    while j > 0:
-        i = before[j]
-        if i >= 0:
-            parts[first] = total[j] - total[i]
-            first, j = first - 1, i
-            kept[first] = at[i]
-            continue
-        for k in range(at[j] - 1, at[j - 1] - 1, -1):
-            parts[first] = moves[k + 1] - moves[k]
-            first -= 1
-            kept[first] = k
-        j -= 1
-    return kept[first:].copy(), parts[first:].copy(), moves[n - 1]
+def _is_legal(free, factors, a, c):
+    """Return whether the segment between two positions is legal, or none."""
+    return legal_cost(free, factors, a[0], a[1], c[0], c[1], np.inf) < np.inf
 
 
 @njit(cache=True, nogil=True)
-def _moved(free, factors, path, at, costs):
-    """Move the inner points of a line along the path of cells, where that is cheaper, in place.
+def _spread(free, factors, line, spacing):
+    """Return a line with its points evenly spaced along it, and points of its own only where a
+    shortcut past them is not legal; the line itself if rounding makes that illegal."""
+    n = line.shape[0]
+    whole = 0.0
+    for i in range(1, n):
+        whole += math.hypot(line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1])
+    m = max(int(whole / spacing + 0.5), 1)
+    chain = np.empty((m + n, 2))
+    chain[0] = line[0]
+    size, passed, ahead, first = 1, 0.0, 1, 1
+    for k in range(1, m + 1):
+        # The segment that holds the next point.
+        at = line[n - 1].copy()
+        while k < m and ahead < n:
+            row, col = line[ahead - 1]
+            down, over = line[ahead, 0] - row, line[ahead, 1] - col
+            step, left = math.hypot(down, over), whole * k / m - passed
+            if step > left:
+                at[0] = np.rint((row + left / step * down) * _FINE) / _FINE
+                at[1] = np.rint((col + left / step * over) * _FINE) / _FINE
+                break
+            passed += step
+            ahead += 1
+        if k == m:
+            ahead = n - 1
+        if not _is_legal(free, factors, chain[size - 1], at):
+            while first < min(ahead, n - 1):
+                chain[size] = line[first]
+                size, first = size + 1, first + 1
+            if k < m and not _is_legal(free, factors, chain[size - 1], at):
+                continue  # the point before the next one is that of the line
+        first = ahead
+        chain[size] = at
+        size += 1
+    for k in range(1, size):
+        if not _is_legal(free, factors, chain[k - 1], chain[k]):
+            return line.copy()
+    return chain[:size].copy()
 
-    Steps are 8 cells, then 4, 2 and 1, ahead and back. Return whether anything was moved.
+
+@njit(cache=True, nogil=True)
+def _move(free, factors, chain, aside, step, moved, is_off):
+    """Move the points of a chain aside; return whether it stays legal.
+
+    Parameters
+    ----------
+    free, factors, chain
+        See `_settled`.
+    aside
+        See `slopes_of`.
+    step
+        float64 (n,), how far, in cells.
+    moved
+        float64 (n, 2), changed: the points after it.
+    is_off
+        bool (n,), changed: which points have a segment that is not legal.
     """
-    found = False
-    for i in range(1, at.shape[0] - 1):
-        a, c = path[at[i - 1]], path[at[i + 1]]
-        for ahead in (-1, 1):
-            step = _FAR
-            while step > 0:
-                k = at[i] + ahead * step
-                if at[i - 1] < k < at[i + 1]:
-                    row, col = path[k]
-                    now = (costs[i] + costs[i + 1]) * (1 - 10 * _SLACK)
-                    first = math.hypot(row - a[0], col - a[1])
-                    second = math.hypot(c[0] - row, c[1] - col)
-                    if first > 0 and second > 0 and first + second < now:
-                        first = legal_cost(free, factors, a[0], a[1], row, col, now - second)
-                        if first + second < now:
-                            second = legal_cost(free, factors, row, col, c[0], c[1], now - first)
-                            if first + second < now:
-                                at[i], costs[i], costs[i + 1] = k, first, second
-                                found = True
-                                continue
-                step //= 2
-    return found
+    rows, cols = free.shape
+    n = chain.shape[0]
+    for i in range(1, n - 1):
+        row = chain[i, 0] + step[i] * aside[i, 0]
+        col = chain[i, 1] + step[i] * aside[i, 1]
+        if step[i] != 0:
+            row, col = np.rint(row * _FINE) / _FINE, np.rint(col * _FINE) / _FINE
+        moved[i, 0], moved[i, 1] = min(max(row, 0.0), rows + 0.0), min(max(col, 0.0), cols + 0.0)
+    is_legal, is_off[:] = True, False
+    for i in range(1, n):
+        if not _is_legal(free, factors, moved[i - 1], moved[i]):
+            is_off[i - 1] = is_off[i] = True
+            is_legal = False
+    return is_legal
+
+
+@njit(cache=True, nogil=True)
+def _face_aside(chain, aside):
+    """Set the directions in which the points of a chain move: across the line past each."""
+    for i in range(1, chain.shape[0] - 1):
+        down, over = chain[i + 1, 0] - chain[i - 1, 0], chain[i + 1, 1] - chain[i - 1, 1]
+        length = math.hypot(down, over)
+        aside[i, 0] = -over / length if length > 0 else 0.0
+        aside[i, 1] = down / length if length > 0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def _settled(free, factors, chain, stride, steps):
+    """Return a chain whose inner points have moved to their sides until it costs least there.
+
+    Parameters
+    ----------
+    free, factors
+        See `settle`.
+    chain
+        float64 (n, 2), positions.
+    stride
+        See `slopes_of`.
+    steps
+        Most steps.
+    """
+    n = chain.shape[0]
+    chain, moved, best, least = chain.copy(), chain.copy(), chain.copy(), np.inf
+    is_off, held, step = np.zeros(n, np.bool_), np.empty(n), np.zeros(n)
+    # Directions and slopes at the best chain, and at the last one.
+    aside, slope, bend, link = np.zeros((n, 2)), np.zeros(n), np.zeros(n), np.zeros(n)
+    next_aside, next_slope = np.zeros((n, 2)), np.zeros(n)
+    next_bend, next_link = np.zeros(n), np.zeros(n)
+    farthest, last = np.full(n, _FARTHEST), np.zeros(n)
+    for _ in range(steps):
+        _face_aside(chain, next_aside)
+        cost = slopes_of(factors, chain, stride, next_aside, next_slope, next_bend, next_link)
+        if cost > least:  # too far: half as far, from where it was
+            farthest[:] = farthest * 0.5
+        else:
+            best, chain, least = chain, best, cost
+            aside, next_aside, slope, next_slope = next_aside, aside, next_slope, slope
+            bend, next_bend, link, next_link = next_bend, bend, next_link, link
+        # Points whose segments would leave the free cells are held, and the others solved for anew.
+        held[:], is_legal = np.nan, False
+        for k in range(_TRIES):
+            if k < _SOLVED:
+                solve(slope, bend, link, held, farthest, step)
+            is_legal = _move(free, factors, best, aside, step, moved, is_off)
+            if is_legal:
+                break
+            for i in range(1, n - 1):
+                if is_off[i]:
+                    held[i] = 0.5 * step[i] if k < _HALVES else 0.0
+                    step[i] = held[i]
+        if not is_legal:
+            return best
+        for i in range(1, n - 1):
+            if step[i] * last[i] < 0:
+                farthest[i] *= 0.5
+            last[i] = step[i]
+        chain[:] = moved
+        if np.abs(step).max() < _STILL:
+            break
+    cost = slopes_of(factors, chain, stride, next_aside, next_slope, next_bend, next_link)
+    return best if cost > least else chain
+
+
+@njit(cache=True, nogil=True)
+def _thinned(free, factors, chain):
+    """Return a chain without the points that lie on the line between others."""
+    n = chain.shape[0]
+    kept = np.empty((n, 2))
+    kept[0], size, i = chain[0], 1, 0
+    while i < n - 1:
+        j = i + 1
+        while j < n - 1:
+            down, over = chain[j + 1, 0] - chain[i, 0], chain[j + 1, 1] - chain[i, 1]
+            length = math.hypot(down, over)
+            is_flat = length > 0
+            for k in range(i + 1, j + 1):
+                off = down * (chain[k, 1] - chain[i, 1]) - over * (chain[k, 0] - chain[i, 0])
+                is_flat = is_flat and abs(off) <= _FLAT * length
+            if not (is_flat and _is_legal(free, factors, chain[i], chain[j + 1])):
+                break
+            j += 1
+        if chain[j, 0] != chain[i, 0] or chain[j, 1] != chain[i, 1]:
+            kept[size] = chain[j]
+            size += 1
+        i = j
+    return kept[:size].copy()
+
+
+@njit(cache=True, nogil=True)
+def _finely_settled(free, factors, line, least):
+    """Return a line after a fine chain along it has settled: in more than one round where that is
+    dearer than another line, which costs `least`."""
+    now = np.inf
+    for _ in range(_ROUNDS):
+        before = now
+        line = _settled(free, factors, _spread(free, factors, line, _FINE_SPACING), 1.0, _STEPS)
+        now = cost_of(factors, line)
+        if now < least * (1 + _ALIKE) or now > before * (1 - _ALIKE):
+            break
+    return _thinned(free, factors, line)
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def shorten(free, factors, path):
-    """Return a line through some of the points of a path of cells, no dearer, its cost, and that of
-    the path.
+def settle(free, factors, path):
+    """Return a line between the ends of a path that costs least of those near it, its cost, and
+    that of the path.
 
-    Its segments are legal, or are segments of the path.
+    The line is never dearer than the path, and its segments are legal if those of the path are.
 
     Parameters
     ----------
@@ -183,98 +324,25 @@ def shorten(free, factors, path):
     factors
         float32 (rows, cols), >= 1.
     path
-        float64 (n, 2), n >= 1, see `line_of_cells`.
+        float64 (n, 2), n >= 1, positions, no two in a row equal.
     """
-    at, costs, whole = _first_line(free, factors, path)
-    for _ in range(_ROUNDS):
-        moved = _moved(free, factors, path, at, costs)
-        total, before = _cheapest(free, factors, path[at], costs, _SPANS)
-        n = at.shape[0]
-        first, j = n - 1, n - 1
-        while j > 0:
-            i = before[j] if before[j] >= 0 else j - 1
-            costs[first] = total[j] - total[i]
-            first, j = first - 1, i
-            at[first] = at[i]
-        at, costs = at[first:].copy(), costs[first:].copy()
-        costs[0] = 0.0
-        if first == 0 and not moved:
-            break
-    return path[at], costs.sum(), whole
-
-
-# The cost of a segment and the test whether it is legal, in one walk over its cells.
-#
-# Positions are those of `taut`.
-
-_FREE = 1
-_LEGAL_SLACK = 1e-12
-"""Rounding of a sum of costs, relative."""
-
-
-@njit(cache=True, nogil=True)
-def legal_cost(free, factors, a_row, a_col, b_row, b_col, most):
-    """Return the integral of the factors along a segment, in cells, if it is legal; else infinity.
-
-    The walk is that of `segment_cost` and `is_legal`. It ends, and returns infinity, where the
-    rest makes the segment dearer than `most`, because no factor is below 1.
-
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols), >= 1.
-    a_row, a_col, b_row, b_col
-        The endpoints, inside the map; if they are equal, the cost is 0.
-    most
-        The largest cost that is of use; a little more may be returned.
-    """
-    if a_row == b_row or a_col == b_col:
-        if a_row == b_row and a_col == b_col:
-            return 0.0
-        if not is_legal(free, a_row, a_col, b_row, b_col, _FREE, _FREE):
-            return np.inf
-        return segment_cost(factors, a_row, a_col, b_row, b_col)
-
-    # The walk runs towards higher columns, so that only rows have two directions.
-    if b_col < a_col:
-        a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
-    up = b_row > a_row
-    turn = 1 if up else -1
-    row, col = math.floor(a_row) if up else math.ceil(a_row) - 1, math.floor(a_col)
-    last_row, last_col = math.ceil(b_row) - 1 if up else math.floor(b_row), math.ceil(b_col) - 1
-    rows, cols = abs(b_row - a_row), b_col - a_col
-    per_row, per_col = 1.0 / rows, 1.0 / cols
-    # How far the next line between rows, and between columns, is from the first endpoint.
-    to_row, to_col = row + 1.0 - a_row if up else a_row - row, col + 1.0 - a_col
-    length = math.sqrt(rows * rows + cols * cols)
-    limit = most / length * (1 + _LEGAL_SLACK)
-
-    # `share` of the segment is behind, at a cost of `total` if the whole had length 1.
-    share, total = 0.0, 0.0
-    while free[row, col] >= _FREE:
-        if row == last_row and col == last_col:
-            return (total + factors[row, col] * (1.0 - share)) * length
-        left, right = to_row * cols, to_col * rows
-        # Rounding preserves order: only equal products need their errors.
-        hand = compare_products(to_row, cols, to_col, rows) if left == right else 0
-        if left < right or hand < 0:
-            until = to_row * per_row
-            total += factors[row, col] * (until - share)
-            row += turn
-            to_row += 1.0
-        else:
-            until = to_col * per_col
-            total += factors[row, col] * (until - share)
-            if left == right and hand == 0:  # through a corner
-                if free[row, col + 1] < _FREE and free[row + turn, col] < _FREE:
-                    break
-                row += turn
-                to_row += 1.0
-            col += 1
-            to_col += 1.0
-        share = until
-        if total + (1.0 - share) > limit:
-            break
-    return np.inf
+    whole = cost_of(factors, path)
+    if path.shape[0] < 3:
+        return path.copy(), whole, whole
+    line = _cut_short(free, factors, path)
+    best, least = line, cost_of(factors, line)
+    # A coarse chain leads far in few steps, but cuts through narrow bends.
+    chain = _settled(free, factors, _spread(free, factors, line, _COARSE), 2.0, _STEPS)
+    is_coarse = cost_of(factors, chain) < least * (1 + _WORSE)
+    line = _finely_settled(free, factors, chain if is_coarse else line, least)
+    now = cost_of(factors, line)
+    if is_coarse and now > least:
+        other = _finely_settled(free, factors, best, least)
+        if cost_of(factors, other) < now:
+            line, now = other, cost_of(factors, other)
+    # Costs that jump from cell to cell are not always those between the centres of cells.
+    if now <= least * (1 + _WORSE):
+        best, least = line, now
+    if least > whole:
+        return path.copy(), whole, whole
+    return best, least, whole

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav.refine.kernels.segments import is_legal
+from hybridnav._base.kernels.exact import is_legal
 from hybridnav.refine.kernels.taut import FREE, grown, tighten
 
 _STEPS, _STEPS_PER_CELL = 2000, 1

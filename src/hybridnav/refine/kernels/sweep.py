@@ -21,8 +21,8 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.exact import is_legal
 from hybridnav._base.trig import cos, sin
-from hybridnav.refine.kernels.segments import is_legal
 
 BLOCKED, OPEN, STAND = 0, 1, 2
 """Marks of cells in a query: not free, free but outside the corridor, free to stand on."""

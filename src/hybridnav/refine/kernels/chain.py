@@ -1,0 +1,127 @@
+"""Kernels of Newton's method on a chain of points that move to their sides.
+
+Positions are those of `taut`.
+"""
+
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import njit
+
+_BESIDE = 0.4
+"""Cells to both sides at which the slope of the factors is measured."""
+_DAMPING = 1e-3
+
+
+@njit(cache=True, nogil=True)
+def _factor_at(factors, row, col):
+    """Return the factor at a position, interpolated between the centres of four cells; beyond the
+    outer ones it stays."""
+    row, col = max(row - 0.5, 0.0), max(col - 0.5, 0.0)
+    low, left = int(row), int(col)
+    up, over = np.float32(row - low), np.float32(col - left)
+    if low + 1 < factors.shape[0] and left + 1 < factors.shape[1]:
+        first = factors[low, left] + over * (factors[low, left + 1] - factors[low, left])
+        low += 1
+        second = factors[low, left] + over * (factors[low, left + 1] - factors[low, left])
+        return first + up * (second - first)
+    low, left = min(low, factors.shape[0] - 1), min(left, factors.shape[1] - 1)
+    high, right = min(low + 1, factors.shape[0] - 1), min(left + 1, factors.shape[1] - 1)
+    first = factors[low, left] + over * (factors[low, right] - factors[low, left])
+    second = factors[high, left] + over * (factors[high, right] - factors[high, left])
+    return first + up * (second - first)
+
+
+@njit(cache=True, nogil=True)
+def slopes_of(factors, chain, stride, aside, slope, bend, link):
+    """Measure how the cost of a chain changes as its points move aside: the slope, and the
+    curvature, which is a matrix with three diagonals. Return the cost.
+
+    Parameters
+    ----------
+    factors
+        See `settle`.
+    chain
+        float64 (n, 2), positions.
+    stride
+        Cells from one place at which it is measured to the next.
+    aside
+        float64 (n, 2), unit vectors, the directions in which points move.
+    slope, bend, link
+        float64 (n,), changed: the slope by each point, the diagonal of the curvature, and what
+        stands beside it, for each point and the next.
+    """
+    slope[:], bend[:], link[:] = 0.0, 0.0, 0.0
+    cost = 0.0
+    for i in range(chain.shape[0] - 1):
+        down, over = chain[i + 1, 0] - chain[i, 0], chain[i + 1, 1] - chain[i, 1]
+        length = math.hypot(down, over)
+        if length < 1e-9:
+            continue
+        ahead_row, ahead_col = down / length, over / length
+        side_row, side_col = -ahead_col, ahead_row
+        # Along the segment: the factor, its slope to the side and its curvature. What curves
+        # downwards is left out, so that a step leads to a minimum.
+        n = max(int(length / stride + 0.999), 1)
+        mean, first, second = 0.0, 0.0, 0.0
+        first_bend, second_bend, both = 0.0, 0.0, 0.0
+        for k in range(n):
+            share = (k + 0.5) / n
+            row, col = chain[i, 0] + share * down, chain[i, 1] + share * over
+            here = _factor_at(factors, row, col)
+            right = _factor_at(factors, row + _BESIDE * side_row, col + _BESIDE * side_col)
+            left = _factor_at(factors, row - _BESIDE * side_row, col - _BESIDE * side_col)
+            rise = (right - left) / (2 * _BESIDE)
+            curve = max((right - 2 * here + left) / (_BESIDE * _BESIDE), 0.0)
+            mean += here
+            first += (1 - share) * rise
+            second += share * rise
+            first_bend += (1 - share) * (1 - share) * curve
+            second_bend += share * share * curve
+            both += share * (1 - share) * curve
+        mean, weight = mean / n, length / n
+        cost += mean * length
+        # The segment pulls at both of its points with the factor along it, like a string.
+        a_side = aside[i, 0] * side_row + aside[i, 1] * side_col
+        b_side = aside[i + 1, 0] * side_row + aside[i + 1, 1] * side_col
+        a_ahead = aside[i, 0] * ahead_row + aside[i, 1] * ahead_col
+        b_ahead = aside[i + 1, 0] * ahead_row + aside[i + 1, 1] * ahead_col
+        tension = mean / length
+        slope[i] += weight * first * a_side - mean * a_ahead
+        slope[i + 1] += weight * second * b_side + mean * b_ahead
+        bend[i] += (tension + weight * first_bend) * a_side * a_side
+        bend[i + 1] += (tension + weight * second_bend) * b_side * b_side
+        link[i] = (weight * both - tension) * a_side * b_side
+    return cost
+
+
+@njit(cache=True, nogil=True)
+def solve(slope, bend, link, held, farthest, step):
+    """Solve for the step of the inner points that makes the slope 0, by elimination.
+
+    Parameters
+    ----------
+    slope, bend, link
+        See `slopes_of`.
+    held
+        float64 (n,), the steps of points that are held, NaN for others.
+    farthest
+        float64 (n,), the farthest that points may go.
+    step
+        float64 (n,), changed; the first and the last stay 0.
+    """
+    n = slope.shape[0]
+    above = np.zeros(n)
+    for i in range(1, n - 1):
+        if not np.isnan(held[i]):
+            above[i], step[i] = 0.0, held[i]
+            continue
+        below = link[i - 1] if i > 1 else 0.0
+        pivot = bend[i] + _DAMPING - below * above[i - 1]
+        above[i] = link[i] / pivot if i < n - 2 else 0.0
+        step[i] = (-slope[i] - below * step[i - 1] * (i > 1)) / pivot
+    for i in range(n - 3, 0, -1):
+        step[i] -= above[i] * step[i + 1]
+    for i in range(1, n - 1):
+        step[i] = min(max(step[i], -farthest[i]), farthest[i])

@@ -1,0 +1,227 @@
+"""The lattice of a map: one node for each part of a block of cells, and edges between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav.errors import InvalidValueError
+from hybridnav.search.lattice.kernels.build import NO_PART, REACH, lay_edges, lay_nodes
+from hybridnav.search.lattice.kernels.landmarks import costs_from_landmarks
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+
+_SIDES = ((4, 0.35), (2, 0.5), (1, 4.0))
+"""Cells on a side of a block, and the most walls beside a free cell, in the mean: where there are
+many, nodes of large blocks are not on the way."""
+_LANDMARKS = 12
+_FEW = 256
+_MOST_SPENT = 2.0
+"""Nodes, in those of the map, with which a lattice that was renewed is built anew."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Nodes and edges over the free cells of a map; a value, which updates replace.
+
+    A block has 4 x 4 cells; in narrow maps, such as mazes, 2 x 2 or one. Each connected part of its
+    free cells has a node, in its cheapest cell. Edges lead to blocks up to a knight's move away:
+    straight segments with the exact integral of the factors along them. Parts that meet without
+    seeing each other are joined by the cheapest path of cells inside them, so two cells are
+    connected in the lattice just if they are on the grid.
+
+    Examples
+    --------
+    >>> from hybridnav.search.lattice import build_lattice
+    >>> lattice = build_lattice(np.ones((8, 8), bool), np.ones((8, 8), np.float32))
+    >>> lattice.cells.tolist(), lattice.side
+    ([9, 13, 41, 45], 4)
+    """
+
+    free: AnyArray
+    """uint8 (rows, cols), 1 where a cell may be entered."""
+    factors: AnyArray
+    """float32 (rows, cols), >= 1."""
+    nodes_of: AnyArray
+    """int32 (blocks, 2), the first node of each block, and how many it has."""
+    parts: AnyArray
+    """uint8 (rows, cols), the part of each free cell in its block, 255 for other cells."""
+    cells: AnyArray
+    """int32 (nodes,), flat cells; after updates also nodes that no block has any more."""
+    edges_of: AnyArray
+    """int64 (nodes, 2), the first edge of each node, and how many it has."""
+    to: AnyArray
+    """int32 (edges,), the node at the other end; each edge is listed at both."""
+    costs: AnyArray
+    """float32 (edges,), cost in cells, below 0 for an edge inside two parts."""
+    landmarks: AnyArray
+    """float32 (nodes, k), the cost from each landmark to each node, infinite where there is no
+    path; k is 0 without landmarks, which make searches faster."""
+    side: int
+    """Cells on a side of a block."""
+
+    @property
+    def arrays(self) -> tuple[AnyArray | int, ...]:
+        """All arrays, and the side of a block, as kernels take them."""
+        return (
+            self.free, self.factors, self.nodes_of, self.parts, self.cells, self.edges_of, self.to,
+            self.costs, self.landmarks, self.side,
+        )  # fmt: skip
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes that blocks have."""
+        return int(self.nodes_of[:, 1].sum())
+
+    def renewed(self, free: BoolArray, factors: FloatArray, changed: LongArray) -> Lattice:
+        """Return the lattice after some cells changed, without landmarks.
+
+        Parameters
+        ----------
+        free, factors
+            As for `build_lattice`, of all cells now.
+        changed
+            int64 (k,), flat cells; no other cell may differ.
+        """
+        if not len(changed):
+            return self
+        rows, cols = free.shape
+        side = self.side
+        down, across = -(-rows // side), -(-cols // side)
+        is_changed = np.zeros((down, across), np.bool_)
+        row, col = np.divmod(changed, cols)
+        is_changed[row // side, col // side] = True
+        # Edges that pass a changed block have both ends this near to it.
+        is_near = is_changed.copy()
+        for block in np.argwhere(is_changed):
+            low, high = np.maximum(block - REACH, 0), block + REACH + 1
+            is_near[low[0] : high[0], low[1] : high[1]] = True
+        laid = np.flatnonzero(is_changed), np.flatnonzero(is_near)
+        before = (
+            self.nodes_of.copy(), self.parts.copy(), self.cells, self.edges_of, self.to, self.costs
+        )  # fmt: skip
+        made = _laid(free, factors, side, laid, before)
+        return _built(free, factors) if made.is_spent or _side_of(free) != side else made
+
+    def with_landmarks(self) -> Lattice:
+        """Return the lattice with landmarks; it is the same whether it was renewed or built anew.
+
+        Notes
+        -----
+        A. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph theory, 2005.
+        """
+        used = np.zeros(len(self.cells), np.bool_)
+        for extra in range(int(self.nodes_of[:, 1].max(initial=0))):
+            used[self.nodes_of[self.nodes_of[:, 1] > extra, 0] + extra] = True
+        nodes = np.flatnonzero(used)
+        order = nodes[np.argsort(self.cells[nodes])]
+        table = costs_from_landmarks(self.edges_of, self.to, self.costs, order, _LANDMARKS)
+        return replace(self, landmarks=table)
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether updates have left more unused nodes and edges than used ones."""
+        used = int(self.edges_of[:, 1].sum())
+        nodes, edges = _MOST_SPENT * self.n_nodes, _MOST_SPENT * used
+        return len(self.cells) > nodes + _FEW or len(self.to) > edges + 16 * _FEW
+
+
+def build_lattice(free: BoolArray, factors: FloatArray) -> Lattice:
+    """Build the lattice of a map, with landmarks, in time nearly linear in its cells.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols), which cells may be entered.
+    factors
+        float32 (rows, cols), >= 1, what a metre in each cell costs, in metres.
+
+    Raises
+    ------
+    InvalidValueError
+        When the two are no arrays of one shape.
+
+    Examples
+    --------
+    >>> from hybridnav.search.lattice import build_lattice
+    >>> build_lattice(np.ones((8, 8), bool), np.ones((8, 8), np.float32)).n_nodes
+    4
+    """
+    if free.ndim != 2 or free.shape != factors.shape:  # noqa: PLR2004
+        raise InvalidValueError(
+            f"free cells and factors must have one shape (rows, cols), got {free.shape} and "
+            f"{factors.shape}"
+        )
+    return _built(free, factors).with_landmarks()
+
+
+def _built(free: BoolArray, factors: FloatArray) -> Lattice:
+    """Return the lattice of a map, without landmarks."""
+    rows, cols = free.shape
+    side = _side_of(free)
+    blocks = np.arange(-(-rows // side) * -(-cols // side))
+    none = (
+        np.zeros((len(blocks), 2), np.int32),
+        np.full(free.shape, NO_PART, np.uint8),
+        np.empty(0, np.int32),
+        np.empty((0, 2), np.int64),
+        np.empty(0, np.int32),
+        np.empty(0, np.float32),
+    )
+    return _laid(free, factors, side, (blocks, blocks), none)
+
+
+def _side_of(free: BoolArray) -> int:
+    """Return the cells on a side of a block that suit a map, by the walls beside its free cells."""
+    is_free = free != 0
+    walls = np.count_nonzero(is_free[1:] != is_free[:-1])
+    walls += np.count_nonzero(is_free[:, 1:] != is_free[:, :-1])
+    share = int(walls) / max(int(is_free.sum()), 1)
+    return next(side for side, most in _SIDES if share <= most)
+
+
+def _laid(
+    free: BoolArray,
+    factors: FloatArray,
+    side: int,
+    blocks: tuple[LongArray, LongArray],
+    before: tuple[AnyArray, ...],
+) -> Lattice:
+    """Return a lattice with nodes laid in some blocks, and edges of the nodes of some."""
+    nodes_of, parts, cells, edges_of, to, costs = before
+    is_free = np.ascontiguousarray(free).view(np.uint8)
+    factor = np.ascontiguousarray(factors, dtype=np.float32)
+    # Kernels are compiled once for arrays that may not be written, whatever they are given.
+    is_free, factor = is_free.view(), factor.view()
+    is_free.flags.writeable = factor.flags.writeable = False
+    n, m = len(cells), len(to)
+    more = len(blocks[0]) + len(blocks[0]) // 8 + 1
+    cells = np.concatenate([cells, np.empty(more, np.int32)])
+    cells, n = lay_nodes(is_free, factor, side, blocks[0], nodes_of, parts, cells, n)
+    cells = cells[:n].copy()
+    of_nodes = np.zeros((n, 2), np.int64)
+    of_nodes[: len(edges_of)] = edges_of
+    room = 16 * int(nodes_of[blocks[1], 1].sum()) + 1
+    to = np.concatenate([to, np.empty(room, np.int32)])
+    costs = np.concatenate([costs, np.empty(room, np.float32)])
+    to, costs, m = lay_edges(
+        is_free, factor, side, blocks[1], nodes_of, parts, cells, of_nodes, to, costs, m
+    )
+    none = np.empty((n, 0), np.float32)
+    return Lattice(
+        is_free,
+        factor,
+        nodes_of,
+        parts,
+        cells,
+        of_nodes,
+        to[:m].copy(),
+        costs[:m].copy(),
+        none,
+        side,
+    )

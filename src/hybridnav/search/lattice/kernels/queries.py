@@ -1,0 +1,266 @@
+"""The kernel of queries on a lattice: A* over its nodes, and the line through those on the path.
+
+Positions are (row, col) in grid units. See `build` for nodes, edges and parts.
+"""
+
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import pop, push
+from hybridnav.maps.costs.integral import legal_cost
+from hybridnav.search.lattice.kernels.build import path_inside
+
+_NEAR = 12
+"""Cells up to which the straight line between both ends is tried."""
+_UNITS = 1024.0
+"""Units of a cell in keys of the open list; of equal keys, the lower cell comes first."""
+_MOST_NODES = 8
+"""Most parts of a block of 16 cells."""
+FULL = -1
+"""Number of expanded nodes that says that the open list had no room."""
+
+
+@njit(cache=True, nogil=True)
+def _nodes_near(lattice, at, cell, nodes, costs):
+    """Find the nodes in and round the block of a position that it sees, and what it costs to reach
+    each; with the node of its own part in any case.
+
+    Return how many there are, and whether the only one is not seen.
+
+    Parameters
+    ----------
+    lattice
+        See `find_line`.
+    at
+        float64 (2,), position.
+    cell
+        int64 (2,), (row, col) of the free cell that holds it: on a side, which one.
+    nodes, costs
+        int64 and float64, with room for the nodes of nine blocks.
+    """
+    free, factors, nodes_of, parts, cells = lattice[:5]
+    side = lattice[9]
+    rows, cols = free.shape
+    down, across = (rows + side - 1) // side, (cols + side - 1) // side
+    row, col = cell
+    n = 0
+    for block_row in range(max(row // side - 1, 0), min(row // side + 2, down)):
+        for block_col in range(max(col // side - 1, 0), min(col // side + 2, across)):
+            first, count = nodes_of[block_row * across + block_col]
+            for node in range(first, first + count):
+                to_row, to_col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
+                cost = legal_cost(free, factors, at[0], at[1], to_row, to_col, np.inf)
+                if cost < np.inf:
+                    nodes[n], costs[n] = node, cost
+                    n += 1
+    if n > 0:
+        return n, False
+    node = nodes_of[row // side * across + col // side, 0] + parts[row, col]
+    room = np.empty(2 * side * side, np.int64)
+    cost, _ = path_inside(
+        free, factors, side, parts, np.int64(row * cols + col), np.int64(cells[node]), room
+    )
+    nodes[0] = node
+    costs[0] = cost + factors[row, col] * math.hypot(at[0] - row - 0.5, at[1] - col - 0.5)
+    return 1, True
+
+
+@njit(cache=True, nogil=True)
+def _costs_towards(landmarks, starts):
+    """Return between what costs from each landmark a node must lie to be near the start: the lower
+    and the upper end, by the nodes from which it is reached, float64 (2, k)."""
+    k = landmarks.shape[1]
+    towards = np.empty((2, k))
+    towards[0], towards[1] = np.inf, -np.inf
+    for i in range(len(starts[0])):
+        for j in range(k):
+            at = landmarks[starts[0][i], j]
+            towards[0, j] = min(towards[0, j], at + starts[1][i])
+            towards[1, j] = max(towards[1, j], at - starts[1][i])
+    return towards
+
+
+@njit(cache=True, nogil=True)
+def _cost_left(landmarks, towards, node, down, over):
+    """Return a lower bound on the cost from a node to the start, which lies so far from it."""
+    least = math.hypot(down, over)
+    for j in range(landmarks.shape[1]):
+        at = landmarks[node, j]
+        if at < np.inf:
+            least = max(least, at - towards[1, j], towards[0, j] - at)
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _search(lattice, start, starts, goals, most, work):
+    """Search from the goal to the start by A*; return the last node, the number of expanded ones,
+    and whether the open list was full.
+
+    The last node is -1 if there is no path that costs less than `most`. The distance to the start
+    bounds what is left, because no factor is below 1.
+
+    Parameters
+    ----------
+    lattice
+        See `find_line`.
+    start
+        float64 (2,), the position to reach.
+    starts, goals
+        Nodes from which the start is reached, and those from which the search begins, with their
+        costs.
+    most
+        Cost of a path that is known, infinite for none.
+    work
+        See `find_line`.
+    """
+    cells, edges_of, to, edge_costs, landmarks = lattice[4:9]
+    cols = lattice[0].shape[1]
+    cost, before, mark, rest, heap, generation = work
+    opened, closed = 2 * generation, 2 * generation + 1
+    size, expanded, last, is_full = 0, 0, -1, False
+    towards = _costs_towards(landmarks, starts)
+    # What is left to pay from the nodes round the start.
+    for k in range(len(starts[0])):
+        rest[starts[0][k]] = starts[1][k]
+    # Begin at the nodes round the goal.
+    for k in range(len(goals[0])):
+        node, first = goals[0][k], goals[1][k]
+        cost[node], before[node], mark[node] = first, -1, opened
+        row, col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
+        left = _cost_left(landmarks, towards, node, row - start[0], col - start[1])
+        key = np.int64((first + left) * _UNITS)
+        push(heap, size, key << 32 | cells[node], node)
+        size += 1
+    while size > 0:
+        key = heap[0, 0] >> 32
+        node = pop(heap, size)
+        size -= 1
+        if key >= most * _UNITS:  # nothing that is left is cheaper
+            break
+        if mark[node] == closed:
+            continue
+        mark[node] = closed
+        expanded += 1
+        # Is a path over this node the cheapest so far?
+        here = cost[node]
+        if here + rest[node] < most:
+            most, last = here + rest[node], node
+        first, count = edges_of[node]
+        if size + count > heap.shape[0]:
+            is_full = True
+            break
+        # Relax its edges; what cannot be part of a cheaper path is left out.
+        for edge in range(first, first + count):
+            other = to[edge]
+            whole = here + abs(edge_costs[edge])
+            if mark[other] < opened or (mark[other] == opened and whole < cost[other]):
+                row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
+                least = whole + _cost_left(
+                    landmarks, towards, other, row - start[0], col - start[1]
+                )
+                if least < most:
+                    cost[other], before[other], mark[other] = whole, node, opened
+                    push(heap, size, np.int64(least * _UNITS) << 32 | cells[other], other)
+                    size += 1
+    # Leave the work arrays as they were.
+    for k in range(len(starts[0])):
+        rest[starts[0][k]] = np.inf
+    return last, expanded, is_full
+
+
+@njit(cache=True, nogil=True)
+def _put(line, size, row, col):
+    """Put a position at the end of a line, unless it is there; return the size of the line."""
+    if size == 0 or line[size - 1, 0] != row or line[size - 1, 1] != col:
+        line[size, 0], line[size, 1] = row, col
+        size += 1
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _put_inside(lattice, line, size, a, b):
+    """Put the centres of the cells on the path inside the parts of two cells to a line."""
+    free, factors, parts, side = lattice[0], lattice[1], lattice[3], lattice[9]
+    cols = free.shape[1]
+    room = np.empty(2 * side * side, np.int64)
+    # The path is listed from its second cell.
+    _, count = path_inside(free, factors, side, parts, b, a, room)
+    for k in range(count):
+        size = _put(line, size, room[k] // cols + 0.5, room[k] % cols + 0.5)
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _line_from(lattice, ends, ends_in, last, is_inside, before):
+    """Return the line through the nodes of a path."""
+    cols, side = lattice[0].shape[1], lattice[9]
+    cells, edges_of, to, edge_costs = lattice[4:8]
+    n, node = 0, last
+    while node >= 0:
+        n, node = n + 1, before[node]
+    line = np.empty((2 * side * side * (n + 2), 2))
+    size = _put(line, 0, ends[0, 0], ends[0, 1])
+    own = np.empty(2, np.int64)
+    for k in range(2):
+        own[k] = ends_in[k, 0] * cols + ends_in[k, 1]
+    if is_inside[0]:
+        size = _put_inside(lattice, line, size, own[0], np.int64(cells[last]))
+    node = last
+    while True:
+        size = _put(line, size, cells[node] // cols + 0.5, cells[node] % cols + 0.5)
+        following = before[node]
+        if following < 0:
+            break
+        first, count = edges_of[node]
+        for edge in range(first, first + count):
+            if to[edge] == following and edge_costs[edge] < 0:
+                a, b = np.int64(cells[node]), np.int64(cells[following])
+                size = _put_inside(lattice, line, size, a, b)
+        node = following
+    if is_inside[1]:
+        size = _put_inside(lattice, line, size, np.int64(cells[node]), own[1])
+    size = _put(line, size, ends[1, 0], ends[1, 1])
+    return line[:size].copy()
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def find_line(lattice, ends, ends_in, work):
+    """Find a line of little cost between two positions; return it, and the nodes expanded.
+
+    The line has no positions if there is no path. `FULL` in place of the number of nodes asks for
+    more room in the open list.
+
+    Parameters
+    ----------
+    lattice
+        `free`, `factors`, `nodes_of`, `parts`, `cells`, `edges_of`, `to`, `costs`,
+        `landmarks` and `side`, see `Lattice`.
+    ends
+        float64 (2, 2), start and goal.
+    ends_in
+        int64 (2, 2), (row, col) of the free cells that hold them.
+    work
+        Arrays of one query: float64 (nodes,) costs, int32 (nodes,) nodes before, int64 (nodes,)
+        marks, float64 (nodes,) that are infinite, int64 (entries, 2) the open list; and a number
+        above those of earlier queries with these arrays, > 0.
+    """
+    free, factors = lattice[:2]
+    nodes, costs = np.empty((2, 9 * _MOST_NODES), np.int64), np.empty((2, 9 * _MOST_NODES))
+    n, n_inside = _nodes_near(lattice, ends[0], ends_in[0], nodes[0], costs[0])
+    m, m_inside = _nodes_near(lattice, ends[1], ends_in[1], nodes[1], costs[1])
+    straight = np.inf
+    if math.hypot(ends[0, 0] - ends[1, 0], ends[0, 1] - ends[1, 1]) <= _NEAR:
+        straight = legal_cost(free, factors, ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1], np.inf)
+    starts, goals = (nodes[0, :n], costs[0, :n]), (nodes[1, :m], costs[1, :m])
+    last, expanded, is_full = _search(lattice, ends[0], starts, goals, straight, work)
+    if is_full:
+        return np.empty((0, 2)), FULL
+    if last >= 0:
+        line = _line_from(lattice, ends, ends_in, last, (n_inside, m_inside), work[1])
+        return line, expanded
+    if straight < np.inf:
+        return ends.copy(), expanded
+    return np.empty((0, 2)), expanded

@@ -1,5 +1,0 @@
-"""Paths of least cost: fields of several levels, and the costs between their border cells."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
