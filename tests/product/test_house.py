@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 44,
     "parameters of commands, shared ones once": 110,
-    "lines of tests": 56_300,
+    "lines of tests": 56_450,
 }
 
 

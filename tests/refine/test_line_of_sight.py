@@ -10,7 +10,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from hybridnav._base.kernels.exact import is_legal
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.maps import CellClass, OccupancyGrid
@@ -18,6 +17,8 @@ from hybridnav.maps.costs.integral import legal_cost, segment_cost
 from hybridnav.maps.files import load_map
 from hybridnav.refine.grid import LineOfSight
 from hybridnav.refine.kernels.arcs import round_bends
+from hybridnav.refine.kernels.segments import clear_segments
+from hybridnav.refine.kernels.taut import FREE
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points
 from tests.strategies import MAX_SIDE, class_grids, drawn, examples, framed, occupancy_grid
@@ -276,7 +277,7 @@ def test_one_walk_finds_what_two_do(ends: Any, seed: int, share: float) -> None:
         return
     cost = segment_cost(factors, *ends)
     found = legal_cost(free, factors, *ends, np.inf)
-    if not is_legal(free, *ends, 1, 1):
+    if not clear_segments(free * np.uint8(FREE), np.array([ends[:2]]), np.array([ends[2:]]))[0]:
         assert found == np.inf
         return
     assert found == pytest.approx(cost, rel=1e-12)

@@ -131,6 +131,7 @@ class OverLattice(Method):
         positions = line.settle(found.positions)
         seconds["settle"] = time.perf_counter() - now
         points = line.in_metres(positions, *query.points)
+        points = points if query.straight_m > 0 else points[:1]
         cost_m = max(cost_along(self._grid, self._layer, points), query.straight_m)
         passed = partial(self._passed, query, line, positions)
         return Found(passed, cost_m, query.straight_m, points, stats=stats)

@@ -119,7 +119,7 @@ class Lattice:
         for extra in range(int(self.nodes_of[:, 1].max(initial=0))):
             used[self.nodes_of[self.nodes_of[:, 1] > extra, 0] + extra] = True
         nodes = np.flatnonzero(used)
-        order = nodes[np.argsort(self.cells[nodes])]
+        order = nodes[np.argsort(self.cells[nodes], kind="stable")]
         table = costs_from_landmarks(self.edges_of, self.to, self.costs, order, _LANDMARKS)
         return replace(self, landmarks=table)
 

@@ -14,8 +14,10 @@ from hybridnav.search.lattice.kernels.build import path_inside
 
 _NEAR = 12
 """Cells up to which the straight line between both ends is tried."""
-_UNITS = 1024.0
+_UNITS = 256.0
 """Units of a cell in keys of the open list; of equal keys, the lower cell comes first."""
+_MOST = 2.0**31 - 1
+"""Largest key, in units: costs above it are searched in any order."""
 _MOST_NODES = 8
 """Most parts of a block of 16 cells."""
 FULL = -1
@@ -130,14 +132,14 @@ def _search(lattice, start, starts, goals, most, work):
         cost[node], before[node], mark[node] = first, -1, opened
         row, col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
         left = _cost_left(landmarks, towards, node, row - start[0], col - start[1])
-        key = np.int64((first + left) * _UNITS)
+        key = np.int64(min((first + left) * _UNITS, _MOST))
         push(heap, size, key << 32 | cells[node], node)
         size += 1
     while size > 0:
         key = heap[0, 0] >> 32
         node = pop(heap, size)
         size -= 1
-        if key >= most * _UNITS:  # nothing that is left is cheaper
+        if key >= min(most * _UNITS, _MOST + 1):  # nothing that is left is cheaper
             break
         if mark[node] == closed:
             continue
@@ -162,7 +164,8 @@ def _search(lattice, start, starts, goals, most, work):
                 )
                 if least < most:
                     cost[other], before[other], mark[other] = whole, node, opened
-                    push(heap, size, np.int64(least * _UNITS) << 32 | cells[other], other)
+                    key = np.int64(min(least * _UNITS, _MOST))
+                    push(heap, size, key << 32 | cells[other], other)
                     size += 1
     # Leave the work arrays as they were.
     for k in range(len(starts[0])):
