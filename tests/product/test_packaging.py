@@ -8,7 +8,6 @@ import shutil
 import struct
 import subprocess
 import sys
-import tarfile
 import zipfile
 import zlib
 from importlib.metadata import distribution
@@ -321,8 +320,7 @@ def test_the_unpacked_wheel_finds_its_presets_and_maps(wheel, tmp_path):
 
 def test_a_wheel_made_from_the_source_distribution_is_the_same(wheel, tmp_path):
     source = _build(ROOT, "sdist", tmp_path / "sdist")
-    with tarfile.open(source) as archive:
-        archive.extractall(tmp_path, filter="data")
+    shutil.unpack_archive(source, tmp_path)
     (folder,) = (path.parent for path in tmp_path.glob("*/pyproject.toml"))
     again = _build(folder, "wheel", tmp_path / "wheel")
     with zipfile.ZipFile(wheel) as first, zipfile.ZipFile(again) as second:

@@ -214,5 +214,6 @@ def test_arcs_cost_at_most_a_two_hundredth_more(field: Field, seed: int) -> None
             arcs = finish.arcs(points, radius_m=radius_m)
             assert arcs.cost_m <= field.cost(points[:, ::-1]) * 1.005 * (1 + 1e-9)
             assert (arcs.points[[0, -1]] == points[[0, -1]]).all()
-            assert arcs.length_m <= arcs.cost_m * (1 + 1e-9)
+            # Costs are those of positions on the grain.
+            assert arcs.length_m <= arcs.cost_m * (1 + 1e-9) + 2.0**-24 * len(arcs.points)
             assert len(arcs.headings_rad) == len(arcs.points)

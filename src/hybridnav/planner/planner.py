@@ -154,7 +154,7 @@ class HybridPlanner:
         """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
         return self._now.needs_headings
 
-    def plan(
+    def plan(  # noqa: PLR0913 - all but two have defaults
         self,
         start: ArrayLike | str,
         goal: ArrayLike | str,
@@ -162,6 +162,7 @@ class HybridPlanner:
         smooth: Smooth | None = None,
         blocked: Closable | ClosedCells | None = None,
         at: At = "anywhere",
+        keep: PlanResult | None = None,
     ) -> PlanResult:
         """Plan a path between two points, or rooms.
 
@@ -186,6 +187,10 @@ class HybridPlanner:
         at
             Position in a named room: `"anywhere"`, at the cells that make the cell path shortest,
             or at its `"point"`.
+        keep
+            With method `cheapest`: an earlier result, on whose path the robot stays. From `start`
+            beside it, its rest is returned, while no cell of it is closed and it costs little more
+            than a new path: 2 %, or `keep_within` of the preset. For another goal nothing is kept.
 
         Returns
         -------
@@ -196,11 +201,12 @@ class HybridPlanner:
         ------
         InvalidValueError
             When a point is not two or three finite numbers, a name is not known, a closed item is
-            not on the map, or `smooth` is `"arcs"` and the planner plans by lengths.
+            not on the map, `smooth` is `"arcs"` and the planner plans by lengths, or `keep` is
+            given to another method than `cheapest`.
         """
         with self._query():
             now = self._now
-            return now.plan(now.read(start, goal, smooth, blocked, at))
+            return now.plan(now.read(start, goal, smooth, blocked, at, keep))
 
     def _query(self) -> AbstractContextManager[bool]:
         """Return the lock to hold while the map and the costs must stay as they are."""

@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path, PlanResult, PlanStatus
 from hybridnav.planner.batch import plan_many
@@ -20,7 +21,7 @@ from hybridnav.planner.endpoints import cells_of_endpoints, check_at, no_places,
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
-from hybridnav.search.found import ClosedCells, Query
+from hybridnav.search.found import ClosedCells, KeptLine, Query
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -56,6 +57,8 @@ class PlanRequest(NamedTuple):
     """Cells that are closed for this query; None for none."""
     goal: ArrayLike | str
     """The goal as it was given."""
+    kept: KeptLine | None
+    """The line to stay on; None for none."""
     began: float
     """The time at which reading began, of `time.perf_counter`."""
 
@@ -89,13 +92,14 @@ class Planning:
 
     # Reading: names to points, closures to cells.
 
-    def read(
+    def read(  # noqa: PLR0913, PLR0917 - as `HybridPlanner.plan`
         self,
         start: ArrayLike | str,
         goal: ArrayLike | str,
         smooth: Smooth | None,
         blocked: Closable | ClosedCells | None,
         at: At,
+        keep: PlanResult | None = None,
     ) -> PlanRequest:
         """Read a query; see `HybridPlanner.plan`."""
         began, waypoint = time.perf_counter(), goal
@@ -106,7 +110,23 @@ class Planning:
         turns = self.needs_headings
         first = read_end("start", start, needs_heading=turns)
         last = read_end("goal", goal, needs_heading=turns)
-        return PlanRequest((first, last), self._checked(smooth), closed, waypoint, began)
+        kept = None if keep is None else self._kept(keep, last)
+        return PlanRequest((first, last), self._checked(smooth), closed, waypoint, kept, began)
+
+    def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
+        """Return the line of a result, None if it ends elsewhere or there is none."""
+        planner = self.preset.planner
+        if planner.method != "cheapest":
+            raise InvalidValueError(
+                f"keep goes with presets of method cheapest, such as robot, and this is "
+                f"{self.preset.name}"
+            )
+        points = checked_type("keep", keep, PlanResult).line
+        if points is None and keep.path is not None and not keep.path.is_curved:
+            points = keep.path.points
+        if points is None or len(points) == 1 or not np.array_equal(points[-1], goal[:2]):
+            return None
+        return KeptLine(points, planner.keep_within)
 
     @property
     def needs_headings(self) -> bool:
@@ -174,7 +194,7 @@ class Planning:
 
     def query(self, request: PlanRequest) -> Query | PlanStatus:
         """Return the query for the method, or the status that refuses start or goal."""
-        poses, _, closed, *_ = request
+        poses, _, closed, _, kept, _ = request
         points, allowed = (poses[0][:2], poses[1][:2]), self.preset.planner.allow_unexplored
         cells = cells_of_endpoints(self.grid, points, allow_unexplored=allowed)
         if isinstance(cells, PlanStatus):
@@ -182,7 +202,7 @@ class Planning:
         shut = self.closed_for_all(closed)
         if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
             return refused
-        return Query(cells, points, closed)
+        return Query(cells, points, closed, kept)
 
     # Planning: a path found by the method, then refined.
 
@@ -288,8 +308,10 @@ class Planning:
             length_m = polyline_length(points)
             path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
         bound = self._cost_bound(query, cost_m)
-        metric = self.method.metric
-        return self._solved(request, found, path, bound, metric=metric, weighted_cost=cost_m)
+        metric, weighted = self.method.metric, cost_m
+        return self._solved(
+            request, found, path, bound, metric=metric, weighted_cost=weighted, line=points
+        )
 
     def _bound(self, query: Query, found: Found, cost_m: float) -> float | Callable[[], float]:
         """Return the bound of a path, or how to find it where it takes a search of its own."""

@@ -19,6 +19,7 @@ from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from hybridnav._base.typing import FloatArray
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
 
@@ -118,6 +119,9 @@ class PlanResult:
     """Goal of the plan, like `start`."""
     grid_bound: float | None = None
     """Proved bound on the cost of all paths of cells, metres, of an any-angle path by costs."""
+    line: FloatArray | None = field(default=None, repr=False)
+    """float64 (m, 2), the straight lines of a path by method `cheapest` before its bends were
+    rounded, `(x, y)` in metres, map frame; None of other paths."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
 
@@ -125,8 +129,8 @@ class PlanResult:
     def lower_bound(self) -> float:
         """A proved bound on the optimum in the metric, metres; infinite where there is no path.
 
-        That of an any-angle path by costs is found when it is read first, in the time of a search
-        of cells without preparation: see `search.lattice.cost_bound`.
+        That of an any-angle path by costs is found when it is read first, in tens of milliseconds
+        on maps of buildings: see `search.lattice.cost_bound`.
         """
         source = self.bound_source
         return source() if callable(source) else source

@@ -247,6 +247,9 @@ class CheapestSettings(_ByCosts):
     """
 
     method: Literal["cheapest"] = "cheapest"
+    keep_within: Annotated[_Float, Field(ge=0, le=1e3)] = 0.02
+    """Most that the rest of a path which is kept may cost more than a new one, as a part of it; see
+    `HybridPlanner.plan`."""
 
     @model_validator(mode="before")
     @classmethod

@@ -138,6 +138,34 @@ class CostLine:
         found: FloatArray = kernels.settle(self.free, self.factors, path)[0]
         return found
 
+    def rest_of(self, line: FloatArray, start: FloatArray, most_m: float) -> FloatArray | None:
+        """Return the rest of a line from a point beside it.
+
+        Parameters
+        ----------
+        line
+            float64 (n, 2), n >= 2, `(x, y)` in metres, map frame, as `shorten` returns it.
+        start
+            `(x, y)` in metres, in a cell that may be entered.
+        most_m
+            Largest cost in metres.
+
+        Returns
+        -------
+        FloatArray
+            float64 (m, 2), `(x, y)` in metres: `start`, and the points of the line from the first
+            one that it sees; None where a segment may not be driven, or it costs more.
+        """
+        here, most = self.on_grain(np.array([start]))[0], most_m / self._frame.resolution_m
+        rest = kernels.rest_of(self.free, self.factors, self.on_grain(line), here, most)
+        return self.in_metres(rest, start, line[-1]) if len(rest) else None
+
+    def on_grain(self, points: FloatArray) -> FloatArray:
+        """Return the positions of points, on the grain of exact tests; what lies on the rim of the
+        map stays there."""
+        line = np.rint(self._frame.positions_of(points) * _GRAIN) / _GRAIN
+        return np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
+
     def in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return the points of positions, the first and last being exact."""
         points = self._frame.points_of_grid(line)
@@ -165,9 +193,7 @@ class CostLine:
         """
         if len(points) == 1:
             return ArcLine(points, np.zeros(1), 0.0, 0.0)
-        line = np.rint(self._frame.positions_of(points) * _GRAIN) / _GRAIN
-        # Points on the rim of the map stay there.
-        line = np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
+        line = self.on_grain(points)
         per_cell = self._frame.resolution_m
         spare = _SPARE * kernels.cost_of(self.factors, line)
         found, ahead, cost, length = round_bends(

@@ -91,6 +91,15 @@ class ClosedCells:
         return bool(self.holds(flat).any())
 
 
+class KeptLine(NamedTuple):
+    """A line that an answer stays on while it may be driven, and costs little more than another."""
+
+    points: FloatArray
+    """float64 (n, 2), n >= 2, `(x, y)` in metres, map frame, to the goal."""
+    within: float
+    """Most that it may cost more, as a part of the cost of the other."""
+
+
 class Query(NamedTuple):
     """One query: two cells that may be entered, points in them, and what is closed for it."""
 
@@ -100,6 +109,8 @@ class Query(NamedTuple):
     """float64 (2,) each, start and goal, `(x, y)` in metres, map frame."""
     closed: ClosedCells | None = None
     """Closed cells, not including start and goal; None for none."""
+    kept: KeptLine | None = None
+    """The line to stay on, for method `cheapest`; None for none."""
 
     @property
     def straight_m(self) -> float:

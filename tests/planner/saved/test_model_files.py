@@ -448,8 +448,8 @@ class InPieces:
     def __getattr__(self, name):
         return getattr(self.file, name)
     def write(self, content):
-        for at in range(0, len(content), 1 << 12):
-            counted(self.file.write)(content[at : at + (1 << 12)])
+        for at in range(0, len(content), 1 << 11):
+            counted(self.file.write)(content[at : at + (1 << 11)])
             self.file.flush()
 
 opened = pathlib.Path.open

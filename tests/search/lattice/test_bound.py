@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
+import hybridnav as hn
+from hybridnav.refine import CostLine
+from hybridnav.refine.kernels.cost_line import cost_of
 from hybridnav.search.lattice import LatticeSearch, build_lattice, cost_bound
+from tests.layers import layer_of
 from tests.oracle.any_angle_cost import SidePoints
 from tests.search.lattice.scenes import SEEDS, Field, fields, settled
 from tests.strategies import MAX_SIDE, examples
@@ -46,12 +51,15 @@ def test_no_path_costs_less(field: Field, seed: int) -> None:
     if line.positions is not None:  # the oracle's path is not quite the cheapest
         least = min(least, field.cost(settled(field, line.positions)))
     start, goal = map(tuple, ends.tolist())
-    bound = cost_bound(field.free.view(np.uint8), field.factors, (start, goal), own)
-    assert bound <= least * (1 + 1e-9) + 1e-6
-    assert bound >= math.dist(*ends)
+    free, known = field.free.view(np.uint8), least * rng.choice([1.0001, 1.02, 1.3, 3]) + 1e-6
+    factors = layer_of(field.factors).factors  # rounded, as costs of paths are counted
+    loose = cost_bound(free, factors, (start, goal), own)
+    bound = cost_bound(free, factors, (start, goal), own, known)
+    assert max(bound, loose) <= least * (1 + 1e-9) + 1e-6
+    assert bound >= min(math.dist(*ends), known)
     if math.isfinite(bound):
-        known = cost_bound(field.free.view(np.uint8), field.factors, (start, goal), own, bound / 2)
-        assert known == pytest.approx(bound / 2, abs=1e-9)
+        half = cost_bound(free, factors, (start, goal), own, loose / 2)
+        assert half == pytest.approx(loose / 2, abs=1e-9)
 
 
 def test_an_end_that_rounding_moved_over_a_side_has_the_factor_of_its_own_cell() -> None:
@@ -72,6 +80,39 @@ def test_it_is_tight_along_the_lines_of_the_grid() -> None:
     assert bound_of(free, factors, ((2, 3), (2, 17))) == pytest.approx(3 * 14 / 1.0823922)
     assert bound_of(free, factors, ((2, 3), (2, 17)), known=20) == 20
     assert bound_of(free, factors, ((2, 3), (2, 3))) == 0
+
+
+def office_fields() -> Any:
+    """Free cells and costs of the office, and pairs of positions in it."""
+    grid = hn.load_map(Path("maps/office/office.yaml"), robot_radius_m=0.25)
+    line = CostLine(grid, hn.CostLayer.clearance(grid))
+    cells = np.argwhere(line.free)
+    return line, np.random.default_rng(3).choice(cells, (12, 2)) + 0.5
+
+
+def test_it_is_near_the_cost_of_good_paths_in_a_building() -> None:
+    line, pairs = office_fields()
+    search = LatticeSearch(build_lattice(line.free.view(bool), line.factors))
+    gaps = []
+    for start, goal in pairs:
+        path = line.settle(search.line(tuple(start), tuple(goal)).positions)
+        cost = cost_of(line.factors, path)
+        gaps.append(cost / bound_of(line.free, line.factors, (start, goal), known=cost) - 1)
+    assert np.mean(gaps) < 0.02
+    assert max(gaps) < 0.04
+
+
+def test_a_known_path_that_is_too_dear_costs_little() -> None:
+    """The bound is on all paths, whatever is known; a dear one only widens the search."""
+    line, pairs = office_fields()
+    start, goal = pairs[0]
+    search = LatticeSearch(build_lattice(line.free.view(bool), line.factors))
+    cost = cost_of(line.factors, line.settle(search.line(tuple(start), tuple(goal)).positions))
+    bounds = [
+        bound_of(line.free, line.factors, (start, goal), known=share * cost) for share in (1, 1.5)
+    ]
+    assert bounds[1] <= cost
+    assert bounds[1] > 0.95 * bounds[0]
 
 
 def test_walls_raise_it() -> None:

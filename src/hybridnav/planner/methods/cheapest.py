@@ -133,7 +133,13 @@ class OverLattice(Method):
         points = line.in_metres(positions, *query.points)
         points = points if query.straight_m > 0 else points[:1]
         cost_m = max(cost_along(self._grid, self._layer, points), query.straight_m)
-        passed = partial(self._passed, query, line, positions)
+        if query.kept is not None and len(points) > 1:
+            most_m = (1 + query.kept.within) * cost_m
+            rest = line.rest_of(query.kept.points, query.points[0], most_m)
+            if rest is not None:
+                points, cost_m = rest, cost_along(self._grid, self._layer, rest)
+                cost_m = max(cost_m, query.straight_m)
+        passed = partial(self._passed, query, line, points)
         return Found(passed, cost_m, query.straight_m, points, stats=stats)
 
     def _position_in(self, cell: tuple[int, int], point: FloatArray) -> tuple[float, float]:
@@ -145,9 +151,9 @@ class OverLattice(Method):
         )
         return row, col
 
-    def _passed(self, query: Query, line: CostLine, positions: FloatArray) -> LongArray:
+    def _passed(self, query: Query, line: CostLine, points: FloatArray) -> LongArray:
         """Return the cells that a path passes, from start to goal."""
-        passed = cells_of_line(line.free.view(np.bool_), positions)
+        passed = cells_of_line(line.free.view(np.bool_), line.on_grain(points))
         # For an end on a side, the cell behind the side may be listed.
         parts = [passed]
         if tuple(passed[0].tolist()) != query.cells[0]:

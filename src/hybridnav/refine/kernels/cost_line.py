@@ -36,6 +36,8 @@ _STILL = 0.02
 _HALVES, _SOLVED, _TRIES = 2, 5, 16
 """Times that a step is tried because it leads off free cells. In the first ones points there make
 half of their way, later none; in the last ones the others are not solved for anew."""
+_NEAR = 1.0
+"""Cells from a start within which no bend of a line is aimed at."""
 _SLACK = 1e-13
 """Rounding of a sum of costs, relative: of equal costs, the longer segment is taken."""
 _WORSE = 0.01
@@ -346,3 +348,52 @@ def settle(free, factors, path):
     if least > whole:
         return path.copy(), whole, whole
     return best, least, whole
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def rest_of(free, factors, line, start, most):
+    """Return the rest of a line from a position beside it; without rows where it has a segment that
+    is not legal, or costs more than some cost.
+
+    Parameters
+    ----------
+    free
+        uint8 (rows, cols), 1 where a cell may be entered.
+    factors
+        float32 (rows, cols), >= 1.
+    line
+        float64 (n, 2), n >= 2, positions on the map.
+    start
+        float64 (2,), the position.
+    most
+        The cost, in cells.
+    """
+    row, col = start
+    nearest, ahead = np.inf, 1
+    for k in range(1, line.shape[0]):
+        down, across = line[k, 0] - line[k - 1, 0], line[k, 1] - line[k - 1, 1]
+        to_row, to_col = row - line[k - 1, 0], col - line[k - 1, 1]
+        share = (to_row * down + to_col * across) / (down * down + across * across)
+        share = min(max(share, 0.0), 1.0)
+        apart = math.hypot(to_row - share * down, to_col - share * across)
+        if apart < nearest:
+            nearest, ahead = apart, k
+    # Not to a bend close by, which would turn the robot; and past one that is out of sight.
+    first, last, total = ahead, line.shape[0] - 1, np.inf
+    while first < last and math.hypot(line[first, 0] - row, line[first, 1] - col) < _NEAR:
+        first += 1
+    total = legal_cost(free, factors, row, col, line[first, 0], line[first, 1], most)
+    while first < last and total == np.inf:
+        first += 1
+        total = legal_cost(free, factors, row, col, line[first, 0], line[first, 1], most)
+    for k in range(first + 1, last + 1):
+        total += legal_cost(
+            free, factors, line[k - 1, 0], line[k - 1, 1], line[k, 0], line[k, 1], most
+        )
+    if total > most:
+        return np.empty((0, 2))
+    rest = np.empty((last - first + 2, 2))
+    rest[0] = start
+    rest[1:] = line[first:]
+    return rest

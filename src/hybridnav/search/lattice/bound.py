@@ -7,29 +7,46 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search.lattice.kernels.bound import least_over_corners
+from hybridnav.search.lattice.kernels import bound as kernels
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
-    from hybridnav._base.typing import AnyArray
+    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
+
+    Position = tuple[float, float]
+    Cell = tuple[int, int]
 
 _RATIO = math.sqrt(4 - 2 * math.sqrt(2))
 """Most by which a path over corners is dearer than one at any angle, 1.0824."""
+_MOST = 2.0**40
+"""Cost from which on nothing is searched, in cells."""
+_LEAST, _ITERATIONS, _EFFORT = 64, 256, 2**22
+"""Most iterations, and most cells in all of them together."""
+_ENOUGH = 0.99
+"""Part of the cost of the known path that no bound need exceed."""
+_ROUNDING = 1e-9
+_CORNERS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
 
 
 def cost_bound(
     free: AnyArray,
     factors: AnyArray,
-    ends: tuple[tuple[float, float], tuple[float, float]],
-    cells: tuple[tuple[int, int], tuple[int, int]],
+    ends: tuple[Position, Position],
+    cells: tuple[Cell, Cell],
     known: float = math.inf,
 ) -> float:
     """Return a lower bound on the cost of all paths between two positions, in cells.
 
-    Between two corners of cells, the cheapest path along sides and diagonals of cells is at most
-    1.0824 times as dear as the cheapest at any angle, whatever the factors are; a move along a side
-    costs the smaller factor of its two cells. Start and goal are joined to corners of their cells.
+    A *potential*, a function that nowhere rises by more than the factor, is a bound by itself: no
+    path costs less than the potential rises from its start to its goal. One that is linear on four
+    triangles a cell is found by fast marching from both ends, and then raised by a primal-dual
+    iteration; where it is still too steep, the excess is subtracted. It covers the cells over which
+    a path may cost less than the known one. Paths that leave them cost more: between two corners of
+    cells, the cheapest path along sides and diagonals is at most 1.0824 times as dear as the
+    cheapest at any angle, whatever the factors are; along a side the smaller factor of its two
+    cells counts.
 
     Parameters
     ----------
@@ -42,7 +59,8 @@ def cost_bound(
     cells
         The free cells (row, col) that hold them.
     known
-        Cost of a path; a bound above it is of no use.
+        Cost of a path; a bound above it is of no use. Without one, the bound is that of sides and
+        diagonals alone.
 
     Returns
     -------
@@ -57,8 +75,9 @@ def cost_bound(
     --------
     >>> from hybridnav.search.lattice import cost_bound
     >>> free, factors = np.ones((9, 9), np.uint8), np.full((9, 9), 2, np.float32)
-    >>> round(cost_bound(free, factors, ((0, 0), (9, 9)), ((0, 0), (8, 8))), 3)
-    23.518
+    >>> ends, cells = ((0, 0), (9, 4)), ((0, 0), (8, 3))
+    >>> 19.3 < cost_bound(free, factors, ends, cells, 20) < 19.7  # the line costs 19.70
+    True
     """
     corners: list[Any] = []
     joins = 0.0
@@ -66,5 +85,59 @@ def cost_bound(
         corner = round(row), round(col)
         joins += float(factors[tuple(cell)]) * math.dist((row, col), corner)
         corners.append(np.array(corner, dtype=np.int64))
-    over_corners: float = least_over_corners(free, factors, *corners, (known + joins) * _RATIO)
-    return min(max(over_corners / _RATIO - joins, math.dist(*ends)), known)
+    most = int(min((known + joins) * _RATIO, _MOST) * kernels.UNITS)
+    nothing = np.empty(0, np.int64)
+    forth = kernels.costs_over_corners(free, factors, *corners, most, nothing)
+    over_corners = int(forth[corners[1] @ (free.shape[1] + 1, 1)])
+    if over_corners > most:
+        return known
+    found = over_corners / kernels.UNITS / _RATIO - joins
+    if math.isfinite(known):
+        back = kernels.costs_over_corners(free, factors, *corners[::-1], most, forth)
+        band = kernels.band_of(free, forth, back, most)
+        found = max(
+            found, _proved(factors, band, (forth, back), list(zip(ends, cells, strict=True)), known)
+        )
+    return min(max(found, math.dist(*ends)), known)
+
+
+def _proved(
+    factors: AnyArray,
+    band: tuple[LongArray, LongArray, LongArray],
+    costs: tuple[LongArray, LongArray],
+    ends: Sequence[tuple[Position, Cell]],
+    known: float,
+) -> float:
+    """Return the bound of a potential on some cells, on paths that stay in them."""
+    flat, corners, flat_corners = band
+    flat_ends = [row * factors.shape[1] + col for _, (row, col) in ends]
+    own = np.searchsorted(flat, flat_ends)
+    if len(flat) == 0 or (flat.take(own, mode="clip") != flat_ends).any():
+        return 0.0
+    of_cells = factors.ravel()[flat].astype(np.float64)
+    waves, joints = [], np.empty((2, 5))
+    for k, (from_end, (position, cell)) in enumerate(zip(costs, ends, strict=True)):
+        inside = np.clip(np.subtract(position, cell), 0.0, 1.0)
+        wave = np.full(len(flat_corners), np.inf)
+        wave[corners[own[k]]] = of_cells[own[k]] * np.hypot(*(_CORNERS - inside).T)
+        order = np.argsort(from_end[flat_corners[corners]].min(axis=1), kind="stable")
+        kernels.march(corners, of_cells, order, wave)
+        waves.append(wave)
+        joints[k] = own[k], *_weights_of(inside)
+    potential = 0.5 * (waves[0] - waves[1])
+    iterations = min(_ITERATIONS, max(_LEAST, _EFFORT // len(flat)))
+    found: float = kernels.raise_potential(
+        corners, of_cells, potential, joints, iterations, _ENOUGH * known
+    )
+    return found * (1 - _ROUNDING) - _ROUNDING
+
+
+def _weights_of(inside: FloatArray) -> tuple[int, float, float, float]:
+    """Return the side whose triangle holds a position in a cell, and the weights of the middle and
+    of the corners of the side there."""
+    down, across = (2 * inside - 1).tolist()
+    if abs(down) >= abs(across):
+        side, inward, along = int(down > 0), abs(down), across
+    else:
+        side, inward, along = 2 + int(across > 0), abs(across), down
+    return side, 1 - inward, 0.5 * (inward - along), 0.5 * (inward + along)

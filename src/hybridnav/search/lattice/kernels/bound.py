@@ -1,6 +1,8 @@
-"""The kernel of a lower bound on the cost of all paths between two positions.
+"""Kernels of a lower bound on the cost of all paths between two positions.
 
-Positions are (row, col) in grid units. A *corner* is a lattice point where four cells meet.
+Positions are (row, col) in grid units. A *corner* is a lattice point where four cells meet. Each
+cell is cut into four triangles by its middle; the corners of a cell are numbered 0 to 3, row by
+row, and its *sides* as in `_SIDES`.
 """
 
 import math
@@ -10,13 +12,23 @@ import numpy as np
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
 
-_UNITS = 2.0**20
+UNITS = 2.0**20
 """Units of a cell in costs, which are rounded down."""
 _FAR = 1 << 62
 _DOWN = np.array([0, 0, -1, 1, -1, -1, 1, 1], np.int64)
 _ACROSS = np.array([-1, 1, 0, 0, -1, 1, -1, 1], np.int64)
 _STRAIGHT = 4
 """The first so many moves run along the side of two cells, the others through one cell."""
+_SIDES = np.array([[0, 1], [2, 3], [0, 2], [1, 3]], np.int64)
+"""Corners of the sides of a cell: above, below, left, right."""
+_SWEEPS = 3
+_STEP, _FORCE = 0.5 / math.sqrt(26.0), 2.0 / math.sqrt(26.0)
+"""Step lengths of the iteration; with 20 for 26 it diverges on maps of buildings."""
+_ROUND = 16
+"""Iterations from one look at all cells, and at the bound, to the next."""
+_SLACK = 0.98
+"""Part of its factor up to which a cell without force is left out until the next look."""
+_LONGEST = math.sqrt(2.0) * (1 + 1e-12)
 
 
 @njit(cache=True, nogil=True)
@@ -39,10 +51,11 @@ def _factor_of_move(free, factors, row, col, move):
 
 @guarded
 @njit(cache=True, nogil=True)
-def least_over_corners(free, factors, start, goal, most):
-    """Return the least cost of paths over corners between two of them, in cells, rounded down.
+def costs_over_corners(free, factors, start, goal, most, known):
+    """Return the costs of paths over corners from one of them, in units of 2^-20, rounded down.
 
-    A* with the octile distance. Infinite if there is no such path; `most` if all cost more.
+    A* whose open list is emptied up to a limit. Costs are exact where they and the cost left add up
+    to the limit or less; elsewhere they are exact or too high.
 
     Parameters
     ----------
@@ -53,16 +66,18 @@ def least_over_corners(free, factors, start, goal, most):
     start, goal
         int64 (2,), (row, col) of the corners.
     most
-        Cost from which on nothing is searched, in cells.
+        The limit, in units.
+    known
+        int64 (corners,), such costs from the goal to the same limit, which are the cost left; empty
+        for the octile distance.
     """
     cols = free.shape[1] + 1
-    straight, diagonal = np.int64(_UNITS), np.int64(_UNITS * math.sqrt(2.0))
+    straight, diagonal = np.int64(UNITS), np.int64(UNITS * math.sqrt(2.0))
     cost = np.full((free.shape[0] + 1) * cols, _FAR, np.int64)
     heap, size = np.empty((1024, 2), np.int64), 1
-    at, goal_at = start[0] * cols + start[1], goal[0] * cols + goal[1]
+    at = start[0] * cols + start[1]
     cost[at] = 0
     heap[0, 0], heap[0, 1] = 0, at
-    limit = np.int64(min(most, 2.0**40) * _UNITS)
     while size > 0:
         key = heap[0, 0]
         at = pop(heap, size)
@@ -70,12 +85,12 @@ def least_over_corners(free, factors, start, goal, most):
         row, col = at // cols, at % cols
         down, across = abs(row - goal[0]), abs(col - goal[1])
         left = abs(down - across) * straight + min(down, across) * diagonal
+        if known.size > 0:
+            left = known[at]
         if key > cost[at] + left:  # reached more cheaply since
             continue
-        if key > limit:
-            return most
-        if at == goal_at:
-            return cost[at] / _UNITS
+        if key > most:
+            break
         if size + _DOWN.size > heap.shape[0]:
             larger = np.empty((2 * heap.shape[0], 2), np.int64)
             larger[:size] = heap[:size]
@@ -85,13 +100,248 @@ def least_over_corners(free, factors, start, goal, most):
             if factor == np.inf:
                 continue
             length = 1.0 if move < _STRAIGHT else math.sqrt(2.0)
-            whole = cost[at] + np.int64(factor * length * _UNITS)
+            whole = cost[at] + np.int64(factor * length * UNITS)
             to_row, to_col = row + _DOWN[move], col + _ACROSS[move]
             to = to_row * cols + to_col
             if whole < cost[to]:
-                cost[to] = whole
+                # Of two costs that are known the sum may not overflow.
                 down, across = abs(to_row - goal[0]), abs(to_col - goal[1])
                 left = abs(down - across) * straight + min(down, across) * diagonal
-                push(heap, size, whole + left, to)
-                size += 1
-    return np.inf
+                if known.size > 0:
+                    left = known[to]
+                if whole + left <= most:
+                    cost[to] = whole
+                    push(heap, size, whole + left, to)
+                    size += 1
+    return cost
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def band_of(free, forth, back, most):
+    """Return the free cells with a corner over which a path may cost less than a limit.
+
+    Parameters
+    ----------
+    free
+        uint8 (rows, cols), 1 where a cell may be entered.
+    forth, back
+        int64 (corners,), costs over corners from start and goal, exact up to the limit.
+    most
+        The limit, in the units of the costs.
+
+    Returns
+    -------
+    tuple
+        int64 (n,), the flat cells, ascending; int64 (n, 4), their corners, numbered from 0; and
+        int64 (n_corners,), the flat corner of each number.
+    """
+    rows, cols = free.shape
+    number = np.full(forth.size, -1, np.int64)
+    cells, corners = np.empty(1024, np.int64), np.empty((1024, 4), np.int64)
+    n_cells, n_corners = 0, 0
+    for row in range(rows):
+        for col in range(cols):
+            if free[row, col] == 0:
+                continue
+            is_near = False
+            for k in range(4):
+                at = (row + k // 2) * (cols + 1) + col + k % 2
+                if forth[at] < _FAR and back[at] < _FAR and forth[at] + back[at] < most:
+                    is_near = True
+                    break
+            if not is_near:
+                continue
+            if n_cells == cells.size:
+                cells = np.concatenate((cells, np.empty_like(cells)))
+                corners = np.concatenate((corners, np.empty_like(corners)))
+            cells[n_cells] = row * cols + col
+            for k in range(4):
+                at = (row + k // 2) * (cols + 1) + col + k % 2
+                if number[at] < 0:
+                    number[at] = n_corners
+                    n_corners += 1
+                corners[n_cells, k] = number[at]
+            n_cells += 1
+    flat = np.empty(n_corners, np.int64)
+    for at in range(number.size):
+        if number[at] >= 0:
+            flat[number[at]] = at
+    return cells[:n_cells].copy(), corners[:n_cells].copy(), flat
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def march(corners, factors, order, costs):
+    """Find the costs of corners from one end, about: the upwind scheme of fast marching.
+
+    Parameters
+    ----------
+    corners
+        int64 (n, 4), corners of the cells.
+    factors
+        float64 (n,), factors of the cells.
+    order
+        int64 (n,), the cells as a wave from the end reaches them.
+    costs
+        float64 (n_corners,), those of the corners of the cell of the end, infinite elsewhere;
+        written.
+    """
+    for _ in range(_SWEEPS):
+        for cell in order:
+            factor = factors[cell]
+            for k in range(4):
+                # Over the two corners beside it, or straight through the cell.
+                first, second = costs[corners[cell, k ^ 1]], costs[corners[cell, k ^ 2]]
+                found = costs[corners[cell, k ^ 3]] + math.sqrt(2.0) * factor
+                apart = abs(first - second)
+                if apart < factor:
+                    over = 0.5 * (first + second + math.sqrt(2 * factor * factor - apart * apart))
+                else:  # infinite less infinite too
+                    over = min(first, second) + factor
+                found = min(found, over)
+                if found < costs[corners[cell, k]]:
+                    costs[corners[cell, k]] = found
+
+
+@njit(cache=True, nogil=True)
+def _value(potential, middles, corners, end):
+    """Return a potential at one end: its cell, side, and the weights of three corners."""
+    cell, side = int(end[0]), int(end[1])
+    value = end[2] * middles[cell]
+    for k in range(2):
+        value += end[3 + k] * potential[corners[cell, _SIDES[side, k]]]
+    return value
+
+
+@njit(cache=True, nogil=True)
+def _steepest(corners, factors, potential, middles, steepness):
+    """Find how steep a potential is in each cell, as a part of the factor; return the most."""
+    most = 0.0
+    for cell in range(factors.size):
+        squared = 0.0
+        for side in range(4):
+            first = potential[corners[cell, _SIDES[side, 0]]]
+            second = potential[corners[cell, _SIDES[side, 1]]]
+            along, inward = second - first, 2 * middles[cell] - first - second
+            squared = max(squared, along * along + inward * inward)
+        steepness[cell] = math.sqrt(squared) / factors[cell]
+        most = max(most, steepness[cell])
+    return most
+
+
+@njit(cache=True, nogil=True)
+def _proved(factors, steepness, most, rise):
+    """Return the bound that a potential proves, whichever share of it proves most.
+
+    A potential that is nowhere steeper than the factor bounds the cost of all paths by its rise
+    from start to goal. Where it is, the excess counts for the longest line in the cell: a cheapest
+    path spends no more in a cell than a straight line through it would cost.
+    """
+    # The bound is concave in the share: thirds close in on its maximum.
+    low, high = 0.9 / max(most, 1e-9), 1.1
+    best = 0.0
+    for _ in range(24):
+        shares = (2 * low + high) / 3, (low + 2 * high) / 3
+        spent = np.zeros(2)
+        for cell in range(factors.size):
+            for k in range(2):
+                spent[k] += max(shares[k] * steepness[cell] - 1, 0.0) * factors[cell]
+        first = shares[0] * rise - _LONGEST * spent[0]
+        second = shares[1] * rise - _LONGEST * spent[1]
+        best = max(best, first, second)
+        if first < second:
+            low = shares[0]
+        else:
+            high = shares[1]
+    return best
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def raise_potential(corners, factors, potential, ends, iterations, enough):
+    """Return the greatest bound that a potential proves while it is improved.
+
+    The potential is linear on each triangle. Primal-dual iteration: raise it at the goal and lower
+    it at the start, and push back wherever it is steeper than the factor of its cell.
+
+    Parameters
+    ----------
+    corners
+        int64 (n, 4), corners of the cells.
+    factors
+        float64 (n,), factors of the cells.
+    potential
+        float64 (n_corners,), to begin with; written.
+    ends
+        float64 (2, 5), of start and goal: cell, side of the triangle, weights of its middle and of
+        the corners of the side.
+    iterations
+        Most of them.
+    enough
+        A bound that ends them.
+
+    Notes
+    -----
+    A. Chambolle, T. Pock: A first-order primal-dual algorithm for convex problems, 2011.
+    """
+    n = factors.size
+    middles = np.empty(n)
+    for cell in range(n):
+        whole = 0.0
+        for k in range(4):
+            whole += potential[corners[cell, k]]
+        middles[cell] = 0.25 * whole
+    force = np.zeros((n, 4, 2))
+    ahead, ahead_middles = potential.copy(), middles.copy()
+    pull = np.empty(potential.size)
+    steepness, steep = np.empty(n), np.empty(n, np.int64)
+    n_steep, best = 0, 0.0
+    for iteration in range(iterations):
+        if iteration % _ROUND == 0:
+            most = _steepest(corners, factors, potential, middles, steepness)
+            rise = _value(potential, middles, corners, ends[1])
+            rise -= _value(potential, middles, corners, ends[0])
+            best = max(best, _proved(factors, steepness, most, rise))
+            if best >= enough:
+                break
+            n_steep = 0
+            for cell in range(n):
+                if steepness[cell] > _SLACK or np.any(force[cell] != 0.0):
+                    steep[n_steep] = cell
+                    n_steep += 1
+        pull[:] = 0.0
+        for cell in steep[:n_steep]:
+            limit = _FORCE * factors[cell]
+            pull_middle = 0.0
+            for side in range(4):
+                # The slope along the side, and from the side to the middle.
+                first, second = corners[cell, _SIDES[side, 0]], corners[cell, _SIDES[side, 1]]
+                along = ahead[second] - ahead[first]
+                inward = 2 * ahead_middles[cell] - ahead[first] - ahead[second]
+                along = force[cell, side, 0] + _FORCE * along
+                inward = force[cell, side, 1] + _FORCE * inward
+                squared = along * along + inward * inward
+                if squared <= limit * limit:
+                    force[cell, side, 0] = force[cell, side, 1] = 0.0
+                    continue
+                # What exceeds the factor pushes back.
+                share = 1 - limit / math.sqrt(squared)
+                along, inward = share * along, share * inward
+                force[cell, side, 0], force[cell, side, 1] = along, inward
+                pull[second] += along - inward
+                pull[first] -= along + inward
+                pull_middle += 2 * inward
+            moved = middles[cell] - _STEP * pull_middle
+            ahead_middles[cell], middles[cell] = 2 * moved - middles[cell], moved
+        for k in range(2):
+            cell, side = int(ends[k, 0]), int(ends[k, 1])
+            up = 1.0 if k == 1 else -1.0
+            middles[cell] += up * _STEP * ends[k, 2]
+            ahead_middles[cell] += 2 * up * _STEP * ends[k, 2]
+            for other in range(2):
+                pull[corners[cell, _SIDES[side, other]]] -= up * ends[k, 3 + other]
+        for corner in range(potential.size):
+            moved = potential[corner] - _STEP * pull[corner]
+            ahead[corner], potential[corner] = 2 * moved - potential[corner], moved
+    return best
