@@ -198,7 +198,7 @@ def profile_of(
     rise, fall = 2 * limits.max_acceleration_m_s2, 2 * limits.max_deceleration_m_s2
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     square = np.zeros(len(poses))
-    square[1:-1] = np.where(_stops(driven, is_curved), 0.0, np.minimum(most[:-1], most[1:]))
+    square[1:-1] = np.where(_stands(driven, is_curved), 0.0, np.minimum(most[:-1], most[1:]))
     square = _slowly_rising(square, along, rise)
     square = _slowly_rising(square[::-1], along[-1] - along[::-1], fall)[::-1]
     seconds = np.where(
@@ -228,7 +228,7 @@ def _most_squares(curvature: FloatArray, limits: MotionLimits, *, is_curved: boo
     return most
 
 
-def _stops(driven: Spread, is_curved: bool) -> BoolArray:  # noqa: FBT001 - a fact of the path
+def _stands(driven: Spread, is_curved: bool) -> BoolArray:  # noqa: FBT001 - a fact of the path
     """Return whether the robot stops at each inner pose.
 
     It does so for turns on the spot and reversals, and where straight lines meet at an angle.
