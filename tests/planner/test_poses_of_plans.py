@@ -237,3 +237,67 @@ def test_no_pose_occurs_twice_where_the_plans_of_a_tour_meet(
         assert not len(repeated(rows[:, :3]))
         still = (np.diff(rows[:, :2], axis=0) == 0).all(axis=1)
         assert still.sum() == turns
+
+
+def spots_of_pure_pursuit(poses: Any) -> set[int]:
+    """Where Nav2's Regulated Pure Pursuit sees a cusp or a turn on the spot: by the sign of the
+    product of two steps, and by points that are equal, exactly, with other orientations."""
+    place = [(each["pose"]["position"]["x"], each["pose"]["position"]["y"]) for each in poses]
+    faced = [each["pose"]["orientation"] for each in poses]
+    found = set()
+    for i in range(1, len(poses) - 1):
+        before = np.subtract(place[i], place[i - 1])
+        behind = np.subtract(place[i + 1], place[i])
+        if before @ behind < 0:
+            found.add(i)
+        for step, pair in ((before, faced[i - 1 : i + 1]), (behind, faced[i : i + 2])):
+            if np.hypot(*step) == 0 and pair[0] != pair[1]:
+                found.add(i)
+    return found
+
+
+@pytest.mark.parametrize("preset", [*PLAIN, *OMPL])
+@pytest.mark.parametrize("yaws", [(), (START_YAW, GOAL_YAW)])
+def test_messages_are_as_the_controllers_of_nav2_take_them(
+    two_rooms: hn.TopologicalMap, preset: str, yaws: Any
+) -> None:
+    if preset in NEEDS_YAW and not yaws:
+        return
+    planner = planner_of(two_rooms, preset)
+    one, other = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
+    path: Any = planner.plan((*one, *yaws[:1]), (*other, *yaws[1:])).path
+    planner.close()
+    message = path.to_message("map", spacing_m=0.05, stamp_ns=7_000_000_008)
+    header = {"stamp": {"sec": 7, "nanosec": 8}, "frame_id": "map"}
+    assert message["header"] == header
+    for each in message["poses"]:
+        assert each["header"] == header
+        place, turn = each["pose"]["position"], each["pose"]["orientation"]
+        assert (place["z"], turn["x"], turn["y"]) == (0, 0, 0)
+        assert math.hypot(turn["z"], turn["w"]) == pytest.approx(1, abs=1e-12)
+        assert all(map(math.isfinite, (*place.values(), *turn.values())))
+    for each, after in itertools.pairwise(message["poses"]):
+        assert each["pose"] != after["pose"]
+        step = [after["pose"]["position"][axis] - each["pose"]["position"][axis] for axis in "xy"]
+        assert math.hypot(*step) <= 0.05 * (1 + 1e-9)
+        if step == [0, 0]:
+            assert each["pose"]["orientation"] != after["pose"]["orientation"]
+        else:
+            assert math.hypot(*step) > 1e-9
+    # The robot turns or reverses wherever a controller thinks so.
+    poses = path.poses(0.05)
+    stops = path.points[np.union1d(path.spot_turns, path.reversals)]
+    for at in spots_of_pure_pursuit(message["poses"]):
+        assert np.abs(stops - poses[at, :2]).max(axis=1).min() < 1e-9
+
+
+@pytest.mark.parametrize("preset", PLAIN)
+def test_a_message_from_a_point_to_itself_has_a_pose(
+    two_rooms: hn.TopologicalMap, preset: str
+) -> None:
+    planner = hn.HybridPlanner(two_rooms, preset=preset)
+    (point,) = two_rooms.grid.frame.points_of([(7, 1)]).tolist()
+    path: Any = planner.plan(point, point).path
+    assert len(path.to_message()["poses"]) == 1
+    turned: Any = planner.plan((*point, 1.0), (*point, 2.0)).path
+    assert len(turned.to_message()["poses"]) == 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,19 @@ _BEND = 1e-6
 """Radians, and radians per metre, below which a path counts as straight: the rounding of cell
 centres on a straight line far from the origin."""
 _ROUNDING = 1e-9
+
+
+class Spread(NamedTuple):
+    """Poses along a path, and the step from each one to the next."""
+
+    poses: FloatArray
+    """float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi)."""
+    directions: SignArray
+    """int8 (n,), 1 ahead or -1 backwards after each pose, at the last one before it."""
+    lengths_m: FloatArray
+    """float64 (n - 1,), metres driven on each step, on arcs along them; 0 for turns on the spot."""
+    turns_rad: FloatArray
+    """float64 (n - 1,), turn of the heading on each step, also one by more than half a circle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +166,10 @@ class Motion:
         kept = np.flatnonzero(bent) + 1
         return np.unique(np.concatenate([[0], kept, [len(self.points) - 1]]))
 
-    def spread(self, spacing_m: float) -> tuple[FloatArray, SignArray]:
-        """Return poses at most `spacing_m` apart, float64 (m, 3), and their directions, int8 (m,).
+    def spread(self, spacing_m: float) -> Spread:
+        """Return poses at most `spacing_m` apart.
 
-        The direction is that after each pose, at the last one that before it. No pose occurs twice
-        in a row; a turn on the spot is two poses at one point.
+        No pose occurs twice in a row; two poses at one point are a turn on the spot.
 
         Raises
         ------
@@ -177,34 +189,57 @@ class Motion:
                 f"{total_m:.4g} m, got {spacing_m}: increase it"
             )
         if len(lengths) == 0:
-            pose = np.append(self.points[0], wrapped(self._faced))[None]
-            return self._turned_at_ends(pose, np.ones(1, np.int8))
+            pose, still = np.append(self.points[0], wrapped(self._faced))[None], np.zeros(0)
+            return self._turned_at_ends(Spread(pose, np.ones(1, np.int8), still, still))
         along = np.concatenate([[0.0], np.cumsum(lengths)])
         bends = self.bends()
-        steps, parts = [], []
+        steps, wanted = [], []
         for first, last in zip(bends[:-1].tolist(), bends[1:].tolist(), strict=True):
             count = max(1, int(np.ceil((along[last] - along[first]) / spacing_m - _ROUNDING)))
-            wanted = np.linspace(along[first], along[last], count, endpoint=False)
+            wanted.append(np.linspace(along[first], along[last], count, endpoint=False))
             inside = along[first + 1 : last]
-            step = first + np.searchsorted(inside, wanted, side="right")
-            steps.append(step)
-            parts.append(_part(wanted - along[step], lengths[step]))
+            steps.append(first + np.searchsorted(inside, wanted[-1], side="right"))
         step = np.append(np.concatenate(steps), len(lengths) - 1)
-        part = np.append(np.concatenate(parts), 1.0)
-        return self._turned_at_ends(self._poses(step, part), self.directions[step])
+        at = np.append(np.concatenate(wanted), along[-1])
+        part = np.append(_part(at[:-1] - along[step[:-1]], lengths[step[:-1]]), 1.0)
+        turns = self._turns
+        turned = np.concatenate([[0.0], np.cumsum(turns)])[step] + part * turns[step]
+        poses, ahead = self._poses(step, part), self.directions[step]
+        return self._turned_at_ends(Spread(poses, ahead, np.diff(at), np.diff(turned)))
 
-    def _turned_at_ends(self, poses: FloatArray, ahead: SignArray) -> tuple[FloatArray, SignArray]:
-        """Return poses and directions with the turns on the spot at both ends."""
+    def driven(self, spacing_m: float) -> Spread:
+        """Return poses as `spread` does, with two at each turn on the spot, also where lines
+        without headings bend."""
+        found = self.spread(spacing_m)
+        if self.headings_rad is not None:
+            return found
+        yaw, moves = found.poses[:, 2], found.lengths_m > 0
+        turn = wrapped(np.diff(yaw))
+        at = 1 + np.flatnonzero((np.abs(turn[:-1]) > _BEND) & moves[:-1] & moves[1:])
+        before = np.column_stack([found.poses[at, :2], yaw[at - 1]])
+        return Spread(
+            np.insert(found.poses, at, before, 0),
+            np.insert(found.directions, at, found.directions[at]),
+            np.insert(found.lengths_m, at, 0.0),
+            np.insert(found.turns_rad, at, turn[at - 1]),
+        )
+
+    def _turned_at_ends(self, found: Spread) -> Spread:
+        """Return poses with the turns on the spot at both ends."""
+        poses, ahead, lengths, turns = found
         for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
             if heading is None:
                 continue
             turned = poses[end].copy()
             turned[2:] = wrapped(np.array([heading]))
             if _differ(turned[2], poses[end, 2]):
+                turn = wrapped(turned[2:] - poses[end, 2])
+                turns = np.append(turns, turn) if end else np.append(-turn, turns)
                 at = len(poses) if end else 0
+                lengths = np.insert(lengths, len(lengths) if end else 0, 0.0)
                 poses, ahead = np.insert(poses, at, turned, 0), np.insert(ahead, at, ahead[end])
             poses[end] = turned
-        return poses, ahead
+        return Spread(poses, ahead, lengths, turns)
 
     def _poses(self, step: LongArray, part: FloatArray) -> FloatArray:
         """Return the poses at shares of some steps."""

@@ -102,6 +102,7 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         lines.append(
             f"length     {figures['length_m']:.2f} m{'' if by_costs else in_metric(figures)}"
         )
+        lines += _duration_lines(figures)
         if by_costs:
             lines.append(f"cost       {figures['cost']:.2f} m{in_metric(figures)}")
         bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
@@ -125,6 +126,12 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     if expanded:
         lines.append(f"expanded   {', '.join(expanded)}")
     return lines + _whole_grid_lines(figures)
+
+
+def _duration_lines(figures: dict[str, Any]) -> list[str]:
+    """State how long the robot drives, if its limits are known."""
+    seconds = figures["duration_s"]
+    return [] if seconds is None else [f"duration   {seconds:.1f} s"]
 
 
 def _beside_cells(bound_m: float, gap: float) -> str:
@@ -190,6 +197,7 @@ def _measured(figures: dict[str, Any]) -> list[str]:
         lines = [f"length     {length_m:.2f} m ({metric})"]
     else:
         lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
+    lines += _duration_lines(figures)
     bound, gap = figures["lower_bound"], 0.0
     if bound > 0:
         gap = figures["cost"] / bound - 1

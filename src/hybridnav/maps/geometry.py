@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav.maps.kernels.geometry import (
     centres,
+    least_along,
     passed_cells,
     polyline_length,
     polyline_lengths,
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "cells_of_line",
     "centres",
+    "least_along",
     "passed_cells",
     "polyline_length",
     "polyline_lengths",

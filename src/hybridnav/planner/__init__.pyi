@@ -14,6 +14,7 @@ from .export import (
 from .path import Path as Path
 from .planner import HybridPlanner as HybridPlanner
 from .preset import (
+    LimitSettings as LimitSettings,
     Preset as Preset,
     load_preset as load_preset,
     planner_settings as planner_settings,
@@ -32,6 +33,11 @@ from .settings import (
     CostSettings as CostSettings,
     PlannerSettings as PlannerSettings,
     PyramidSettings as PyramidSettings,
+)
+from .speed import (
+    MotionLimits as MotionLimits,
+    SpeedMap as SpeedMap,
+    SpeedProfile as SpeedProfile,
 )
 from .tour import Tour as Tour, plan_tour as plan_tour
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import FloatArray, LongArray, SignArray
+    from hybridnav.planner.speed import MotionLimits, SpeedMap, SpeedProfile
 
     End = Sequence[float] | FloatArray
 
@@ -45,9 +46,11 @@ class Path:
     shortened by line of sight keeps the cells of the original path."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
-    where an any-angle path turns."""
+    where an any-angle path turns. With `is_curved` those at which lines and arcs meet: straight
+    lines between them are chords, shorter than what is driven; `poses` lie on the arcs."""
     length_m: float
-    """Length in metres; for a cell path it is counted as a + b sqrt 2 cells from the moves."""
+    """Length in metres of what is driven, on arcs along them; for a cell path it is counted as
+    a + b sqrt 2 cells from the moves."""
     headings_rad: FloatArray | None = None
     """float64 (m,), heading at each point, counter-clockwise from the x axis; None if the state
     space has none."""
@@ -116,7 +119,7 @@ class Path:
             When the spacing is not positive, or so small that there would be more than ten million
             poses.
         """
-        return self._motion.spread(spacing_m)[0]
+        return self._motion.spread(spacing_m).poses
 
     def directions(self, spacing_m: float = 0.05) -> SignArray:
         """Return the direction, ahead or backwards, in which the robot leaves each of the `poses`.
@@ -132,7 +135,46 @@ class Path:
             int8 (n,), 1 for ahead, -1 for backwards, which is more than 90 degrees off the heading;
             the last one is that of the step before.
         """
-        return self._motion.spread(spacing_m)[1]
+        return self._motion.spread(spacing_m).directions
+
+    def profile(
+        self,
+        limits: MotionLimits,
+        spacing_m: float = 0.05,
+        *,
+        speed_map: SpeedMap | None = None,
+    ) -> SpeedProfile:
+        """Return the speed along the path with which the robot arrives first.
+
+        Parameters
+        ----------
+        limits
+            Most speed, acceleration, braking, lateral acceleration and turning rate.
+        spacing_m
+            As in `poses`; it changes neither speeds nor times, but with `speed_map`.
+        speed_map
+            Limits of zones; on each step from pose to pose the least one that the straight line
+            between them touches holds. None for no zones.
+
+        Raises
+        ------
+        InvalidValueError
+            As for `poses`.
+
+        Examples
+        --------
+        >>> from hybridnav.planner import MotionLimits
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (1.5, 0.5)).path
+        >>> profile = path.profile(MotionLimits(max_speed_m_s=0.5, max_acceleration_m_s2=2.5))
+        >>> profile.speed_m_s.max(), round(profile.duration_s, 3)
+        (np.float64(0.5), 2.2)
+        """
+        # Loads a module that plans whose speeds nobody reads do not need.
+        from hybridnav.planner.speed import profile_of  # noqa: PLC0415
+
+        driven = self._motion.driven(spacing_m)
+        return profile_of(driven, limits, speed_map, is_curved=self.is_curved)
 
     def to_message(
         self, frame_id: str = "map", *, spacing_m: float = 0.05, stamp_ns: int = 0

@@ -401,6 +401,7 @@ class Planning:
     def _settings(self) -> dict[str, Any]:
         pyramid, layer = self.built.pyramid, self.costs.layer
         costs = {} if layer is None else {"costs": layer.source}
+        limits = self.preset.limits
         return {
             "preset": self.preset.name,
             "planner": self.preset.planner.model_dump(),
@@ -410,6 +411,7 @@ class Planning:
                 "seed": pyramid.seed,
                 "robot_radius_m": self.grid.robot_radius_m,
             },
+            **({} if limits is None else {"limits": limits.model_dump()}),
             **costs,
         }
 

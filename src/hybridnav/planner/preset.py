@@ -6,10 +6,10 @@ import os
 import warnings
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import yaml
-from pydantic import ValidationError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import parse_value, read_yaml
@@ -23,6 +23,7 @@ from hybridnav.planner.settings import (
     PyramidSettings,
     Section,
     method_of,
+    no_boolean,
 )
 
 if TYPE_CHECKING:
@@ -45,8 +46,34 @@ _OLD_NAMES = {
 """Presets of earlier versions, which were `ompl` with one of OMPL's planners each."""
 
 
+_Limit = Annotated[float, BeforeValidator(no_boolean), Field(gt=0, allow_inf_nan=False)]
+
+
+class LimitSettings(Section):
+    """Section `limits`: how fast the robot drives, see `MotionLimits`; `duration_s` needs them.
+
+    Examples
+    --------
+    >>> hn.load_preset("robot", overrides=["limits.max_speed_m_s=0.26"]).limits.max_speed_m_s
+    0.26
+    """
+
+    max_speed_m_s: _Limit = 0.5
+    """Speed ahead and backwards, m / s."""
+    max_acceleration_m_s2: _Limit = 2.5
+    """Gain of speed, m / s^2."""
+    max_deceleration_m_s2: _Limit = 2.5
+    """Loss of speed when braking, m / s^2."""
+    max_lateral_acceleration_m_s2: _Limit = 1.0
+    """Speed^2 * curvature on arcs, m / s^2."""
+    max_turning_rate_rad_s: _Limit = 2.0
+    """Turn of the heading, rad / s."""
+    max_angular_acceleration_rad_s2: _Limit = 3.2
+    """Change of the turning rate in turns on the spot, rad / s^2."""
+
+
 class Preset(Section):
-    """A planner's configuration: sections `pyramid` and `planner`, and what it is for.
+    """A planner's configuration: sections `pyramid`, `planner` and `limits`, and what it is for.
 
     Examples
     --------
@@ -58,6 +85,8 @@ class Preset(Section):
     description: str = ""
     pyramid: PyramidSettings = PyramidSettings()
     planner: AnyMethod = PaperSettings()
+    limits: LimitSettings | None = None
+    """How fast the robot drives; None for plans without durations."""
 
     def to_yaml(self) -> str:
         """Return the preset as the text of a YAML file, every key present."""
@@ -214,13 +243,13 @@ def _find(source: PathLike) -> Path:
 def _apply(tree: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
-    if not (equals and dot and name and isinstance(tree.get(section), dict)):
-        sections = " or ".join(key for key, value in tree.items() if isinstance(value, dict))
+    if not (equals and dot and name and isinstance(tree.get(section, ""), dict | None)):
+        sections = " or ".join(key for key, one in tree.items() if isinstance(one, dict | None))
         raise PresetError(
             f"setting {brief(override)}: expected section.key=value, section {sections}"
         )
     *inner, name = name.split(".")
-    branch = tree[section]
+    branch = tree[section] = tree[section] or {}
     for part in inner:
         if part in branch and not isinstance(branch[part], dict | None):
             raise PresetError(f"setting {printable(key)}: unknown key; {part} is no section")

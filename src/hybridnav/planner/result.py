@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
+    from hybridnav.planner.speed import MotionLimits
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
@@ -107,7 +108,7 @@ class PlanResult:
     """The lower bound, or how to find it."""
     stats: PlanStats = field(default_factory=PlanStats)
     settings: dict[str, Any] = field(default_factory=dict)
-    """Preset, and settings of the pyramid."""
+    """Preset, and settings of the planner and the pyramid; its `limits`, if it has any."""
     weighted_cost: float | None = None
     """Cost in a metric other than the length, as with costs of cells; None for the length."""
     refinement: Refinement | None = None
@@ -142,6 +143,26 @@ class PlanResult:
         source = self.route_source
         return source if source is None or isinstance(source, Route) else source.route()
 
+    @property
+    def limits(self) -> MotionLimits | None:
+        """The robot's limits, those of the section `limits` of the preset; None without it."""
+        stated = self.settings.get("limits")
+        if stated is None:
+            return None
+        # Loads a module that plans without limits do not need.
+        from hybridnav.planner.speed import MotionLimits  # noqa: PLC0415
+
+        return MotionLimits(**stated)
+
+    @cached_property
+    def duration_s(self) -> float | None:
+        """Seconds that the robot drives and turns within `limits`, from standstill to standstill;
+        None without limits or a path. `Path.profile` has other limits, and zones."""
+        limits = self.limits
+        if limits is None or self.path is None:
+            return None
+        return self.path.profile(limits, math.inf).duration_s
+
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
         """What a person does along the path; none without a path, and on a map without rooms."""
@@ -155,7 +176,7 @@ class PlanResult:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with what is found on demand, so that copies hold no map."""
-        found = {"route", "instructions", "lower_bound"}
+        found = {"route", "instructions", "lower_bound", "duration_s"}
         state = {name: value for name, value in vars(self).items() if name not in found}
         return state | {
             "route_source": self.route,
@@ -214,6 +235,7 @@ class PlanResult:
             "start": None if self.start is None else list(self.start),
             "goal": None if self.goal is None else list(self.goal),
             "length_m": self.path.length_m if self.path else None,
+            "duration_s": self.duration_s,
             "cost": self.cost if self.solved else None,
             "lower_bound": self.lower_bound if self.solved else None,
             "gap": self.gap if self.solved else None,

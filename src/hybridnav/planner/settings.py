@@ -24,7 +24,7 @@ from hybridnav.refine.ompl.settings import OmplSettings
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
-def _no_boolean(value: Any) -> Any:
+def no_boolean(value: Any) -> Any:
     """Refuse a YAML `yes` or `on` where a number belongs; Python would call it 1."""
     if isinstance(value, bool):
         raise PydanticCustomError("number_type", "input should be a number")
@@ -40,8 +40,8 @@ def _class_name(refine: str) -> str:
     )
 
 
-_Float = Annotated[float, BeforeValidator(_no_boolean)]
-_Int = Annotated[int, BeforeValidator(_no_boolean)]
+_Float = Annotated[float, BeforeValidator(no_boolean)]
+_Int = Annotated[int, BeforeValidator(no_boolean)]
 
 
 class Section(BaseModel):

@@ -71,6 +71,15 @@ class Tour:
         return sum(result.path.length_m for result in self.results if result.path is not None)
 
     @property
+    def duration_s(self) -> float | None:
+        """Seconds of all plans, with a stop at each waypoint; None unless the tour is solved and
+        its preset has limits."""
+        parts = [result.duration_s for result in self.results]
+        if not self.solved or None in parts:
+            return None
+        return sum(part for part in parts if part is not None)
+
+    @property
     def start(self) -> tuple[float, ...] | None:
         """Start of the tour, as `PlanResult.start`."""
         return self.results[0].start
@@ -121,6 +130,7 @@ class Tour:
             "status": str(self.status),
             "goal": parts[-1]["goal"],
             "length_m": self.length_m if self.solved else None,
+            "duration_s": self.duration_s,
             "cost": self.cost if self.solved else None,
             "lower_bound": self.lower_bound if self.solved else None,
             "gap": self.gap if self.solved else None,

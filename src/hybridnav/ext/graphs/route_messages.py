@@ -77,7 +77,7 @@ def route_messages(
         )
     points = graph.points[passed]
     places = [{"x": x, "y": y, "z": 0.0} for x, y in points.tolist()]
-    poses, _ = Motion(points, None, curved=False).spread(spacing_m)
+    poses = Motion(points, None, curved=False).spread(spacing_m).poses
     return {
         "route": {
             "header": header_message(frame_id, stamp_ns),

@@ -118,6 +118,38 @@ def passed_cells(free, positions):
 
 @guarded
 @njit(cache=True, nogil=True)
+def least_along(values, positions):
+    """Return the least value of the cells that each segment touches, float64 (n - 1,).
+
+    A cell counts if the segment meets its closed square, or passes it by 1e-9 of a cell; outside of
+    the grid values are infinite. In each row of cells a segment covers one range of columns.
+
+    Parameters
+    ----------
+    values
+        float64 (rows, cols).
+    positions
+        float64 (n, 2), n >= 1, (row, col) on the lattice of the cells' corners.
+    """
+    least = np.full(len(positions) - 1, np.inf)
+    for i in range(len(least)):
+        row, col = positions[i, 0], positions[i, 1]
+        down, across = positions[i + 1, 0] - row, positions[i + 1, 1] - col
+        low, high = min(row, row + down) - _SLIVER_CELLS, max(row, row + down) + _SLIVER_CELLS
+        for r in range(max(math.floor(low), 0), min(math.floor(high) + 1, values.shape[0])):
+            first, last = 0.0, 1.0  # shares of the segment at which it enters and leaves the row
+            if down != 0.0:
+                one, other = (r - _SLIVER_CELLS - row) / down, (r + 1 + _SLIVER_CELLS - row) / down
+                first, last = max(first, min(one, other)), min(last, max(one, other))
+            one, other = col + first * across, col + last * across
+            left, right = min(one, other) - _SLIVER_CELLS, max(one, other) + _SLIVER_CELLS
+            for c in range(max(math.floor(left), 0), min(math.floor(right) + 1, values.shape[1])):
+                least[i] = min(least[i], values[r, c])
+    return least
+
+
+@guarded
+@njit(cache=True, nogil=True)
 def walks_clear(free, tails, heads):
     """Return which walks from cell to cell meet free cells only, bool (n,).
 
