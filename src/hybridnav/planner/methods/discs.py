@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import within_radius
+from hybridnav.planner.endpoints import refusal
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.methods.shortest import OverMesh
 from hybridnav.planner.settings import ShortestSettings
@@ -79,10 +80,8 @@ class Discs:
         disc, closed = self.circumscribed, query.closed
         if closed is not None and closed.solid is not None:
             closed = self._around(closed, closed.solid)
-        if not disc.may_enter(query) or (
-            closed is not None
-            and closed.holds(np.array(query.cells) @ [self._grid.shape[1], 1]).any()
-        ):
+        is_shut = closed is not None and refusal(closed, query.cells, self._grid.shape)
+        if is_shut or not disc.may_enter(query):
             return None
         found = disc.find(query._replace(closed=closed))
         return found if found.has_path else None

@@ -308,9 +308,9 @@ class OmplPlanner:
     def _corridors(self, cells: LongArray) -> tuple[tuple[str, BoolArray | None], ...]:
         if self._field_of is None:
             return (("whole map", None),)
-        passed = np.zeros(self._n_fields, dtype=np.bool_)
+        n_fields, tails, heads = self._beside
+        passed = np.zeros(n_fields, dtype=np.bool_)
         passed[self._field_of[cells[:, 0], cells[:, 1]]] = True
-        tails, heads = self._beside
         wider = passed.copy()
         wider[heads[passed[tails]]] = True
         wider[tails[passed[heads]]] = True
@@ -320,25 +320,17 @@ class OmplPlanner:
         return (("corridor", passed), widened)
 
     @cached_property
-    def _n_fields(self) -> int:
-        assert self._field_of is not None  # noqa: S101 - only called if it is set
-        return int(self._field_of.max(initial=-1)) + 1
-
-    @cached_property
-    def _beside(self) -> tuple[LongArray, LongArray]:
-        """Return the pairs of neighbouring fields, each pair once."""
-        assert self._field_of is not None  # noqa: S101
+    def _beside(self) -> tuple[int, LongArray, LongArray]:
+        """Return the number of fields, and the pairs of neighbours, in either order, each once."""
         fields = self._field_of
+        assert fields is not None  # noqa: S101 - only called if it is set
+        n_fields = int(fields.max(initial=-1)) + 1
         keys = []
         for one, other in ((fields[:, :-1], fields[:, 1:]), (fields[:-1], fields[1:])):
             differ = (one != other) & (one >= 0) & (other >= 0)
-            low, high = (
-                np.minimum(one[differ], other[differ]),
-                np.maximum(one[differ], other[differ]),
-            )
-            keys.append(low.astype(np.int64) * self._n_fields + high)
+            keys.append(one[differ].astype(np.int64) * n_fields + other[differ])
         pairs = np.unique(np.concatenate(keys))
-        return pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
+        return n_fields, pairs // max(n_fields, 1), pairs % max(n_fields, 1)
 
     def _path(self, cells: LongArray, reply: Reply) -> Path:
         """Return the path of a reply; along curves its poses are one cell apart."""
