@@ -50,13 +50,13 @@ MAPS = (
     "aws_small_warehouse/002/map.yaml",
 )
 CART = [[0.45, 0.3], [0.45, -0.3], [-0.45, -0.3], [-0.45, 0.3]]
-NEAR_M = 0.02
+NEAR_M = 0.0199
 Timed = tuple[hn.PlanResult, float]
 
 
-def poses_of(grid: hn.OccupancyGrid, pairs: int, rng: np.random.Generator) -> list[FloatArray]:
+def poses_of(check: MotionCheck, grid: hn.OccupancyGrid, pairs: int, seed: int) -> list[FloatArray]:
     """Poses in which the cart stands, float64 (2, 3) for each pair."""
-    check, cells = MotionCheck(grid, footprint=CART), np.argwhere(grid.enterable())
+    cells, rng = np.argwhere(grid.enterable()), np.random.default_rng(seed)
     found: list[FloatArray] = []
     while len(found) < 2 * pairs:
         pose = np.append(grid.frame.points_of(rng.choice(cells, 1)), rng.uniform(-np.pi, np.pi))
@@ -116,10 +116,10 @@ def main(given: Namespace) -> None:
     every: dict[str, tuple[list[Timed], list[float], int]] = {}
     for name in wanted:
         grid = read(given.data / name, 0.3)
-        rng = np.random.default_rng(given.seed)
+        cart = MotionCheck(grid, footprint=Footprint.of(CART).padded(given.padding))
         wide = MotionCheck(grid, footprint=Footprint.of(CART).padded(NEAR_M))
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-        queries, answers = poses_of(grid, given.pairs, rng), {}
+        queries, answers = poses_of(cart, grid, given.pairs, given.seed), {}
         for method in ("discs and OMPL", "OMPL alone"):
             planner: Any = hn.HybridPlanner(topology, preset=preset)
             planner.prepare()

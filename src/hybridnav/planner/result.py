@@ -135,8 +135,8 @@ class PlanResult:
     def lower_bound(self) -> float:
         """A proved bound on the optimum in the metric, metres; infinite where there is no path.
 
-        Of a footprint it is the shortest path of the largest disc inside it: no disc is shorter. It
-        is no claim that the path is the shortest one of the footprint.
+        With a footprint it is the shortest path of the largest disc inside it: no disc is shorter.
+        It is no claim that the path is the shortest one of the footprint.
 
         That of an any-angle path by costs is found when it is read first, in the time of a search
         of cells without preparation: see `search.lattice.cost_bound`.
