@@ -156,7 +156,7 @@ class OmplPlanner:
         tells_search
             Whether to return the states and trees of the search too.
         """
-        deadline_s = time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0)
+        began = time.monotonic() - spent_s
         refused = self._refused(endpoints, closed)
         if refused is not None:
             return self._without_path(refused, Refinement((), "OMPL"))
@@ -166,7 +166,8 @@ class OmplPlanner:
             if isinstance(found, OmplPlan):
                 return found
             between = found
-        return self._sampled(between, deadline_s, tells_search=tells_search)
+        left_s = max(self.ompl.budget_s - (time.monotonic() - began), 0.0)
+        return self._sampled(between, left_s, tells_search=tells_search)
 
     def _without_path(self, status: PlanStatus, how: Refinement) -> OmplPlan:
         return OmplPlan(status, self._metric, None, None, math.inf, how)
@@ -189,15 +190,13 @@ class OmplPlanner:
             return OmplPlan(PlanStatus.SOLVED, self._metric, disc, None, bound, how)
         return _Between(cells, endpoints, closed, least_m, disc, steps)
 
-    def _sampled(
-        self, asked: _Between, deadline_s: float, *, tells_search: bool = False
-    ) -> OmplPlan:
+    def _sampled(self, asked: _Between, left_s: float, *, tells_search: bool) -> OmplPlan:
         """Return the answer of OMPL, or the path that is known where it finds no shorter one."""
         cells, endpoints, closed, least_m, disc, known = asked
         flat, solid = (None, None) if closed is None else (closed.flat, closed.solid)
         with self._one_at_a_time:
             self._worker.ensure()
-            corridors = self._corridors(cells)
+            corridors, deadline_s = self._corridors(cells), time.monotonic() + left_s
             query = OmplQuery(*endpoints, cells, deadline_s, corridors, flat, solid, tells_search)
             self._worker.send(query)
             # Made while the worker plans, so that a path exists when its time is up.
