@@ -284,8 +284,8 @@ def test_smoothing_rounds_bends_and_lengthens_nothing(planner_of: Any) -> None:
 
 
 def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMap) -> None:
-    """A robot 2 m wide fits into the rooms and through no door."""
-    wide = "[[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]"
+    """A robot 1 m wide fits into the rooms and through no door; a disc inside it does."""
+    wide = "[[0.5, 0.3], [-0.5, 0.3], [-0.5, -0.7], [0.5, -0.7]]"
     preset = load_preset(
         "ompl",
         overrides=[f"planner.ompl={{space: se2, footprint: '{wide}', budget_s: 0.4}}"],
@@ -295,6 +295,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
     assert not result.solved
     assert (result.cost, math.isnan(result.gap)) == (math.inf, True)
     assert [step.partition(":")[0] for step in result.refinement.steps] == [  # type: ignore[union-attr]
+        "circumscribed disc",
         "corridor",
         "widened corridor",
         "grid path by line of sight",

@@ -83,12 +83,17 @@ def runs_of(area: BaseGeometry, grid: OccupancyGrid, *, radius_m: float) -> Long
     InvalidValueError
         When the area closes no cell.
     """
-    radius_cells = radius_m / grid.resolution_m
-    parts = parts_on(area, grid)
-    runs = np.concatenate([_runs_near(part, grid.shape, radius_cells) for part in parts])
+    runs = runs_near(area, grid, radius_m=radius_m)
     if not len(runs):
         raise _beside(area, grid)
     return runs
+
+
+def runs_near(area: BaseGeometry, grid: OccupancyGrid, *, radius_m: float) -> LongArray:
+    """Find the same cells; none for an area beside the map that is near enough to close some."""
+    radius_cells = radius_m / grid.resolution_m
+    parts = parts_on(area, grid)
+    return np.concatenate([_runs_near(part, grid.shape, radius_cells) for part in parts])
 
 
 def parts_on(area: BaseGeometry, grid: OccupancyGrid) -> list[BaseGeometry]:

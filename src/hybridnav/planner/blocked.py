@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.islands import in_runs
-from hybridnav.planner.areas import cells_on_boundaries, checked_area, runs_of, shown
+from hybridnav.planner.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.planner.endpoints import no_places
 from hybridnav.pyramid import LevelArc
 from hybridnav.topology.rooms import Door
@@ -160,6 +160,13 @@ class Blocked:
             areas = cast("Sequence[BaseGeometry]", given)
             runs += [runs_of(area, grid, radius_m=radius_m) for area in areas]
         return _cells_in_runs(np.concatenate(runs))
+
+    def solid_on(self, grid: OccupancyGrid) -> LongArray | None:
+        """Find the cells of the areas that are obstacles, for a robot with a footprint; None
+        without any."""
+        areas = cast("Sequence[BaseGeometry]", self.polygons)
+        runs = [runs_near(area, grid, radius_m=0.0) for area in areas]
+        return _cells_in_runs(np.concatenate(runs)) if runs else None
 
     def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
         if not len(self.places):

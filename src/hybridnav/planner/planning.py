@@ -169,7 +169,9 @@ class Planning:
         # Without a lock: two threads may compute the same cells.
         found = known.pop(closure.key, None)
         if found is None:
-            found = ClosedCells(closure.cells_on(self.grid, self.topology))
+            is_solid = self.ompl is not None and self.ompl.body is not None
+            solid = closure.solid_on(self.grid) if is_solid else None
+            found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
         known[closure.key] = found  # the last one now
         for old in list(known)[:-_KEPT]:
             known.pop(old, None)
@@ -230,8 +232,10 @@ class Planning:
         metric = self.method.metric
         if not found.has_path:
             bound, stats = found.lower_bound_m, found.stats
-            status = PlanStatus.NO_PATH
-            return self._answer(status, request, metric=metric, bound_source=bound, stats=stats)
+            status, how = PlanStatus.NO_PATH, None if self.ompl is None else self.ompl.no_path
+            return self._answer(
+                status, request, metric=metric, bound_source=bound, stats=stats, refinement=how
+            )
         if self.ompl is not None:
             result = self._by_ompl(self.ompl, request, query, found)
         elif self._by_costs is not None:
@@ -329,19 +333,22 @@ class Planning:
         self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
     ) -> PlanResult:
         """Return the result of a path refined by OMPL, with the bound of the method too."""
-        now, closed = time.perf_counter(), request.closed
+        now = time.perf_counter()
         first, last = (
             pose if len(pose) > 2 else np.append(pose, 0.0)  # noqa: PLR2004
             for pose in request.poses
         )
-        flat = None if closed is None else closed.flat
-        refined = ompl.plan(found.cells, (first, last), flat, spent_s=now - request.began)
-        found.stats.seconds["ompl"] = time.perf_counter() - now
         is_any_angle = self.method.metric == "any-angle"
-        own = found.lower_bound_m if is_any_angle else query.straight_m
-        bound, path = max(refined.lower_bound, own), refined.path
+        refined = ompl.plan(
+            found.cells,
+            (first, last),
+            request.closed,
+            spent_s=now - request.began,
+            least_m=found.lower_bound_m if is_any_angle else query.straight_m,
+        )
+        found.stats.seconds["ompl"] = time.perf_counter() - now
+        bound, path = refined.lower_bound, refined.path
         if path is not None and refined.status is PlanStatus.SOLVED:
-            bound = min(bound, refined.weighted_cost or path.length_m)
             path = path if path.headings_rad is not None else path.turned_at_ends(*request.poses)
         return self._answer(
             refined.status,

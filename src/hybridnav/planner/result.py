@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import numpy as np
 
@@ -71,18 +71,28 @@ class InstructionSource(Protocol):
         ...
 
 
+Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
+
+
 @dataclass(frozen=True)
 class Refinement:
     """History of the path of a sampling-based planner."""
 
     steps: tuple[str, ...]
     """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
-    by_grid: bool
-    """Whether the path is the grid's, shortened by line of sight, because all attempts failed."""
-    trace: tuple[tuple[float, float], ...]
+    by: Answer
+    """What answered: `circumscribed disc`, whose path is valid with every heading; `inscribed
+    disc`, which proves that there is no path; `OMPL`; or `grid`, whose path, shortened by line of
+    sight, counts where all else failed."""
+    trace: tuple[tuple[float, float], ...] = ()
     """Seconds and cost of each better path."""
-    iterations: int
+    iterations: int = 0
     """Iterations of planners and simplification."""
+
+    @property
+    def by_grid(self) -> bool:
+        """Whether the path is the grid's, shortened by line of sight."""
+        return self.by == "grid"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +139,9 @@ class PlanResult:
     @cached_property
     def lower_bound(self) -> float:
         """A proved bound on the optimum in the metric, metres; infinite where there is no path.
+
+        With a footprint it is the shortest path of the largest disc inside it: no disc is shorter.
+        It is no claim that the path is the shortest one of the footprint.
 
         That of an any-angle path by costs is found when it is read first, in tens of milliseconds
         on maps of buildings: see `search.lattice.cost_bound`.

@@ -83,6 +83,21 @@ class Footprint:
             raise InvalidValueError("a footprint must have no holes")
         return cls(shapely.get_coordinates(shape.exterior))
 
+    def padded(self, padding_m: float) -> Footprint:
+        """Return the outline with each side moved outwards, corners kept sharp (mitred).
+
+        Nav2 moves each corner outwards along both axes of the robot: the same for a rectangle along
+        them about the base, and less than the padding for some others.
+
+        Parameters
+        ----------
+        padding_m
+            Metres, >= 0.
+        """
+        if not padding_m > 0:
+            return self
+        return Footprint.of(shapely.Polygon(self.corners_m).buffer(padding_m, join_style="mitre"))
+
     def convex_parts(self) -> list[FloatArray]:
         """Return the corners of convex polygons that form the outline, float64 (n, 2) each, metres.
 

@@ -86,7 +86,13 @@ class MotionCheck:
         self._body = _no_body() if footprint is None else _body_of(grid, footprint)
         self._marks = self._marks_of(inside, closed)
 
-    def confined(self, *, inside: BoolArray | None = None, closed: LongArray | None = None) -> Self:
+    def confined(
+        self,
+        *,
+        inside: BoolArray | None = None,
+        closed: LongArray | None = None,
+        solid: LongArray | None = None,
+    ) -> Self:
         """Return a check of the same robot and map in another corridor, without the work on the
         footprint.
 
@@ -94,9 +100,16 @@ class MotionCheck:
         ----------
         inside, closed
             As in the class; they replace those of this check.
+        solid
+            int64 (n,), flat cells that the footprint must not meet either; None for none.
         """
         other = copy.copy(self)
         other._marks = self._marks_of(inside, closed)  # noqa: SLF001 - of the same class
+        if solid is not None and not self._is_disc:
+            occupied = self._grid.measured == CellClass.OCCUPIED
+            occupied.flat[solid] = True
+            around = look_ahead(occupied), _distance_cells(occupied)
+            other._body = (*around, *self._body[2:])  # noqa: SLF001
         return other
 
     def state_valid(self, x: float, y: float, yaw: float = 0.0) -> bool:

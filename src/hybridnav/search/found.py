@@ -64,6 +64,9 @@ class ClosedCells:
 
     flat: LongArray
     """int64 (n,), flat cells, sorted, each once."""
+    solid: LongArray | None = None
+    """int64 (m,), flat cells that no part of a footprint may meet; None for none. Discs are kept
+    off by the closed cells alone."""
 
     def holds(self, flat: LongArray) -> BoolArray:
         """Return which of some flat cells are closed."""

@@ -8,15 +8,16 @@ import threading
 import time
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import Motion
 from hybridnav._base.trig import directions
-from hybridnav.maps.geometry import cells_of_line
+from hybridnav.maps.geometry import cells_of_line, polyline_length
 from hybridnav.planner import Path, PlanStatus, Refinement
+from hybridnav.planner.methods.discs import Discs
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import driven, shortest_curve
 from hybridnav.refine.ompl import Clearance, OmplQuery, Setup, Worker
@@ -29,9 +30,15 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planner import Metric
     from hybridnav.planner.methods.grid import KnownMap
+    from hybridnav.planner.result import Answer
     from hybridnav.planner.settings import OmplPlannerSettings
     from hybridnav.refine.ompl import Reply, Search
-    from hybridnav.search.found import Method
+    from hybridnav.search.found import ClosedCells, Method
+
+
+NEAR_BOUND = 1.05
+"""A path of the circumscribed disc that is at most this times the bound is the answer at once;
+OMPL, which may find a way through a narrow door, tries to beat a longer one in its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +52,19 @@ class OmplPlan:
     lower_bound: float
     refinement: Refinement
     search: Search | None = None
+
+
+class _Between(NamedTuple):
+    """What the discs leave for OMPL."""
+
+    cells: LongArray
+    endpoints: tuple[FloatArray, FloatArray]
+    closed: ClosedCells | None
+    least_m: float
+    """A proved bound."""
+    disc: Path | None = None
+    """The path of the circumscribed disc; None without one."""
+    steps: tuple[str, ...] = ()
 
 
 def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
@@ -69,9 +89,10 @@ def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings)
 class OmplPlanner:
     """OMPL restricted to the fields that a coarse path passes.
 
-    If OMPL finds no path there, the neighbouring fields are added; if it still finds none, the
-    grid's own path is shortened by line of sight. A copied or unpickled planner starts its own
-    process at its first query.
+    A footprint lies between two discs, which answer first; see `Discs`. OMPL gets what they leave.
+    If it finds no path in these fields, their neighbours are added; if it still finds none, the
+    path of the larger disc counts, or the grid's own path, shortened by line of sight. A copied or
+    unpickled planner starts its own process at its first query.
 
     Parameters
     ----------
@@ -97,19 +118,25 @@ class OmplPlanner:
     ) -> None:
         self._grid = grid
         self._settings = settings
-        self.ompl = settings.ompl
+        self.ompl, self.body = settings.ompl, settings.ompl.body
+        self.discs: Discs | None = None
+        if self.body is not None and not grid.corner_cutting:
+            allowed = settings.allow_unexplored
+            self.discs = Discs(grid, self.body, allow_unexplored=allowed)
         self._field_of = field_of
         self._one_at_a_time = threading.Lock()
+        self._confined: dict[ClosedCells, MotionCheck] = {}
         self._worker = Worker(Setup(grid, field_of, self.ompl, settings.allow_unexplored))
         self._warm_up()
 
-    def plan(
+    def plan(  # noqa: PLR0913 - one query, and what is known of it
         self,
         cells: LongArray,
         endpoints: tuple[FloatArray, FloatArray],
-        closed: LongArray | None,
+        closed: ClosedCells | None,
         *,
         spent_s: float = 0.0,
+        least_m: float = 0.0,
         tells_search: bool = False,
     ) -> OmplPlan:
         """Find a path of the state space along a path of cells.
@@ -121,66 +148,132 @@ class OmplPlanner:
         endpoints
             Start and goal, float64 (3,): metres and radians, map frame.
         closed
-            int64 (m,), flat cells that may not be entered; None for none.
+            Cells that may not be entered; None for none.
         spent_s
             Seconds of the budget that are spent already.
+        least_m
+            A proved bound on the length of all paths.
         tells_search
             Whether to return the states and trees of the search too.
         """
-        refused = self._refused(endpoints)
+        began = time.monotonic() - spent_s
+        refused = self._refused(endpoints, closed)
         if refused is not None:
-            nothing = Refinement((), by_grid=False, trace=(), iterations=0)
-            return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
+            return self._without_path(refused, Refinement((), "OMPL"))
+        between = _Between(cells, endpoints, closed, least_m)
+        if self.discs is not None and not tells_search:
+            found = self._by_discs(self.discs, between)
+            if isinstance(found, OmplPlan):
+                return found
+            between = found
+        left_s = max(self.ompl.budget_s - (time.monotonic() - began), 0.0)
+        return self._sampled(between, left_s, tells_search=tells_search)
+
+    def _without_path(self, status: PlanStatus, how: Refinement) -> OmplPlan:
+        return OmplPlan(status, self._metric, None, None, math.inf, how)
+
+    def _by_discs(self, discs: Discs, asked: _Between) -> OmplPlan | _Between:
+        """Return the answer of one of the discs, or what they leave for OMPL."""
+        cells, endpoints, closed, least_m, *_ = asked
+        first, last = cells[[0, -1]].tolist()
+        points = endpoints[0][:2], endpoints[1][:2]
+        query = Query(((first[0], first[1]), (last[0], last[1])), points, closed)
+        below = discs.below(query)
+        if below is not None:
+            if not below.has_path:
+                return self._without_path(PlanStatus.NO_PATH, self.no_path)
+            least_m = max(least_m, below.lower_bound_m)
+            cells = below.cells if self._settings.along == "shortest" else cells
+        disc, steps = self._along_disc(discs, query, endpoints, least_m)
+        if disc is not None and disc.length_m <= least_m * NEAR_BOUND:
+            how, bound = Refinement(steps, "circumscribed disc"), min(least_m, disc.length_m)
+            return OmplPlan(PlanStatus.SOLVED, self._metric, disc, None, bound, how)
+        return _Between(cells, endpoints, closed, least_m, disc, steps)
+
+    def _sampled(self, asked: _Between, left_s: float, *, tells_search: bool) -> OmplPlan:
+        """Return the answer of OMPL, or the path that is known where it finds no shorter one."""
+        cells, endpoints, closed, least_m, disc, known = asked
+        flat, solid = (None, None) if closed is None else (closed.flat, closed.solid)
         with self._one_at_a_time:
             self._worker.ensure()
-            query = OmplQuery(
-                start=endpoints[0],
-                goal=endpoints[1],
-                cells=cells,
-                deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
-                corridors=self._corridors(cells),
-                closed=closed,
-                tells_search=tells_search,
-            )
+            corridors, deadline_s = self._corridors(cells), time.monotonic() + left_s
+            query = OmplQuery(*endpoints, cells, deadline_s, corridors, flat, solid, tells_search)
             self._worker.send(query)
             # Made while the worker plans, so that a path exists when its time is up.
-            is_late = self._worker.is_late()
+            is_late = disc is None and self._worker.is_late()
             by_line = self._by_line_of_sight(cells, endpoints, closed) if is_late else None
             reply = self._worker.reply()
-        steps, by_grid = list(reply.steps), False
+        by: Answer = "OMPL"
+        steps = [*known, *reply.steps]
         path = self._path(cells, reply) if len(reply.points) else None
         status = PlanStatus(reply.outcome)
-        if status is not PlanStatus.SOLVED:
+        is_solved = status is PlanStatus.SOLVED
+        if disc is not None:
+            if path is None or not is_solved or path.length_m >= disc.length_m:
+                path, status, by = disc, PlanStatus.SOLVED, "circumscribed disc"
+                steps.append("circumscribed disc: shorter than OMPL's path")
+        elif not is_solved:
             if not is_late:
                 by_line = self._by_line_of_sight(cells, endpoints, closed)
             steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
             if by_line is not None:
-                path, status, by_grid = by_line, PlanStatus.SOLVED, True
-        return OmplPlan(
-            status,
-            self._metric,
-            path,
-            self._weighted_cost(path) if status is PlanStatus.SOLVED else None,
-            self._bound(reply, path, endpoints),
-            Refinement(tuple(steps), by_grid, reply.trace, reply.iterations),
-            reply.search,
-        )
+                path, status, by = by_line, PlanStatus.SOLVED, "grid"
+        cost, bound = None, max(math.dist(*(end[:2] for end in endpoints)), reply.bound_m, least_m)
+        if path is not None and status is PlanStatus.SOLVED:
+            cost = self._weighted_cost(path)
+            bound = min(bound, path.length_m if cost is None else cost)
+        how = Refinement(tuple(steps), by, reply.trace, reply.iterations)
+        return OmplPlan(status, self._metric, path, cost, bound, how, reply.search)
+
+    def _along_disc(
+        self, discs: Discs, query: Query, endpoints: tuple[FloatArray, FloatArray], least_m: float
+    ) -> tuple[Path | None, tuple[str, ...]]:
+        """Return the path of the circumscribed disc with turns on the spot, and how it went."""
+        can_follow = self.ompl.space in {"se2", "differential"}
+        if not can_follow or self.ompl.objective != "length":
+            return None, ()
+        found, step = discs.above(query), "circumscribed disc"
+        points = None if found is None else found.points
+        if found is None or points is None:
+            return None, (f"{step}: no path",)
+        path = self._turning(points, found.cells, endpoints, query.closed)
+        if path is None:
+            return None, (f"{step}: no",)
+        if path.length_m <= least_m * NEAR_BOUND:
+            return path, (f"{step}: solved",)
+        return path, (f"{step}: {100 * (path.length_m / least_m - 1):.0f} % over the bound",)
 
     def close(self) -> None:
         """End the process once no query waits for it; the next query starts another one."""
         with self._one_at_a_time:
             self._worker.close()
 
-    def _refused(self, endpoints: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
+    no_path = Refinement(("inscribed disc: no path",), "inscribed disc")
+    """How a query ends where the largest disc in the robot has no path: nothing else is asked."""
+
+    def _refused(
+        self, endpoints: tuple[FloatArray, FloatArray], closed: ClosedCells | None
+    ) -> PlanStatus | None:
         """Return the status of a query if the footprint does not fit at one of its endpoints."""
-        if self.ompl.footprint is None:
+        if self.body is None:
             return None
-        for pose, status in zip(
-            endpoints, (PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED), strict=True
-        ):
-            if not self._check.state_valid(*pose.tolist()):
-                return status
+        occupied = PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED
+        blocked = PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED
+        for check, refused in ((self._check, occupied), (self._check_of(closed), blocked)):
+            for pose, status in zip(endpoints, refused, strict=True):
+                if not check.state_valid(*pose.tolist()):
+                    return status
         return None
+
+    def _check_of(self, closed: ClosedCells | None) -> MotionCheck:
+        """Return the check of motions with what is closed; the last one is kept."""
+        if closed is None:
+            return self._check
+        check = self._confined.get(closed)
+        if check is None:
+            check = self._check.confined(closed=closed.flat, solid=closed.solid)
+            self._confined = {closed: check}
+        return check
 
     def _warm_up(self) -> None:
         """Build all shared objects, so that no query's time includes them."""
@@ -188,11 +281,16 @@ class OmplPlanner:
             _ = self._beside
         free = np.argwhere(self._grid.enterable())[:1]
         if len(free):
-            centre = self._grid.frame.points_of(free[0])
+            (centre,) = self._grid.frame.points_of(free)
             pose = np.append(centre, 0.0)
             path = self._by_line_of_sight(free, (pose, pose), None)
             self._weighted_cost(path)
-            self._refused((pose, pose))
+            self._refused((pose, pose), None)
+            if self.discs is not None:
+                cell = (int(free[0, 0]), int(free[0, 1]))
+                query = Query((cell, cell), (centre, centre))
+                self.discs.below(query)
+                self._along_disc(self.discs, query, (pose, pose), 0.0)
             if self.ompl.has_heading:
                 self._check.turn_valid(*pose, *pose)
             if self.ompl.space == "differential":
@@ -206,20 +304,12 @@ class OmplPlanner:
             return "dubins"
         return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
 
-    def _bound(
-        self, reply: Reply, path: Path | None, endpoints: tuple[FloatArray, FloatArray]
-    ) -> float:
-        """Return a lower bound on the cost of all paths: the path without obstacles."""
-        straight = float(np.hypot(*(endpoints[1] - endpoints[0])[:2]))
-        bound = max(straight, reply.bound_m)
-        return bound if path is None else min(bound, path.length_m)
-
     def _corridors(self, cells: LongArray) -> tuple[tuple[str, BoolArray | None], ...]:
         if self._field_of is None:
             return (("whole map", None),)
-        passed = np.zeros(self._n_fields, dtype=np.bool_)
+        n_fields, tails, heads = self._beside
+        passed = np.zeros(n_fields, dtype=np.bool_)
         passed[self._field_of[cells[:, 0], cells[:, 1]]] = True
-        tails, heads = self._beside
         wider = passed.copy()
         wider[heads[passed[tails]]] = True
         wider[tails[passed[heads]]] = True
@@ -229,25 +319,17 @@ class OmplPlanner:
         return (("corridor", passed), widened)
 
     @cached_property
-    def _n_fields(self) -> int:
-        assert self._field_of is not None  # noqa: S101 - only called if it is set
-        return int(self._field_of.max(initial=-1)) + 1
-
-    @cached_property
-    def _beside(self) -> tuple[LongArray, LongArray]:
-        """Return the pairs of neighbouring fields, each pair once."""
-        assert self._field_of is not None  # noqa: S101
+    def _beside(self) -> tuple[int, LongArray, LongArray]:
+        """Return the number of fields, and the pairs of neighbours, in either order, each once."""
         fields = self._field_of
+        assert fields is not None  # noqa: S101 - only called if it is set
+        n_fields = int(fields.max(initial=-1)) + 1
         keys = []
         for one, other in ((fields[:, :-1], fields[:, 1:]), (fields[:-1], fields[1:])):
             differ = (one != other) & (one >= 0) & (other >= 0)
-            low, high = (
-                np.minimum(one[differ], other[differ]),
-                np.maximum(one[differ], other[differ]),
-            )
-            keys.append(low.astype(np.int64) * self._n_fields + high)
+            keys.append(one[differ].astype(np.int64) * n_fields + other[differ])
         pairs = np.unique(np.concatenate(keys))
-        return pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
+        return n_fields, pairs // max(n_fields, 1), pairs % max(n_fields, 1)
 
     def _path(self, cells: LongArray, reply: Reply) -> Path:
         """Return the path of a reply; along curves its poses are one cell apart."""
@@ -291,7 +373,7 @@ class OmplPlanner:
         return passed if inside and free[tuple(passed.T)].all() else cells
 
     def _by_line_of_sight(
-        self, cells: LongArray, endpoints: tuple[FloatArray, FloatArray], closed: LongArray | None
+        self, cells: LongArray, endpoints: tuple[FloatArray, FloatArray], closed: ClosedCells | None
     ) -> Path | None:
         """Return the shortened path of the grid; None if the robot cannot drive it."""
         if self.ompl.turning_radius_m is not None:
@@ -299,27 +381,38 @@ class OmplPlanner:
         sight = self._sight
         if closed is not None:
             allowed = self._settings.allow_unexplored
-            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed)
+            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed.flat)
         points = sight.shorten(cells, endpoints[0][:2], endpoints[1][:2])
-        steps = np.diff(points, axis=0)
-        length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
         if not self.ompl.has_heading:
-            return self._path_through(points, None, cells, length_m)
+            return self._path_through(points, None, cells, polyline_length(points))
+        return self._turning(points, cells, endpoints, closed)
+
+    def _turning(
+        self,
+        points: FloatArray,
+        cells: LongArray,
+        endpoints: tuple[FloatArray, FloatArray],
+        closed: ClosedCells | None,
+    ) -> Path | None:
+        """Return the path along a polyline with turns on the spot; None if the robot cannot."""
         poses = self._poses_along(points, endpoints, closed)
         if not len(poses):
             return None
-        points, headings = poses[:, :2].copy(), poses[:, 2].copy()
-        return self._path_through(points, headings, cells, length_m)
+        headings = poses[:, 2].copy()
+        return self._path_through(poses[:, :2].copy(), headings, cells, polyline_length(points))
 
     def _poses_along(
-        self, points: FloatArray, endpoints: tuple[FloatArray, FloatArray], closed: LongArray | None
+        self,
+        points: FloatArray,
+        endpoints: tuple[FloatArray, FloatArray],
+        closed: ClosedCells | None,
     ) -> FloatArray:
         """Return the poses of a robot along a polyline, float64 (n, 3).
 
         The robot turns on the spot at every bend and drives ahead in between; without rows if it
         cannot.
         """
-        check = self._check.confined(closed=closed)
+        check = self._check_of(closed)
         steps = np.diff(points, axis=0)
         ahead = directions(steps[:, 1], steps[:, 0])
         if self.ompl.space == "differential":
@@ -348,7 +441,7 @@ class OmplPlanner:
     @cached_property
     def _check(self) -> MotionCheck:
         allowed = self._settings.allow_unexplored
-        return MotionCheck(self._grid, footprint=self.ompl.footprint, allow_unexplored=allowed)
+        return MotionCheck(self._grid, footprint=self.body, allow_unexplored=allowed)
 
     @cached_property
     def _sight(self) -> LineOfSight:

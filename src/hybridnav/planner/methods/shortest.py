@@ -120,6 +120,10 @@ class OverMesh(Method):
                     self._search = MeshSearch(build_mesh(self._free))
         return self._search
 
+    def may_enter(self, query: Query) -> bool:
+        """Return whether the cells of start and goal may be entered."""
+        return bool(self._free[query.cells[0]] and self._free[query.cells[1]])
+
     def find(self, query: Query) -> Found:
         """Find a shortest path between two points; see `Method`. Its cells are found when somebody
         reads them.

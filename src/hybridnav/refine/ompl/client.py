@@ -64,6 +64,8 @@ class OmplQuery:
     None for the whole map."""
     closed: LongArray | None = None
     """int64 (m,), flat cells that may not be entered."""
+    solid: LongArray | None = None
+    """int64 (k,), flat cells that no part of a footprint may meet."""
     tells_search: bool = False
     """Whether to return states and trees of the search too."""
 

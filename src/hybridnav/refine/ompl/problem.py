@@ -55,7 +55,7 @@ class Base:
         self.boxes = np.empty((0, 4), np.int64) if field_of is None else boxes_of(field_of)
         self.check = MotionCheck(
             setup.grid,
-            footprint=setup.settings.footprint,
+            footprint=setup.settings.body,
             allow_unexplored=setup.allow_unexplored,
         )
         self.clearance: Clearance | None = None
@@ -116,7 +116,7 @@ def search_area_of(base: Base, query: OmplQuery, fields: BoolArray | None) -> Se
         inside = np.zeros(grid.shape, dtype=np.bool_)
         # -1, for no field, reads the last entry, which is False.
         inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
-    check = base.check.confined(inside=inside, closed=query.closed)
+    check = base.check.confined(inside=inside, closed=query.closed, solid=query.solid)
     return SearchArea(grid, inside, box, check, setup.allow_unexplored)
 
 

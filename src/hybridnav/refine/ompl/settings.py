@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
+
+if TYPE_CHECKING:
+    from hybridnav.refine.footprint import Footprint
 
 PARAMETERS: dict[str, dict[str, str]] = {
     "RRTConnect": {"intermediate_states": "setIntermediateStates", "range": "setRange"},
@@ -158,6 +161,9 @@ class OmplSettings(BaseModel):
     ] = Field(default=None, min_length=3, max_length=1000)
     """Corners in metres in the robot's frame, x ahead: a list, Nav2's string of it, or a shapely
     polygon or its WKT. Null for the disc that the map was inflated for."""
+    footprint_padding_m: Annotated[_Float, Field(ge=0, le=1e3)] = 0.0
+    """Metres by which each side of the footprint is moved outwards, as Nav2's `footprint_padding`:
+    no point of the robot comes nearer to an obstacle."""
     turning_radius_m: Annotated[_Float, Field(gt=0, le=1e4)] | None = None
     """Turning radius of `dubins` and `reeds-shepp`."""
     reverses: bool = False
@@ -244,6 +250,8 @@ class OmplSettings(BaseModel):
                     "reeds-shepp",
                 )
             _check_base(self.footprint)
+        elif self.footprint_padding_m:
+            raise PydanticCustomError("padding", "footprint_padding_m goes with a footprint")
         return self
 
     @model_validator(mode="after")
@@ -272,6 +280,15 @@ class OmplSettings(BaseModel):
     def has_heading(self) -> bool:
         """Whether states have a heading."""
         return self.space != "r2"
+
+    @property
+    def body(self) -> Footprint | None:
+        """The footprint with its padding, which every check takes; None for a disc."""
+        if self.footprint is None:
+            return None
+        from hybridnav.refine.footprint import Footprint  # noqa: PLC0415 - loads shapely
+
+        return Footprint.of(self.footprint).padded(self.footprint_padding_m)
 
 
 def _check_base(footprint: tuple[tuple[float, float], ...]) -> None:

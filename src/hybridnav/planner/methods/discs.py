@@ -1,0 +1,119 @@
+"""Two discs about the base of a robot, between which its footprint lies: what each one proves."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.clearance import within_radius
+from hybridnav.planner.endpoints import refusal
+from hybridnav.planner.methods.grid import KnownMap
+from hybridnav.planner.methods.shortest import OverMesh
+from hybridnav.planner.settings import ShortestSettings
+from hybridnav.search.found import ClosedCells
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, LongArray
+    from hybridnav.refine.footprint import Footprint
+    from hybridnav.search.found import Found, Query
+
+_ROUNDING_CELLS = 1e-6
+"""More than rounding moves a body: the discs are smaller, and larger, by this."""
+_BESIDE = 1.5
+"""Radius in cells of a cell with the eight around it."""
+
+
+@copies_alike
+class Discs:
+    """Shortest paths of the largest disc inside a footprint, and of the smallest one round it.
+
+    A cell is blocked for the inscribed disc if that meets an obstacle wherever in the cell its
+    centre is: without a path of it the robot has none, and no path of the robot is shorter. A cell
+    is free for the circumscribed disc if that meets none anywhere: its path is valid with every
+    heading. Both keep the rules of the map for the base.
+
+    Parameters
+    ----------
+    grid
+        The map, without corner cutting, inflated by no more than the inscribed radius.
+    footprint
+        The robot.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+    """
+
+    def __init__(
+        self, grid: OccupancyGrid, footprint: Footprint, *, allow_unexplored: bool = False
+    ) -> None:
+        self._grid, self._footprint = grid, footprint
+        self._settings = ShortestSettings(allow_unexplored=allow_unexplored)
+        self._grown: dict[ClosedCells, ClosedCells] = {}
+
+    @cached_property
+    def inscribed(self) -> OverMesh | None:
+        """Finds paths of the inscribed disc; None if the map is that of the disc already."""
+        radius = self._footprint.inscribed_radius_m / self._grid.resolution_m - _ROUNDING_CELLS
+        if radius < 0:
+            return None
+        blocked = within_radius(self._obstacles, radius_cells=radius)
+        blocked &= self._grid.classes != CellClass.OCCUPIED
+        return self._method(blocked) if blocked.any() else None
+
+    @cached_property
+    def circumscribed(self) -> OverMesh:
+        """Finds paths of the circumscribed disc."""
+        return self._method(self._near(self._obstacles))
+
+    def below(self, query: Query) -> Found | None:
+        """Return a shortest path of the inscribed disc, or that it has none; None if its map is
+        the one that is given."""
+        disc = self.inscribed
+        return disc.find(query) if disc is not None and disc.may_enter(query) else None
+
+    def above(self, query: Query) -> Found | None:
+        """Return a shortest path of the circumscribed disc; None without one."""
+        disc, closed = self.circumscribed, query.closed
+        if closed is not None and closed.solid is not None:
+            closed = self._around(closed, closed.solid)
+        is_shut = closed is not None and refusal(closed, query.cells, self._grid.shape)
+        if is_shut or not disc.may_enter(query):
+            return None
+        found = disc.find(query._replace(closed=closed))
+        return found if found.has_path else None
+
+    @property
+    def _obstacles(self) -> BoolArray:
+        occupied: BoolArray = self._grid.measured == CellClass.OCCUPIED
+        return occupied
+
+    def _near(self, obstacles: BoolArray) -> BoolArray:
+        """Return the cells with a point that is nearer to an obstacle than the large radius."""
+        # From the side of a cell to that of another it is as far as from a centre to the nearest
+        # one of the other cell and those around it.
+        wide = within_radius(obstacles, radius_cells=_BESIDE)
+        radius = self._footprint.circumscribed_radius_m / self._grid.resolution_m
+        return within_radius(wide, radius_cells=radius + _ROUNDING_CELLS)
+
+    def _around(self, closed: ClosedCells, solid: LongArray) -> ClosedCells:
+        """Return closed cells with those that the large disc does not enter beside solid ones."""
+        found = self._grown.get(closed)
+        if found is None:
+            obstacles = np.zeros(self._grid.shape, dtype=np.bool_)
+            obstacles.flat[solid] = True
+            flat = np.union1d(closed.flat, np.flatnonzero(self._near(obstacles)))
+            self._grown.clear()
+            found = self._grown[closed] = ClosedCells(flat)
+        return found
+
+    def _method(self, blocked: BoolArray) -> OverMesh:
+        """Return the method of the map with more blocked cells, its mesh built."""
+        values = {one.name: getattr(self._grid, one.name) for one in fields(self._grid)}
+        values["classes"] = np.where(blocked, np.uint8(CellClass.OCCUPIED), self._grid.classes)
+        method = OverMesh(KnownMap(OccupancyGrid.restored(**values), None), self._settings)
+        method.prepare()
+        return method
