@@ -107,7 +107,9 @@ def test_a_closed_path_is_left_and_an_open_one_is_kept_again(office: hn.Topologi
 @pytest.mark.parametrize("preset", ["shortest", "grid-astar", "paper"])
 def test_other_methods_refuse_it(preset: str, office: hn.TopologicalMap) -> None:
     old = hn.HybridPlanner(office, preset="robot").plan((1.0, 13.2), (5.0, 13.2))
-    with pytest.raises(hn.errors.InvalidValueError, match="keep goes with presets of method"):
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="keep goes with presets of method cheapest"
+    ):
         hn.HybridPlanner(office, preset=preset).plan((1.0, 13.2), (5.0, 13.2), keep=old)
 
 

@@ -115,15 +115,12 @@ class Planning:
 
     def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
         """Return the line of a result, None if it ends elsewhere or there is none."""
-        planner = self.preset.planner
+        planner, name = self.preset.planner, self.preset.name
         if planner.method != "cheapest":
-            raise InvalidValueError(
-                f"keep goes with presets of method cheapest, such as robot, and this is "
-                f"{self.preset.name}"
-            )
-        points = checked_type("keep", keep, PlanResult).line
-        if points is None and keep.path is not None and not keep.path.is_curved:
-            points = keep.path.points
+            raise InvalidValueError(f"keep goes with presets of method cheapest, and {name} is not")
+        points, path = checked_type("keep", keep, PlanResult).line, keep.path
+        if points is None and path is not None and not path.is_curved:
+            points = path.points
         if points is None or len(points) == 1 or not np.array_equal(points[-1], goal[:2]):
             return None
         return KeptLine(points, planner.keep_within)

@@ -176,8 +176,7 @@ class ShortestSettings(PlannerSettings):
 
     method: Literal["shortest"] = "shortest"
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """The search ends once no path can be better by more than this part; null or 0 for the
-    optimum."""
+    """The search ends once no path can be better by more than this part; null for the optimum."""
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
     """Seconds after which a query returns the best path so far, with its proved bound; null for no
     limit. Until the planner is prepared, such queries shorten a path of cells by line of sight."""
@@ -210,7 +209,7 @@ class _ByCosts(PlannerSettings):
     turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
     """With `smooth: arcs`, the least radius of an arc, metres; else the robot turns on the spot."""
     costs: CostSettings | None = None
-    """Factors by which metres cost more; the path is the cheapest one. null makes costs lengths."""
+    """Factors by which metres cost more, and the path is the cheapest; null for lengths."""
 
     @property
     def finish(self) -> Finish:
@@ -236,8 +235,7 @@ class _ByCosts(PlannerSettings):
 
 
 class CheapestSettings(_ByCosts):
-    """Method `cheapest`: the cheapest path at any angle, on a lattice that is laid over the cells,
-    moved to where it costs least.
+    """Method `cheapest`: a line over a lattice of the cells, moved to where it costs least.
 
     Examples
     --------
@@ -248,8 +246,7 @@ class CheapestSettings(_ByCosts):
 
     method: Literal["cheapest"] = "cheapest"
     keep_within: Annotated[_Float, Field(ge=0, le=1e3)] = 0.02
-    """Most that the rest of a path which is kept may cost more than a new one, as a part of it; see
-    `HybridPlanner.plan`."""
+    """Most that a kept path may cost more than a new one, a share; see `HybridPlanner.plan`."""
 
     @model_validator(mode="before")
     @classmethod

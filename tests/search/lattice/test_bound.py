@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
+from hybridnav.maps.costs import cost_along
 from hybridnav.refine import CostLine
-from hybridnav.refine.kernels.cost_line import cost_of
 from hybridnav.search.lattice import LatticeSearch, build_lattice, cost_bound
 from tests.layers import layer_of
 from tests.oracle.any_angle_cost import SidePoints
@@ -82,37 +82,36 @@ def test_it_is_tight_along_the_lines_of_the_grid() -> None:
     assert bound_of(free, factors, ((2, 3), (2, 3))) == 0
 
 
-def office_fields() -> Any:
-    """Free cells and costs of the office, and pairs of positions in it."""
+def office_paths() -> tuple[CostLine, list[tuple[Ends, float]]]:
+    """Free cells and factors of the office, and ends of good paths with their costs in cells."""
     grid = hn.load_map(Path("maps/office/office.yaml"), robot_radius_m=0.25)
-    line = CostLine(grid, hn.CostLayer.clearance(grid))
-    cells = np.argwhere(line.free)
-    return line, np.random.default_rng(3).choice(cells, (12, 2)) + 0.5
+    layer = hn.CostLayer.clearance(grid)
+    line = CostLine(grid, layer)
+    search = LatticeSearch(build_lattice(line.free.view(bool), line.factors))
+    found = []
+    for ends in np.random.default_rng(3).choice(np.argwhere(line.free), (12, 2)) + 0.5:
+        start, goal = map(tuple, ends.tolist())
+        path = search.line(start, goal).positions
+        assert path is not None
+        points = grid.frame.points_of_grid(line.settle(path))
+        found.append(((start, goal), cost_along(grid, layer, points) / grid.resolution_m))
+    return line, found
 
 
 def test_it_is_near_the_cost_of_good_paths_in_a_building() -> None:
-    line, pairs = office_fields()
-    search = LatticeSearch(build_lattice(line.free.view(bool), line.factors))
-    gaps = []
-    for start, goal in pairs:
-        path = line.settle(search.line(tuple(start), tuple(goal)).positions)
-        cost = cost_of(line.factors, path)
-        gaps.append(cost / bound_of(line.free, line.factors, (start, goal), known=cost) - 1)
+    line, found = office_paths()
+    bounds = [bound_of(line.free, line.factors, ends, known=cost) for ends, cost in found]
+    gaps = [cost / bound - 1 for (_, cost), bound in zip(found, bounds, strict=True)]
     assert np.mean(gaps) < 0.02
     assert max(gaps) < 0.04
 
 
-def test_a_known_path_that_is_too_dear_costs_little() -> None:
+def test_a_path_that_is_too_dear_makes_it_a_little_lower() -> None:
     """The bound is on all paths, whatever is known; a dear one only widens the search."""
-    line, pairs = office_fields()
-    start, goal = pairs[0]
-    search = LatticeSearch(build_lattice(line.free.view(bool), line.factors))
-    cost = cost_of(line.factors, line.settle(search.line(tuple(start), tuple(goal)).positions))
-    bounds = [
-        bound_of(line.free, line.factors, (start, goal), known=share * cost) for share in (1, 1.5)
-    ]
-    assert bounds[1] <= cost
-    assert bounds[1] > 0.95 * bounds[0]
+    line, found = office_paths()
+    ends, cost = found[0]
+    bound, loose = (bound_of(line.free, line.factors, ends, known=k * cost) for k in (1, 1.5))
+    assert 0.95 * bound < loose <= cost
 
 
 def test_walls_raise_it() -> None:

@@ -85,7 +85,19 @@ def cost_bound(
         corner = round(row), round(col)
         joins += float(factors[tuple(cell)]) * math.dist((row, col), corner)
         corners.append(np.array(corner, dtype=np.int64))
-    most = int(min((known + joins) * _RATIO, _MOST) * kernels.UNITS)
+    limit = min((known + joins) * _RATIO, _MOST)
+    # As no factor is below 1, nothing outside of this box is within the limit.
+    low, high = np.minimum(*corners), np.maximum(*corners)
+    spare = np.maximum(limit - (high - low), 0) / 2 + 2
+    low = np.maximum(low - spare, 0).astype(np.int64)
+    high = np.minimum(high + spare, free.shape).astype(np.int64)
+    box = slice(low[0], high[0]), slice(low[1], high[1])
+    free, factors = np.ascontiguousarray(free[box]), np.ascontiguousarray(factors[box])
+    corners = [corner - low for corner in corners]
+    inside: Any = [
+        (tuple(end - low), tuple(cell - low)) for end, cell in zip(ends, cells, strict=True)
+    ]
+    most = int(limit * kernels.UNITS)
     nothing = np.empty(0, np.int64)
     forth = kernels.costs_over_corners(free, factors, *corners, most, nothing)
     over_corners = int(forth[corners[1] @ (free.shape[1] + 1, 1)])
@@ -95,9 +107,7 @@ def cost_bound(
     if math.isfinite(known):
         back = kernels.costs_over_corners(free, factors, *corners[::-1], most, forth)
         band = kernels.band_of(free, forth, back, most)
-        found = max(
-            found, _proved(factors, band, (forth, back), list(zip(ends, cells, strict=True)), known)
-        )
+        found = max(found, _proved(factors, band, (forth, back), inside, known))
     return min(max(found, math.dist(*ends)), known)
 
 

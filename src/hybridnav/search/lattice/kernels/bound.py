@@ -49,6 +49,16 @@ def _factor_of_move(free, factors, row, col, move):
     return factor
 
 
+@njit(cache=True, nogil=True)
+def _left(known, at, goal, cols):
+    """Return a bound on the cost from a corner to the goal: a known one, or the octile distance."""
+    if known.size > 0:
+        return known[at]
+    down, across = abs(at // cols - goal[0]), abs(at % cols - goal[1])
+    straight, diagonal = np.int64(UNITS), np.int64(UNITS * math.sqrt(2.0))
+    return abs(down - across) * straight + min(down, across) * diagonal
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def costs_over_corners(free, factors, start, goal, most, known):
@@ -72,7 +82,6 @@ def costs_over_corners(free, factors, start, goal, most, known):
         for the octile distance.
     """
     cols = free.shape[1] + 1
-    straight, diagonal = np.int64(UNITS), np.int64(UNITS * math.sqrt(2.0))
     cost = np.full((free.shape[0] + 1) * cols, _FAR, np.int64)
     heap, size = np.empty((1024, 2), np.int64), 1
     at = start[0] * cols + start[1]
@@ -83,11 +92,7 @@ def costs_over_corners(free, factors, start, goal, most, known):
         at = pop(heap, size)
         size -= 1
         row, col = at // cols, at % cols
-        down, across = abs(row - goal[0]), abs(col - goal[1])
-        left = abs(down - across) * straight + min(down, across) * diagonal
-        if known.size > 0:
-            left = known[at]
-        if key > cost[at] + left:  # reached more cheaply since
+        if key > cost[at] + _left(known, at, goal, cols):  # reached more cheaply since
             continue
         if key > most:
             break
@@ -101,17 +106,12 @@ def costs_over_corners(free, factors, start, goal, most, known):
                 continue
             length = 1.0 if move < _STRAIGHT else math.sqrt(2.0)
             whole = cost[at] + np.int64(factor * length * UNITS)
-            to_row, to_col = row + _DOWN[move], col + _ACROSS[move]
-            to = to_row * cols + to_col
+            to = (row + _DOWN[move]) * cols + col + _ACROSS[move]
             if whole < cost[to]:
-                # Of two costs that are known the sum may not overflow.
-                down, across = abs(to_row - goal[0]), abs(to_col - goal[1])
-                left = abs(down - across) * straight + min(down, across) * diagonal
-                if known.size > 0:
-                    left = known[to]
-                if whole + left <= most:
+                over = whole + _left(known, to, goal, cols)
+                if over <= most:
                     cost[to] = whole
-                    push(heap, size, whole + left, to)
+                    push(heap, size, over, to)
                     size += 1
     return cost
 
@@ -257,6 +257,53 @@ def _proved(factors, steepness, most, rise):
     return best
 
 
+@njit(cache=True, nogil=True)
+def _push_back(corners, factors, cells, middles, ahead, ahead_middles, force, pull):
+    """Let each triangle that is too steep push back: the forces grow, and pull at the corners.
+
+    Middles are moved at once, corners by what `pull` says afterwards.
+
+    Parameters
+    ----------
+    corners, factors
+        As in `raise_potential`.
+    cells
+        int64 (k,), the cells to look at.
+    middles
+        float64 (n,), the potential of the middles of cells; written.
+    ahead, ahead_middles
+        The potential, one step further ahead; that of middles is written.
+    force
+        float64 (n, 4, 2), the force along and across the side of each triangle; written.
+    pull
+        float64 (n_corners,), written: how much forces pull at each corner.
+    """
+    pull[:] = 0.0
+    for cell in cells:
+        limit = _FORCE * factors[cell]
+        pull_middle = 0.0
+        for side in range(4):
+            # The slope along the side, and from the side to the middle.
+            first, second = corners[cell, _SIDES[side, 0]], corners[cell, _SIDES[side, 1]]
+            along = ahead[second] - ahead[first]
+            inward = 2 * ahead_middles[cell] - ahead[first] - ahead[second]
+            along = force[cell, side, 0] + _FORCE * along
+            inward = force[cell, side, 1] + _FORCE * inward
+            squared = along * along + inward * inward
+            if squared <= limit * limit:
+                force[cell, side, 0] = force[cell, side, 1] = 0.0
+                continue
+            # What exceeds the factor pushes back.
+            share = 1 - limit / math.sqrt(squared)
+            along, inward = share * along, share * inward
+            force[cell, side, 0], force[cell, side, 1] = along, inward
+            pull[second] += along - inward
+            pull[first] -= along + inward
+            pull_middle += 2 * inward
+        moved = middles[cell] - _STEP * pull_middle
+        ahead_middles[cell], middles[cell] = 2 * moved - middles[cell], moved
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def raise_potential(corners, factors, potential, ends, iterations, enough):
@@ -298,6 +345,7 @@ def raise_potential(corners, factors, potential, ends, iterations, enough):
     steepness, steep = np.empty(n), np.empty(n, np.int64)
     n_steep, best = 0, 0.0
     for iteration in range(iterations):
+        # Now and then a look at all cells: what is proved, and which of them are steep.
         if iteration % _ROUND == 0:
             most = _steepest(corners, factors, potential, middles, steepness)
             rise = _value(potential, middles, corners, ends[1])
@@ -310,30 +358,9 @@ def raise_potential(corners, factors, potential, ends, iterations, enough):
                 if steepness[cell] > _SLACK or np.any(force[cell] != 0.0):
                     steep[n_steep] = cell
                     n_steep += 1
-        pull[:] = 0.0
-        for cell in steep[:n_steep]:
-            limit = _FORCE * factors[cell]
-            pull_middle = 0.0
-            for side in range(4):
-                # The slope along the side, and from the side to the middle.
-                first, second = corners[cell, _SIDES[side, 0]], corners[cell, _SIDES[side, 1]]
-                along = ahead[second] - ahead[first]
-                inward = 2 * ahead_middles[cell] - ahead[first] - ahead[second]
-                along = force[cell, side, 0] + _FORCE * along
-                inward = force[cell, side, 1] + _FORCE * inward
-                squared = along * along + inward * inward
-                if squared <= limit * limit:
-                    force[cell, side, 0] = force[cell, side, 1] = 0.0
-                    continue
-                # What exceeds the factor pushes back.
-                share = 1 - limit / math.sqrt(squared)
-                along, inward = share * along, share * inward
-                force[cell, side, 0], force[cell, side, 1] = along, inward
-                pull[second] += along - inward
-                pull[first] -= along + inward
-                pull_middle += 2 * inward
-            moved = middles[cell] - _STEP * pull_middle
-            ahead_middles[cell], middles[cell] = 2 * moved - middles[cell], moved
+        cells = steep[:n_steep]
+        _push_back(corners, factors, cells, middles, ahead, ahead_middles, force, pull)
+        # Up at the goal, down at the start.
         for k in range(2):
             cell, side = int(ends[k, 0]), int(ends[k, 1])
             up = 1.0 if k == 1 else -1.0
@@ -341,6 +368,7 @@ def raise_potential(corners, factors, potential, ends, iterations, enough):
             ahead_middles[cell] += 2 * up * _STEP * ends[k, 2]
             for other in range(2):
                 pull[corners[cell, _SIDES[side, other]]] -= up * ends[k, 3 + other]
+        # Corners move, and are looked at one step further ahead.
         for corner in range(potential.size):
             moved = potential[corner] - _STEP * pull[corner]
             ahead[corner], potential[corner] = 2 * moved - potential[corner], moved
