@@ -4,8 +4,10 @@ The maps are those of the study, and the office of `maps/office`; robot radius 0
 maps 0. Pairs are drawn from the largest connected part. Columns:
 
     plan        median and 95 % quantile of one `plan`, ms, the least of two runs; planners prepared
-    A*          the same of `grid-astar` by the same costs
-    speedup     median of the ratios of the two, and the part of the pairs where it is below 1
+    A*          the same of `grid-astar` by the same costs, whose path of cells is no line
+    A*, arcs    the same where its path is settled and rounded as that of `robot`
+    speedup     median of A* over plan, and the part of the pairs where it is below 1
+    of arcs     the same for A* with arcs
     bound       median and 95 % quantile of the first reading of `lower_bound`, ms
     gap         mean and 95 % quantile of `gap`, %
     steady      part of the plans from points along a path, to its goal, that stay within a cell of
@@ -41,7 +43,8 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
 
-COLUMNS = ("map", "plan", "A*", "speedup", "bound", "gap", "steady", "duplicates")
+MEASURED = ("plan", "A*", "A*, arcs", "bound", "gap", "steady")
+COLUMNS = ("map", *MEASURED[:3], "speedup", "of arcs", *MEASURED[3:], "duplicates")
 
 
 def strayed_cells(
@@ -69,14 +72,17 @@ def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[s
     planner.prepare()
     planner.plan(*pairs[0]).gap  # noqa: B018 - kernels load
     rival.plan(*pairs[0])
-    seconds, rival_seconds, bound_seconds, gaps, strayed, paths = [], [], [], [], [], []
+    seconds, rival_seconds, arc_seconds, bound_seconds = [], [], [], []
+    gaps, strayed, paths = [], [], []
     for start, goal in pairs:
         result, s = timed(lambda: planner.plan(start, goal), 2)  # noqa: B023 - called at once
         _, rival_s = timed(lambda: rival.plan(start, goal), 2)  # noqa: B023
+        _, arc_s = timed(lambda: rival.plan(start, goal, smooth="arcs"), 2)  # noqa: B023
         _, bound_s = timed(lambda: result.lower_bound)  # noqa: B023
         assert result.path is not None  # noqa: S101 - ends lie in one part
         seconds.append(s)
         rival_seconds.append(rival_s)
+        arc_seconds.append(arc_s)
         bound_seconds.append(bound_s)
         gaps.append(result.gap)
         paths.append(result.path.points)
@@ -88,6 +94,7 @@ def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[s
     return {
         "plan": np.array(seconds),
         "A*": np.array(rival_seconds),
+        "A*, arcs": np.array(arc_seconds),
         "bound": np.array(bound_seconds),
         "gap": np.array(gaps),
         "steady": np.array(strayed),
@@ -105,13 +112,14 @@ def ms(seconds: FloatArray) -> str:
 
 def row(name: str, found: dict[str, Any]) -> None:
     """Print the line of a map."""
-    speedup = found["A*"] / found["plan"]
+    speedups = [found[rival] / found["plan"] for rival in MEASURED[1:3]]
     gap, steady = 100 * found["gap"], found["steady"]
     print_row(
         name,
         ms(found["plan"]),
         ms(found["A*"]),
-        f"{np.median(speedup):.2f}, {np.mean(speedup < 1):.2f} below 1",
+        ms(found["A*, arcs"]),
+        *(f"{np.median(each):.2f}, {np.mean(each < 1):.2f} below 1" for each in speedups),
         ms(found["bound"]),
         f"{gap.mean():.2f} / {np.quantile(gap, 0.95):.2f}",
         f"{100 * np.mean(steady <= 1):.1f} %, {steady.max():.1f}" if steady.size else "",
@@ -142,19 +150,9 @@ def main(given: Namespace) -> None:
         points = grid.frame.points_of(drawn.reshape(-1, 2)).reshape(-1, 2, 2)
         every.append(measured(grid, points, given.steady))
         row(file.parent.name + "/" + file.stem, every[-1])
-    speedups = [np.median(found["A*"] / found["plan"]) for found in every]
-    row(
-        "all pairs",
-        {
-            **{
-                key: np.concatenate([found[key] for found in every])
-                for key in COLUMNS[1:7]
-                if key != "speedup"
-            },
-            "duplicates": sum(found["duplicates"] for found in every),
-        },
-    )
-    print(
-        f"median of the maps' median speedups {np.median(speedups):.2f}, least {min(speedups):.2f}"
-    )
+    whole = {key: np.concatenate([found[key] for found in every]) for key in MEASURED}
+    row("all pairs", {**whole, "duplicates": sum(found["duplicates"] for found in every)})
+    for rival in MEASURED[1:3]:
+        medians = [np.median(found[rival] / found["plan"]) for found in every]
+        print(f"{rival}: median of the maps {np.median(medians):.2f}, least {min(medians):.2f}")
     print_load()

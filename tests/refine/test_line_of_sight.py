@@ -290,9 +290,10 @@ def test_one_walk_finds_what_two_do(ends: Any, seed: int, share: float) -> None:
 def test_a_bend_that_is_straight_has_no_arc() -> None:
     free, factors = np.ones((40, 40), np.uint8), np.ones((40, 40), np.float32)
     line = np.array([[0.5, 0.5], [10.5, 10.5], [20.5, 20.5], [30.5, 10.5]])
-    points, directions, cost, length = round_bends(free, factors, line, 3.0, 1.0)
+    points, headings, cost, length = round_bends(free, factors, line, 3.0, 1.0)
     np.testing.assert_array_equal(points[1], line[1])
-    np.testing.assert_allclose(directions[:3], math.sqrt(0.5))
+    np.testing.assert_allclose(headings[:3], math.pi / 4)
+    np.testing.assert_allclose(headings[3:], 3 * math.pi / 4)
     arc = np.hypot(*(points[2] - line[2]))  # from the bend to either end of the arc
     expected = 30 * math.sqrt(2) - 2 * arc + arc * math.pi / 2
     assert cost == pytest.approx(expected, rel=1e-6)

@@ -299,14 +299,14 @@ class Planning:
         self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
     ) -> PlanResult:
         """Return the result of a cheapest any-angle path, with arcs if the request says so."""
-        points, cost_m = found.points, found.cost_m
+        points = found.points
         assert points is not None  # noqa: S101 - any-angle methods state them
         if request.smooth == "arcs":
             began = time.perf_counter()
             path, cost_m = costs.arcs_along(found.cells, points, request.closed)
             found.stats.seconds["arcs"] = time.perf_counter() - began
         else:
-            length_m = polyline_length(points)
+            length_m, cost_m = polyline_length(points), found.cost_m
             path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
         bound = self._cost_bound(query, cost_m)
         metric, weighted = self.method.metric, cost_m

@@ -9,7 +9,6 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import wrapped
-from hybridnav._base.trig import directions
 from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
@@ -196,10 +195,9 @@ class CostLine:
         line = self.on_grain(points)
         per_cell = self._frame.resolution_m
         spare = _SPARE * kernels.cost_of(self.factors, line)
-        found, ahead, cost, length = round_bends(
+        found, headings, cost, length = round_bends(
             self.free, self.factors, line, radius_m / per_cell, spare
         )
-        headings = directions(ahead[:, 0], ahead[:, 1])
         if self._frame.yaw_rad != 0:
             headings = wrapped(headings + self._frame.yaw_rad)
         rounded = self.in_metres(found, points[0], points[-1])

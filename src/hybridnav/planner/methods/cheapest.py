@@ -132,15 +132,17 @@ class OverLattice(Method):
         seconds["settle"] = time.perf_counter() - now
         points = line.in_metres(positions, *query.points)
         points = points if query.straight_m > 0 else points[:1]
-        cost_m = max(cost_along(self._grid, self._layer, points), query.straight_m)
         if query.kept is not None and len(points) > 1:
-            most_m = (1 + query.kept.within) * cost_m
+            most_m = (1 + query.kept.within) * self._cost_m(query, points)
             rest = line.rest_of(query.kept.points, query.points[0], most_m)
-            if rest is not None:
-                points, cost_m = rest, cost_along(self._grid, self._layer, rest)
-                cost_m = max(cost_m, query.straight_m)
+            points = points if rest is None else rest
         passed = partial(self._passed, query, line, points)
-        return Found(passed, cost_m, query.straight_m, points, stats=stats)
+        cost = partial(self._cost_m, query, points)
+        return Found(passed, cost, query.straight_m, points, stats=stats)
+
+    def _cost_m(self, query: Query, points: FloatArray) -> float:
+        """Return the cost of a line in metres, which rounding takes below no distance."""
+        return max(cost_along(self._grid, self._layer, points), query.straight_m)
 
     def _position_in(self, cell: tuple[int, int], point: FloatArray) -> tuple[float, float]:
         """Return the position of a point in a cell, on the grain of exact tests."""

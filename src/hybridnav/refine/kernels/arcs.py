@@ -209,13 +209,13 @@ def _thinned(free, factors, line, radius, spare):
 @guarded
 @njit(cache=True, nogil=True)
 def round_bends(free, factors, line, radius, spare):
-    """Return the points of a line with rounded bends, the directions at each, cost and length.
+    """Return the points of a line with rounded bends, the headings at each, cost and length.
 
-    Directions are unit vectors, float64 (m, 2) as the points. Between two points the path is
-    straight if they have the same direction, else an arc; two equal points are a turn on the spot,
-    where no arc of the radius fits. No point occurs twice with one direction. An arc has at least
-    the radius, and at most four times that. Bends too close to each other for that are merged
-    first.
+    Headings are float64 (m,), radians from the direction of the columns to that of the rows.
+    Between two points the path is straight if they have the same heading, else an arc; two equal
+    points are a turn on the spot, where no arc of the radius fits. No point occurs twice with one
+    direction. An arc has at least the radius, and at most four times that. Bends too close to each
+    other for that are merged first.
 
     Parameters
     ----------
@@ -282,4 +282,7 @@ def round_bends(free, factors, line, radius, spare):
         size += 1
     cost += segment_cost(factors, last[0], last[1], line[n - 1, 0], line[n - 1, 1])
     length += math.hypot(line[n - 1, 0] - last[0], line[n - 1, 1] - last[1])
-    return points[:size].copy(), directions[:size].copy(), cost, length
+    headings = np.empty(size)
+    for i in range(size):
+        headings[i] = atan2(directions[i, 0], directions[i, 1])
+    return points[:size].copy(), headings, cost, length
