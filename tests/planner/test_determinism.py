@@ -61,8 +61,8 @@ def queries(name: str) -> Any:
     return office().grid.frame.points_of_grid(chosen + inside)
 
 
-def told(planner: hn.HybridPlanner, pair: Any, *, by: str = "path") -> str:
-    """A hash of all bits of an answer, or of its `cost` alone.
+def told(planner: hn.HybridPlanner, pair: Any) -> str:
+    """A hash of all bits of an answer.
 
     The bound, which takes a search of its own, is read of a fifth of the queries.
     """
@@ -70,7 +70,7 @@ def told(planner: hn.HybridPlanner, pair: Any, *, by: str = "path") -> str:
     parts = [str(result.status), result.cost.hex()]
     if round(1000 * pair.sum()) % 5 == 0:
         parts.append(float(result.lower_bound).hex())
-    if result.path is not None and by == "path":
+    if result.path is not None:
         parts += [result.path.points.tobytes().hex(), str(result.path.cells.tolist())]
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()
 
@@ -100,23 +100,21 @@ def test_answers_depend_on_nothing_that_was_asked_before(name: str) -> None:
 @pytest.mark.parametrize("is_prepared", [False, True])
 @pytest.mark.parametrize("name", COUNTS)
 def test_an_update_and_its_reverse_change_nothing(name: str, is_prepared: bool) -> None:  # noqa: FBT001
-    """`octile` alone may then take another one of several paths that are equally short."""
-    by = "cost" if name == "octile" else "path"
     pairs, planner = queries(name)[:20], planner_of(name)
-    cold = [told(planner, pair, by=by) for pair in pairs]
+    cold = [told(planner, pair) for pair in pairs]
     if is_prepared:
         planner.prepare()
     planner.update(topology=office(is_changed=True))
     fresh = planner_of(name, is_changed=True)
-    there = [told(planner, pair, by=by) for pair in pairs]
-    assert there == [told(fresh, pair, by=by) for pair in pairs]
+    there = [told(planner, pair) for pair in pairs]
+    assert there == [told(fresh, pair) for pair in pairs]
     assert there != cold
     if name == "cheapest-by-noise":
         planner.update(costs=noise(2), changed=(5.0, 5.0, 20.0, 15.0))
         planner.update(costs=noise(1), changed=(5.0, 5.0, 20.0, 15.0))
-        assert [told(planner, pair, by=by) for pair in pairs] == there
+        assert [told(planner, pair) for pair in pairs] == there
     planner.update(topology=office())
-    assert [told(planner, pair, by=by) for pair in pairs] == cold
+    assert [told(planner, pair) for pair in pairs] == cold
 
 
 def test_another_process_answers_alike() -> None:

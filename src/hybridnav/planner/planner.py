@@ -300,11 +300,9 @@ class HybridPlanner:
         Queries of other threads that run already finish by what was before; the update waits for
         them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
 
-        With method `cheapest` the changed fields get their costs at once; searches leave stale
-        tables above these out until `prepare` renews them. `shortest`, `octile` and `grid-astar`
-        follow a changed grid alone. Their results have no route, and names, places and doors are
-        refused, until an update brings the places of the map now. All other presets need these at
-        once. Costs that were given stay with their cells on a changed map; those that the preset
+        `shortest`, `octile`, `grid-astar` and `robot` follow a changed grid alone. Their results
+        have no route, and names, places and doors are refused, until an update brings the places of
+        the map now. All other presets need these at once. Costs that were given stay with their cells on a changed map; those that the preset
         computes from the map are computed anew.
 
         Parameters

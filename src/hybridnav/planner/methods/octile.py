@@ -13,7 +13,7 @@ from hybridnav._base.progress import no_progress
 from hybridnav.maps.geometry import centres
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
-from hybridnav.search.octile import JumpPatch, JumpSearch, build_jump_graph, contract_graph
+from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
@@ -54,34 +54,30 @@ class OverJumps(Method):
 
     @property
     def prepared(self) -> JumpSearch | None:
-        """The search of the graph, None until it is built, and after a change of the map."""
-        search = self._search
-        return None if search is None or search.patch is not None else search
+        """The search of the graph, None until it is built."""
+        return self._search
 
     def prepare(self, progress: Progress = no_progress) -> JumpSearch:
-        """Build the graph, once, also anew after a change of the map; see `Method`."""
-        if self.prepared is None:
+        """Build the graph, once; see `Method`."""
+        if self._search is None:
             with self._building:
-                if self.prepared is None:
+                if self._search is None:
                     free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
                     graph = build_jump_graph(free)
-                    base = JumpPatch.of(graph)
                     progress(1, 2)
                     if graph.n_corners >= CONTRACTED_FROM:
                         graph = contract_graph(graph)
-                    self._search = JumpSearch(graph, base=base)
+                    self._search = JumpSearch(graph)
                     progress(2, 2)
-        assert self._search is not None  # noqa: S101 - built above
         return self._search
 
     def changed(self, change: MapChange) -> OverJumps:
-        """Return the method of the changed map, whose corners look anew; see `Method`."""
+        """Return the method of the changed map, whose graph the next query builds; see `Method`."""
         allowed, search, (grid, *_, cells) = self._allow_unexplored, self._search, change
-        if search is not None:
-            free = grid.enterable(allow_unexplored=allowed)
-            was = enterable_of(self._grid, cells, allow_unexplored=allowed)
-            changed = cells[was != free[tuple(cells.T)]]
-            search = search.renewed(free, changed) if len(changed) else search
+        was, now = (
+            enterable_of(each, cells, allow_unexplored=allowed) for each in (self._grid, grid)
+        )
+        search = search if (was == now).all() else None
         return OverJumps(KnownMap(grid, change.topology, prepared=search), self._settings)
 
     def find(self, query: Query) -> Found:

@@ -4,7 +4,6 @@ from .build import (
     contract_graph as contract_graph,
 )
 from .search import (
-    JumpPatch as JumpPatch,
     JumpPath as JumpPath,
     JumpPaths as JumpPaths,
     JumpSearch as JumpSearch,
