@@ -202,7 +202,9 @@ class CostFinish:
 
     def bound(self, query: Query, cost_m: float) -> float:
         """Return a lower bound on the cost of all any-angle paths of a query, in metres, at most
-        the cost of a path that is known."""
+        the cost of a path that is known; where corners may be cut, the distance."""
+        if self._grid.corner_cutting:
+            return min(query.straight_m, cost_m)
         # Loads modules that plans whose bound nobody reads do not need.
         from hybridnav.search.lattice import cost_bound  # noqa: PLC0415
 

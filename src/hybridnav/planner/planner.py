@@ -302,8 +302,8 @@ class HybridPlanner:
 
         `shortest`, `octile`, `grid-astar` and `robot` follow a changed grid alone. Their results
         have no route, and names, places and doors are refused, until an update brings the places of
-        the map now. All other presets need these at once. Costs that were given stay with their cells on a changed map; those that the preset
-        computes from the map are computed anew.
+        the map now. All other presets need these at once. Costs that were given stay with their
+        cells on a changed map; those that the preset computes from the map are computed anew.
 
         Parameters
         ----------

@@ -114,6 +114,18 @@ def test_a_path_that_is_too_dear_makes_it_a_little_lower() -> None:
     assert 0.95 * bound < loose <= cost
 
 
+def test_no_path_leads_between_two_blocked_cells_that_meet_at_a_corner() -> None:
+    """A wall of cells that meet at corners alone; only its end at the bottom is open."""
+    free, factors = np.ones((30, 31), np.uint8), np.ones((30, 31), np.float32)
+    free[np.arange(29), 15 + np.arange(29) % 2] = 0
+    ends = (0.5, 14.5), (0.5, 17.5)
+    corners = [(29, 15), (29, 16), (28, 17)]
+    around = sum(map(math.dist, [ends[0], *corners], [*corners, ends[1]]))
+    for known in (math.inf, around * 1.001):
+        bound = bound_of(free, factors, ends, known=known)
+        assert 0.85 * around < bound <= around + 1e-6
+
+
 def test_walls_raise_it() -> None:
     free, factors = np.ones((30, 30), np.uint8), np.ones((30, 30), np.float32)
     free[:29, 15] = 0

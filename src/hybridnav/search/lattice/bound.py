@@ -39,14 +39,14 @@ def cost_bound(
 ) -> float:
     """Return a lower bound on the cost of all paths between two positions, in cells.
 
-    A *potential*, a function that nowhere rises by more than the factor, is a bound by itself: no
-    path costs less than the potential rises from its start to its goal. One that is linear on four
-    triangles a cell is found by fast marching from both ends, and then raised by a primal-dual
-    iteration; where it is still too steep, the excess is subtracted. It covers the cells over which
-    a path may cost less than the known one. Paths that leave them cost more: between two corners of
-    cells, the cheapest path along sides and diagonals is at most 1.0824 times as dear as the
-    cheapest at any angle, whatever the factors are; along a side the smaller factor of its two
-    cells counts.
+    Paths may touch blocked cells, but not pass between two that meet at a corner. A *potential*, a
+    function that nowhere rises by more than the factor, is a bound by itself: no path costs less
+    than the potential rises from its start to its goal. One that is linear on four triangles a cell
+    is found by fast marching from both ends, and then raised by a primal-dual iteration; where it
+    is still too steep, the excess is subtracted. It covers the cells over which a path may cost
+    less than the known one. Paths that leave them cost more: between two corners of cells, the
+    cheapest path along sides and diagonals is at most 1.0824 times as dear as the cheapest at any
+    angle, whatever the factors are; along a side the smaller factor of its two cells counts.
 
     Parameters
     ----------
@@ -93,19 +93,23 @@ def cost_bound(
     high = np.minimum(high + spare, free.shape).astype(np.int64)
     box = slice(low[0], high[0]), slice(low[1], high[1])
     free, factors = np.ascontiguousarray(free[box]), np.ascontiguousarray(factors[box])
-    corners = [corner - low for corner in corners]
     inside: Any = [
-        (tuple(end - low), tuple(cell - low)) for end, cell in zip(ends, cells, strict=True)
+        (tuple(end - low), tuple((cell - low).tolist()))
+        for end, cell in zip(ends, cells, strict=True)
     ]
+    start, goal = (
+        kernels.corner_of(free, *(corner - low), cell[0])
+        for corner, (_, cell) in zip(corners, inside, strict=True)
+    )
     most = int(limit * kernels.UNITS)
     nothing = np.empty(0, np.int64)
-    forth = kernels.costs_over_corners(free, factors, *corners, most, nothing)
-    over_corners = int(forth[corners[1] @ (free.shape[1] + 1, 1)])
+    forth = kernels.costs_over_corners(free, factors, start, goal, most, nothing)
+    over_corners = int(forth[goal])
     if over_corners > most:
         return known
     found = over_corners / kernels.UNITS / _RATIO - joins
     if math.isfinite(known):
-        back = kernels.costs_over_corners(free, factors, *corners[::-1], most, forth)
+        back = kernels.costs_over_corners(free, factors, goal, start, most, forth)
         band = kernels.band_of(free, forth, back, most)
         found = max(found, _proved(factors, band, (forth, back), inside, known))
     return min(max(found, math.dist(*ends)), known)

@@ -1,7 +1,9 @@
 """Kernels of a lower bound on the cost of all paths between two positions.
 
-Positions are (row, col) in grid units. A *corner* is a lattice point where four cells meet. Each
-cell is cut into four triangles by its middle; the corners of a cell are numbered 0 to 3, row by
+Positions are (row, col) in grid units. A *corner* is a lattice point where four cells meet. Where
+only two of these are free, and meet in it alone, no path leads from one to the other: such a corner
+is *split* into two, one for each cell. So there are two numbers for each lattice point. Each cell
+is cut into four triangles by its middle; the corners of a cell are numbered 0 to 3, row by
 row, and its *sides* as in `_SIDES`.
 """
 
@@ -32,21 +34,41 @@ _LONGEST = math.sqrt(2.0) * (1 + 1e-12)
 
 
 @njit(cache=True, nogil=True)
-def _factor_of_move(free, factors, row, col, move):
-    """Return the factor of a move from a corner, infinite where it meets no free cell.
+def corner_of(free, row, col, cell_row):
+    """Return the number of the corner at a lattice point for a free cell beside it, by its row."""
+    rows, cols = free.shape
+    number = 2 * (row * (cols + 1) + col)
+    if row == 0 or row == rows or col == 0 or col == cols:
+        return number
+    above = free[row - 1, col - 1] != 0, free[row - 1, col] != 0
+    below = free[row, col - 1] != 0, free[row, col] != 0
+    is_split = above[0] != above[1] and below[0] != below[1] and above[0] != below[0]
+    # A cell above has the first number, one below the second.
+    return number + 1 if is_split and cell_row == row else number
 
-    Along a side the cheaper of its two cells counts.
+
+@njit(cache=True, nogil=True)
+def _move_from(free, factors, corner, move):
+    """Return the corner that a move from a corner leads to, and the factor of the move.
+
+    Along a side the cheaper of its two cells counts; without a free cell, the factor is infinite.
     """
     rows, cols = free.shape
+    row, col = corner // 2 // (cols + 1), corner // 2 % (cols + 1)
     down, across = _DOWN[move], _ACROSS[move]
-    factor = np.inf
+    factor, to = np.inf, np.int64(0)
     for k in range(2 if move < _STRAIGHT else 1):
         # The cell below and right of a corner has its row and column.
         cell_row = row - (k if down == 0 else down < 0)
         cell_col = col - (k if across == 0 else across < 0)
-        if 0 <= cell_row < rows and 0 <= cell_col < cols and free[cell_row, cell_col] != 0:
-            factor = min(factor, factors[cell_row, cell_col] + 0.0)
-    return factor
+        if not (0 <= cell_row < rows and 0 <= cell_col < cols) or free[cell_row, cell_col] == 0:
+            continue
+        if corner_of(free, row, col, cell_row) != corner:
+            continue
+        if factors[cell_row, cell_col] < factor:
+            factor = factors[cell_row, cell_col] + 0.0
+            to = corner_of(free, row + down, col + across, cell_row)
+    return to, factor
 
 
 @njit(cache=True, nogil=True)
@@ -54,7 +76,8 @@ def _left(known, at, goal, cols):
     """Return a bound on the cost from a corner to the goal: a known one, or the octile distance."""
     if known.size > 0:
         return known[at]
-    down, across = abs(at // cols - goal[0]), abs(at % cols - goal[1])
+    at, goal = at // 2, goal // 2
+    down, across = abs(at // cols - goal // cols), abs(at % cols - goal % cols)
     straight, diagonal = np.int64(UNITS), np.int64(UNITS * math.sqrt(2.0))
     return abs(down - across) * straight + min(down, across) * diagonal
 
@@ -74,7 +97,7 @@ def costs_over_corners(free, factors, start, goal, most, known):
     factors
         float32 (rows, cols), >= 1.
     start, goal
-        int64 (2,), (row, col) of the corners.
+        Their numbers.
     most
         The limit, in units.
     known
@@ -82,16 +105,14 @@ def costs_over_corners(free, factors, start, goal, most, known):
         for the octile distance.
     """
     cols = free.shape[1] + 1
-    cost = np.full((free.shape[0] + 1) * cols, _FAR, np.int64)
+    cost = np.full(2 * (free.shape[0] + 1) * cols, _FAR, np.int64)
     heap, size = np.empty((1024, 2), np.int64), 1
-    at = start[0] * cols + start[1]
-    cost[at] = 0
-    heap[0, 0], heap[0, 1] = 0, at
+    cost[start] = 0
+    heap[0, 0], heap[0, 1] = 0, start
     while size > 0:
         key = heap[0, 0]
         at = pop(heap, size)
         size -= 1
-        row, col = at // cols, at % cols
         if key > cost[at] + _left(known, at, goal, cols):  # reached more cheaply since
             continue
         if key > most:
@@ -101,12 +122,11 @@ def costs_over_corners(free, factors, start, goal, most, known):
             larger[:size] = heap[:size]
             heap = larger
         for move in range(_DOWN.size):
-            factor = _factor_of_move(free, factors, row, col, move)
+            to, factor = _move_from(free, factors, at, move)
             if factor == np.inf:
                 continue
             length = 1.0 if move < _STRAIGHT else math.sqrt(2.0)
             whole = cost[at] + np.int64(factor * length * UNITS)
-            to = (row + _DOWN[move]) * cols + col + _ACROSS[move]
             if whole < cost[to]:
                 over = whole + _left(known, to, goal, cols)
                 if over <= most:
@@ -146,7 +166,7 @@ def band_of(free, forth, back, most):
                 continue
             is_near = False
             for k in range(4):
-                at = (row + k // 2) * (cols + 1) + col + k % 2
+                at = corner_of(free, row + k // 2, col + k % 2, row)
                 if forth[at] < _FAR and back[at] < _FAR and forth[at] + back[at] < most:
                     is_near = True
                     break
@@ -157,7 +177,7 @@ def band_of(free, forth, back, most):
                 corners = np.concatenate((corners, np.empty_like(corners)))
             cells[n_cells] = row * cols + col
             for k in range(4):
-                at = (row + k // 2) * (cols + 1) + col + k % 2
+                at = corner_of(free, row + k // 2, col + k % 2, row)
                 if number[at] < 0:
                     number[at] = n_corners
                     n_corners += 1
