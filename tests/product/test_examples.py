@@ -80,6 +80,7 @@ OTHERS = [
     "Frame.moved",
     "HybridPlanner.update",
     "OccupancyGrid.from_message",
+    "Path.profile",
     "Path.to_message",
     "RoomLabels.at",
     "TopologicalMap.local_grid",
