@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray, SignArray
 
 _MAX_POSES = 10_000_000
-_BEND = 1e-6
+BEND = 1e-6
 """Radians, and radians per metre, below which a path counts as straight: the rounding of cell
 centres on a straight line far from the origin."""
 _ROUNDING = 1e-9
@@ -107,9 +107,9 @@ class Motion:
         """
         turns = np.zeros(len(self.points), dtype=np.bool_)
         if self.headings_rad is None:
-            turns[1:-1] = np.abs(wrapped(np.diff(self._travel))) > _BEND
+            turns[1:-1] = np.abs(wrapped(np.diff(self._travel))) > BEND
         else:
-            turns[:-1] = (self.lengths_m == 0) & (np.abs(self._turns) > _BEND)
+            turns[:-1] = (self.lengths_m == 0) & (np.abs(self._turns) > BEND)
         for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
             turns[end] |= heading is not None and _differ(heading, self._faced[end])
         return np.flatnonzero(turns)
@@ -118,7 +118,7 @@ class Motion:
     def max_curvature_per_m(self) -> float:
         """Largest turn of a metre driven on arcs, in radians."""
         lengths, turns = self.lengths_m, np.abs(self._turns)
-        bent = (lengths > 0) & (turns > _BEND)
+        bent = (lengths > 0) & (turns > BEND)
         return float((turns[bent] / lengths[bent]).max(initial=0.0)) if self.curved else 0.0
 
     @property
@@ -156,9 +156,9 @@ class Motion:
         lengths, turns = self.lengths_m, self._turns
         moves = lengths > 0
         rate = np.divide(turns, lengths, out=np.zeros_like(turns), where=moves)
-        bent = np.abs(np.diff(rate)) > _BEND
+        bent = np.abs(np.diff(rate)) > BEND
         if not self.curved:
-            bent |= np.abs(wrapped(np.diff(self._travel))) > _BEND
+            bent |= np.abs(wrapped(np.diff(self._travel))) > BEND
         else:
             bent |= np.diff(self.directions) != 0
         if self.headings_rad is not None:  # turns on the spot
@@ -176,7 +176,7 @@ class Motion:
         InvalidValueError
             When the spacing is not positive, or there would be more than ten million poses.
         """
-        left = np.append((self._chords > 0) | (np.abs(self._turns) > _BEND), True)
+        left = np.append((self._chords > 0) | (np.abs(self._turns) > BEND), True)
         if not left.all():  # turns by less than a bend are none
             headings = None if self.headings_rad is None else self.headings_rad[left]
             distinct = replace(self, points=self.points[left], headings_rad=headings)
@@ -215,7 +215,7 @@ class Motion:
             return found
         yaw, moves = found.poses[:, 2], found.lengths_m > 0
         turn = wrapped(np.diff(yaw))
-        at = 1 + np.flatnonzero((np.abs(turn[:-1]) > _BEND) & moves[:-1] & moves[1:])
+        at = 1 + np.flatnonzero((np.abs(turn[:-1]) > BEND) & moves[:-1] & moves[1:])
         before = np.column_stack([found.poses[at, :2], yaw[at - 1]])
         return Spread(
             np.insert(found.poses, at, before, 0),
@@ -278,7 +278,7 @@ def _chord_of_arc(half_rad: FloatArray) -> FloatArray:
 
 def _differ(one_rad: float, other_rad: float) -> bool:
     """Return whether a robot turns from one heading to the other."""
-    return bool(np.abs(wrapped(np.array([one_rad - other_rad])))[0] > _BEND)
+    return bool(np.abs(wrapped(np.array([one_rad - other_rad])))[0] > BEND)
 
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:

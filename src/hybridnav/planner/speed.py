@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
-from hybridnav._base.poses import wrapped
+from hybridnav._base.poses import BEND, wrapped
 from hybridnav._base.trig import directions
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.checks import checked_type
@@ -19,9 +19,6 @@ from hybridnav.maps.geometry import least_along
 if TYPE_CHECKING:
     from hybridnav._base.poses import Spread
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, SignArray
-
-_KINK_RAD = 1e-6
-"""Change of the direction of travel above which a robot must stop, as in `_base.poses`."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +238,7 @@ def _stands(driven: Spread, is_curved: bool) -> BoolArray:  # noqa: FBT001 - a f
         return stops
     steps = np.diff(driven.poses[:, :2], axis=0)
     turn = wrapped(np.diff(directions(steps[:, 1], steps[:, 0])))
-    stops |= np.abs(turn) > _KINK_RAD
+    stops |= np.abs(turn) > BEND
     return stops
 
 

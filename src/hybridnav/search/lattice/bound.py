@@ -111,11 +111,11 @@ def cost_bound(
     if math.isfinite(known):
         back = kernels.costs_over_corners(free, factors, goal, start, most, forth)
         band = kernels.band_of(free, forth, back, most)
-        found = max(found, _proved(factors, band, (forth, back), inside, known))
+        found = max(found, _by_potential(factors, band, (forth, back), inside, known))
     return min(max(found, math.dist(*ends)), known)
 
 
-def _proved(
+def _by_potential(
     factors: AnyArray,
     band: tuple[LongArray, LongArray, LongArray],
     costs: tuple[LongArray, LongArray],

@@ -12,11 +12,12 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.arrays import grow, pop, push
 
 UNITS = 2.0**20
 """Units of a cell in costs, which are rounded down."""
-_FAR = 1 << 62
+_FAR = 1 << 61
+"""Cost of what is not reached; twice as much is a number still."""
 _DOWN = np.array([0, 0, -1, 1, -1, -1, 1, 1], np.int64)
 _ACROSS = np.array([-1, 1, 0, 0, -1, 1, -1, 1], np.int64)
 _STRAIGHT = 4
@@ -97,7 +98,7 @@ def costs_over_corners(free, factors, start, goal, most, known):
     factors
         float32 (rows, cols), >= 1.
     start, goal
-        Their numbers.
+        Numbers of the corners, see `corner_of`.
     most
         The limit, in units.
     known
@@ -118,9 +119,7 @@ def costs_over_corners(free, factors, start, goal, most, known):
         if key > most:
             break
         if size + _DOWN.size > heap.shape[0]:
-            larger = np.empty((2 * heap.shape[0], 2), np.int64)
-            larger[:size] = heap[:size]
-            heap = larger
+            heap = np.concatenate((heap, heap))
         for move in range(_DOWN.size):
             to, factor = _move_from(free, factors, at, move)
             if factor == np.inf:
@@ -159,35 +158,29 @@ def band_of(free, forth, back, most):
     rows, cols = free.shape
     number = np.full(forth.size, -1, np.int64)
     cells, corners = np.empty(1024, np.int64), np.empty((1024, 4), np.int64)
+    flat, own = np.empty(4096, np.int64), np.empty(4, np.int64)
     n_cells, n_corners = 0, 0
     for row in range(rows):
         for col in range(cols):
             if free[row, col] == 0:
                 continue
-            is_near = False
+            least = most
             for k in range(4):
-                at = corner_of(free, row + k // 2, col + k % 2, row)
-                if forth[at] < _FAR and back[at] < _FAR and forth[at] + back[at] < most:
-                    is_near = True
-                    break
-            if not is_near:
+                own[k] = corner_of(free, row + k // 2, col + k % 2, row)
+                least = min(least, forth[own[k]] + back[own[k]])
+            if least >= most:
                 continue
             if n_cells == cells.size:
-                cells = np.concatenate((cells, np.empty_like(cells)))
+                cells, flat = grow(cells), grow(flat)
                 corners = np.concatenate((corners, np.empty_like(corners)))
             cells[n_cells] = row * cols + col
             for k in range(4):
-                at = corner_of(free, row + k // 2, col + k % 2, row)
-                if number[at] < 0:
-                    number[at] = n_corners
+                if number[own[k]] < 0:
+                    number[own[k]], flat[n_corners] = n_corners, own[k]
                     n_corners += 1
-                corners[n_cells, k] = number[at]
+                corners[n_cells, k] = number[own[k]]
             n_cells += 1
-    flat = np.empty(n_corners, np.int64)
-    for at in range(number.size):
-        if number[at] >= 0:
-            flat[number[at]] = at
-    return cells[:n_cells].copy(), corners[:n_cells].copy(), flat
+    return cells[:n_cells].copy(), corners[:n_cells].copy(), flat[:n_corners].copy()
 
 
 @guarded
