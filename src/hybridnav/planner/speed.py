@@ -15,10 +15,14 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.geometry import least_along
+from hybridnav.planner.preset import LimitSettings
 
 if TYPE_CHECKING:
     from hybridnav._base.poses import Spread
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, SignArray
+
+
+_DEFAULTS = LimitSettings()
 
 
 @dataclass(frozen=True)
@@ -40,17 +44,17 @@ class MotionLimits:
     2.0
     """
 
-    max_speed_m_s: float = 0.5
+    max_speed_m_s: float = _DEFAULTS.max_speed_m_s
     """Speed ahead and backwards, m / s."""
-    max_acceleration_m_s2: float = 2.5
+    max_acceleration_m_s2: float = _DEFAULTS.max_acceleration_m_s2
     """Gain of speed, m / s^2."""
-    max_deceleration_m_s2: float = 2.5
+    max_deceleration_m_s2: float = _DEFAULTS.max_deceleration_m_s2
     """Loss of speed when braking, m / s^2."""
-    max_lateral_acceleration_m_s2: float = 1.0
+    max_lateral_acceleration_m_s2: float = _DEFAULTS.max_lateral_acceleration_m_s2
     """Speed^2 * curvature on arcs, m / s^2."""
-    max_turning_rate_rad_s: float = 2.0
+    max_turning_rate_rad_s: float = _DEFAULTS.max_turning_rate_rad_s
     """Turn of the heading, on the spot and on the way, rad / s."""
-    max_angular_acceleration_rad_s2: float = 3.2
+    max_angular_acceleration_rad_s2: float = _DEFAULTS.max_angular_acceleration_rad_s2
     """Change of the turning rate in turns on the spot, rad / s^2; on the way it is not limited,
     as the curvature jumps where a line meets an arc."""
 
