@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.planner.costs import CostFinish
 from tests.plans import PRESETS, TWO_ROOMS, grid_of, map_of, points_in, presets
 
 
@@ -103,3 +106,29 @@ def test_many_refuses_what_are_no_points(
     with pytest.raises(hn.errors.InvalidValueError, match=message) as caught:
         office_planners["octile"].plan_many(starts, goals)
     assert str(caught.value).isprintable()
+
+
+def test_bounds_that_take_a_search_are_found_when_they_are_read(
+    office_planners: dict[str, hn.HybridPlanner], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner = hn.HybridPlanner(office_planners["octile"].topology, preset="robot")
+    pairs = points_in(planner.grid, np.random.default_rng(2), 6)
+    bound, read = CostFinish.bound, []
+
+    def counted(*of: Any) -> float:
+        read.append(of)
+        return bound(*of)
+
+    monkeypatch.setattr(CostFinish, "bound", counted)
+    batch = planner.plan_many(pairs[:, 0], pairs[:, 1])
+    assert not read
+    assert np.isfinite(batch.cost).any()
+    copied = pickle.loads(pickle.dumps(batch)), copy.deepcopy(batch)  # noqa: S301 - our own
+    assert len(read) == np.isfinite(batch.cost).sum()
+    for other in (batch, *copied):
+        assert not other.lower_bound.flags.writeable
+        assert not other.points.flags.writeable
+        np.testing.assert_array_equal(other.lower_bound, batch.lower_bound)
+        np.testing.assert_array_equal(other.points, batch.points)
+        np.testing.assert_array_equal(other.gap, batch.gap)
+    assert len(read) == np.isfinite(batch.cost).sum()

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.copies import frozen
 from hybridnav.maps import CellClass
 from hybridnav.planner.result import PlanStatus
 from hybridnav.search.found import ClosedCells, QueryMany
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav.search.found import FoundMany, Method
 
 
-@copies_alike
 @dataclass(frozen=True, eq=False)
 class PlanBatch:
     """Outcomes of many queries, arrays of n.
@@ -39,14 +40,32 @@ class PlanBatch:
     """str (n,), the values of `PlanStatus`."""
     cost: FloatArray
     """float64 (n,), metres; infinite where there is no path."""
-    lower_bound: FloatArray
-    """float64 (n,), metres."""
+    bound_source: FloatArray | Callable[[], FloatArray]
+    """The lower bounds, or how to find them."""
     path_start: LongArray
     """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
     headings_rad: FloatArray | None = None
     """float64 (m,), the heading at each point; None in spaces without headings."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                frozen(value)
+
+    def __reduce__(self) -> tuple[type[PlanBatch], tuple[Any, ...]]:
+        """Copy the bounds themselves, so that copies hold no map."""
+        values = vars(self) | {"bound_source": self.lower_bound}
+        return PlanBatch, tuple(values[field.name] for field in fields(self))
+
+    @cached_property
+    def lower_bound(self) -> FloatArray:
+        """float64 (n,), metres, as in `PlanResult`; those of any-angle paths by costs are found
+        when they are read first, in tens of milliseconds each on maps of buildings."""
+        source = self.bound_source
+        return frozen(source()) if callable(source) else source
 
     @property
     def gap(self) -> FloatArray:
@@ -91,6 +110,7 @@ def plan_many(
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
     paths: list[FloatArray] = [np.empty((0, 2))] * n
     headings = [np.empty(0)] * n
+    late: dict[int, Callable[[], float]] = {}
     left = np.ones(n, dtype=np.bool_)
     first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
     asked = np.flatnonzero(_are_free(grid, first) & _are_free(grid, last))
@@ -113,23 +133,32 @@ def plan_many(
             paths[i] = points if cost[i] > 0 else points[:1]
     for i in np.flatnonzero(left).tolist():
         result = alone(starts[i], goals[i])
-        status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
+        status[i], cost[i] = str(result.status), result.cost
+        if callable(result.bound_source):
+            late[i] = result.bound_source
+        else:
+            bound[i] = result.bound_source
         if result.path is not None:
             paths[i] = result.path.points
             if result.path.headings_rad is not None:
                 headings[i] = result.path.headings_rad
     has_yaw = starts.shape[1] > 2  # noqa: PLR2004
-    turns = frozen(np.concatenate([np.empty(0), *headings])) if has_yaw else None
     return PlanBatch(
-        status=frozen(status),
-        cost=frozen(cost),
-        lower_bound=frozen(bound),
-        path_start=frozen(
-            np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64)
-        ),
-        points=frozen(np.concatenate([np.empty((0, 2)), *paths])),
-        headings_rad=turns,
+        status=status,
+        cost=cost,
+        bound_source=partial(_with_late, bound, late) if late else bound,
+        path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
+        points=np.concatenate([np.empty((0, 2)), *paths]),
+        headings_rad=np.concatenate([np.empty(0), *headings]) if has_yaw else None,
     )
+
+
+def _with_late(bound: FloatArray, late: dict[int, Callable[[], float]]) -> FloatArray:
+    """Return bounds with those that are found only now."""
+    bound = bound.copy()
+    for i, source in late.items():
+        bound[i] = source()
+    return bound
 
 
 def _met(

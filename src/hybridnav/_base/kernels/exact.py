@@ -7,6 +7,9 @@ import math
 
 from hybridnav._base.jit import njit
 
+GRAIN = 2.0**24
+"""Parts of a cell to whose multiples positions are rounded."""
+
 
 @njit(cache=True, nogil=True)
 def _rounding_error(first, second, product):

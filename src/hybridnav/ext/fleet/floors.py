@@ -163,7 +163,9 @@ class FloorTable:
         missing = np.argwhere(is_missing)
         if len(missing):
             found = self.floor.planner.plan_many(*self.positions_m[missing.T])
-            costs, bounds = found.cost.tolist(), found.lower_bound.tolist()
+            source, costs = found.bound_source, found.cost.tolist()
+            # Bounds that take a search of their own are left to the pairs of a route.
+            bounds = np.zeros(len(costs)) if callable(source) else source
             for (start, goal), cost, bound in zip(missing.tolist(), costs, bounds, strict=True):
                 self._learn(start, goal, cost, bound)
 

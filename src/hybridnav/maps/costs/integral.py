@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs.kernels.integral import legal_cost, line_cost, segment_cost
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["cost_along", "legal_cost", "segment_cost"]
 
-_QUANTUM = 2.0**-24
 _OFF = 1e-6
 """Cells by which a point may lie outside the map by rounding."""
 
@@ -81,5 +81,5 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
 
 def _positions_on(frame: Frame, points: FloatArray) -> FloatArray:
     """Return points `(x, y)` in metres as positions (row, col), rounded to 2^-24 of a cell."""
-    rounded: FloatArray = np.rint(frame.positions_of(points) / _QUANTUM) * _QUANTUM
+    rounded: FloatArray = np.rint(frame.positions_of(points) * GRAIN) / GRAIN
     return rounded

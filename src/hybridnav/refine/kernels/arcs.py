@@ -8,12 +8,11 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.exact import is_legal
+from hybridnav._base.kernels.exact import GRAIN, is_legal
 from hybridnav._base.trig import atan2, cos, sin, tan
 from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 _FREE = 1
-_GRAIN = 2.0**24
 _PIECE = 0.25
 """Longest piece of an arc in cells: every cell that its bounding box meets must be free."""
 _MARGIN = 1e-6
@@ -31,7 +30,7 @@ _ROUNDS = 6
 @njit(cache=True, nogil=True)
 def _on_grain(position):
     """Return a number rounded to 2^-24."""
-    return np.rint(position * _GRAIN) / _GRAIN
+    return np.rint(position * GRAIN) / GRAIN
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav._base.kernels.exact import is_legal
+from hybridnav._base.kernels.exact import GRAIN, is_legal
 from hybridnav.refine.kernels.taut import FREE, grown, tighten
 
 _STEPS, _STEPS_PER_CELL = 2000, 1
@@ -55,7 +55,7 @@ def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
                 return points[:0]
             # Few enough digits for exact tests; a point outside the cell by rounding moves to its
             # rim.
-            endpoints[end, k] = min(max(np.rint(position * 2.0**24) / 2.0**24, low), low + 1)
+            endpoints[end, k] = min(max(np.rint(position * GRAIN) / GRAIN, low), low + 1)
     string[0, :2] = endpoints[0]
     found, size = 0, 1
     for i in range(1, n):

@@ -21,15 +21,14 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav._base.kernels.exact import is_legal
+from hybridnav._base.kernels.exact import GRAIN, is_legal
 from hybridnav._base.trig import cos, sin
 
 BLOCKED, OPEN, STAND = 0, 1, 2
 """Marks of cells in a query: not free, free but outside the corridor, free to stand on."""
 STAYS, SHIFTS, TURNS = 0, 1, 2
 """Kinds of motion of a body between two of its states."""
-_DIGITS = 2.0**24
-ROUNDING = 1 / _DIGITS
+ROUNDING = 1 / GRAIN
 WIDEST = 1.0
 """Margin in cells above which a motion is halved at once."""
 _HALF_DIAGONAL = 0.7075
@@ -40,7 +39,7 @@ _FARTHEST = 255
 @njit(cache=True, nogil=True)
 def rounded(value):
     """Round a coordinate so that tests on it are exact."""
-    return np.rint(value * _DIGITS) / _DIGITS
+    return np.rint(value * GRAIN) / GRAIN
 
 
 @njit(cache=True, nogil=True)

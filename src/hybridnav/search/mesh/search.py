@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
@@ -33,8 +34,6 @@ Position = tuple[float, float]
 
 _ROOM = 4096
 """Initial room for nodes of a query."""
-_FRACTION = float(1 << 24)
-"""Positions are rounded to this part of a cell, so that every side test is exact."""
 SLICE = 256
 """Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
@@ -318,8 +317,8 @@ def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
 def round_into(cell: Cell, position: Position) -> Position:
     """Round a position, and move it into the closed square of its cell."""
     row, col = (
-        round(position[0] * _FRACTION) / _FRACTION,
-        round(position[1] * _FRACTION) / _FRACTION,
+        round(position[0] * GRAIN) / GRAIN,
+        round(position[1] * GRAIN) / GRAIN,
     )
     top, left = float(cell[0]), float(cell[1])
     return min(max(row, top), top + 1.0), min(max(col, left), left + 1.0)
@@ -327,6 +326,6 @@ def round_into(cell: Cell, position: Position) -> Position:
 
 def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
     """Round positions, and move each into the closed square of its cell; float64 (n, 2)."""
-    rounded = np.round(positions * _FRACTION) / _FRACTION
+    rounded = np.round(positions * GRAIN) / GRAIN
     clipped: FloatArray = np.clip(rounded, cells, cells + 1.0)
     return clipped
