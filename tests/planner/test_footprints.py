@@ -11,6 +11,7 @@ import shapely
 
 import hybridnav as hn
 from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
+from hybridnav.maps.costs import cost_along
 from hybridnav.planner import load_preset
 from hybridnav.planner.methods.discs import Discs
 from hybridnav.refine import MotionCheck
@@ -327,8 +328,56 @@ def test_a_planner_of_the_map_that_changed_answers_by_it(rooms: hn.OccupancyGrid
     assert shut.plan(*ENDS).status is hn.PlanStatus.NO_PATH
     assert shut.plan((2.0, 2.0, 0.5), (4.5, 4.5, 2.0)).solved
     layer = hn.CostLayer(np.full(now.shape, 2.0))
-    with pytest.raises(hn.errors.InvalidValueError, match="method ompl knows lengths only"):
+    with pytest.raises(hn.errors.InvalidValueError, match="for a footprint that turns on the spot"):
         hn.HybridPlanner(shut.topology, preset="ompl", costs=layer)
+
+
+@pytest.mark.parametrize("space", ["differential", "se2"])
+def test_a_footprint_honours_costs_masks_and_keepouts(rooms: hn.OccupancyGrid, space: str) -> None:
+    """An answer of a disc is no dearer than the shortest path of the footprint; the body stays off
+    closed cells, and the base off a keepout zone; the bound is below the path of `robot`, a disc.
+    """
+    plain = planner_of(rooms, space=space)
+    rng = np.random.default_rng(1)
+    dear = np.ones(rooms.shape, np.float32)
+    closed, keepout = np.zeros((2, *rooms.shape), np.bool_)
+    pallet, zone = shapely.box(2.9, 2.9, 3.6, 3.6), shapely.box(14.0, 8.0, 16.0, 9.0)
+    for cells, shape in ((closed, pallet), (keepout, zone)):
+        west, south, east, north = np.rint(np.array(shape.bounds) / rooms.resolution_m).astype(int)
+        cells[south:north, west:east] = True
+    for row, col in rng.integers((0, 0), rooms.shape, (40, 2)):
+        dear[row : row + 12, col : col + 12] = 4.0
+    layer = hn.CostLayer.clearance(rooms) | hn.CostLayer(dear, closed=closed, keepout=keepout)
+    made = hn.HybridPlanner(plain.topology, preset=plain.preset, costs=layer)
+    disc = hn.HybridPlanner(plain.topology, preset="robot", costs=layer)
+    answered, shut = set(), {"polygons": [pallet], "keepout": [zone]}
+    ends = [ENDS, ((2.0, 2.0, 0.5), (4.5, 4.5, 2.0)), ((14.0, 7.0, 0.0), (15.0, 10.0, 0.0))]
+    for start, goal in ends:
+        result, short = made.plan(start, goal), plain.plan(start, goal, blocked=shut)
+        assert result.solved
+        assert result.path is not None
+        assert short.path is not None
+        answered.add(by(result))
+        assert result.metric == "any-angle-weighted"
+        assert result.cost == pytest.approx(cost_along(rooms, layer, result.path.points))
+        if by(result) != "OMPL":
+            assert result.cost <= cost_along(rooms, layer, short.path.points) * 1.05
+        walls, bodies = walls_of(rooms), bodies_of(result)
+        for body in bodies:
+            assert not shapely.intersects(body.buffer(-1e-3), pallet)
+            ground = walls.geometries[walls.query(body.buffer(-1e-3), "intersects")]
+            assert not len(ground)
+        assert not shapely.LineString(result.path.points).intersects(zone.buffer(-0.01))
+        assert 0 < result.lower_bound <= result.cost
+        cheapest = disc.plan(start[:2], goal[:2], smooth="line-of-sight")
+        assert result.lower_bound <= cheapest.cost * (1 + 1e-9)
+    assert "inscribed disc" in answered
+    inside = made.plan((3.2, 3.2, 0.0), ENDS[1])
+    assert inside.status is hn.PlanStatus.START_BLOCKED
+    with pytest.raises(hn.errors.InvalidValueError, match="make a new planner of the map now"):
+        made.update(costs=layer)
+    with pytest.raises(hn.errors.InvalidValueError, match="without OMPL"):
+        made.plan(*ENDS, smooth="arcs")
 
 
 def test_where_the_body_fits_through_no_door_nothing_is_claimed(rooms: hn.OccupancyGrid) -> None:

@@ -89,6 +89,7 @@ class PlannerCosts:
         self._check(given)
         none = CostLayer(np.ones(self._grid.shape, np.float32))
         costs = copy(self)
+        vars(costs).pop("closed", None)
         costs.given = own = none if self.given is None else self.given
         costs.layer = layer = none if self.layer is None else self.layer
         if box[0] >= box[1] or box[2] >= box[3]:
@@ -123,6 +124,16 @@ class PlannerCosts:
             near = within_radius(closed, radius_cells=radius_cells)
             near = near[top : top + box[1] - box[0], left : left + box[3] - box[2]]
         return joined_cells(near, keepout)
+
+    @cached_property
+    def closed(self) -> ClosedCells | None:
+        """The cells that the layer closes for all queries; None for none. A footprint stays off the
+        closed ones as given, which are obstacles, and its base off all of them."""
+        layer, given = self.layer, self.given
+        if layer is None or not len(layer.closed_flat):
+            return None
+        closed = None if given is None else given.closed
+        return ClosedCells(layer.closed_flat, None if closed is None else np.flatnonzero(closed))
 
     def _check(self, given: CostLayer) -> None:
         """Raise `InvalidValueError` if a planner cannot plan by a layer."""
@@ -165,13 +176,6 @@ class CostFinish:
         self._grid = grid
         self._allow_unexplored = settings.allow_unexplored
         self._turning_radius_m: float = getattr(settings, "turning_radius_m", math.nan)
-
-    def with_closed(self, closed: ClosedCells | None) -> ClosedCells | None:
-        """Return the closed cells of a query with those that the layer closes for all queries."""
-        flat = self.layer.closed_flat
-        if not len(flat):
-            return closed
-        return ClosedCells(flat if closed is None else np.union1d(closed.flat, flat))
 
     def line(
         self, cells: LongArray, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None

@@ -69,6 +69,11 @@ def begun(now: Planning, update: PlannerUpdate) -> Callable[[], Planning]:
     InvalidValueError
         When the planner cannot follow, or the grid or the costs are those of another map.
     """
+    if now.ompl is not None:
+        raise InvalidValueError(
+            f"preset {now.preset.name} cannot follow a change, because OMPL's process has the map: "
+            "make a new planner of the map now"
+        )
     if update.grid is not None or update.topology is not None:
         return partial(_caught_up, _followed(now, update))
     assert update.costs is not None  # noqa: S101 - one of the three is given
@@ -91,11 +96,6 @@ def _recosted(now: Planning, costs: PlannerCosts, box: Box) -> Planning:
 def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     """Return how to plan on a changed map; what is now stays as it is."""
     settings, places, grid = now.preset.planner, update.topology, update.grid
-    if now.ompl is not None:
-        raise InvalidValueError(
-            f"preset {now.preset.name} cannot follow a change, because OMPL's process has the map: "
-            "make a new planner of the map now"
-        )
     if places is None and settings.needs_places:
         raise InvalidValueError(
             f"preset {now.preset.name} plans on the places of its map, and only a grid is given: "

@@ -176,7 +176,8 @@ class Planning:
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
-        return closed if self._by_costs is None else self._by_costs.with_closed(closed)
+        always = self.costs.closed
+        return closed | always if closed and always else closed or always
 
     def _checked(self, smooth: Smooth | None) -> Smooth:
         """Return the finish asked for, or that of the preset for None."""
@@ -184,10 +185,10 @@ class Planning:
         if chosen not in _SMOOTH:
             known = ", ".join(map(repr, _SMOOTH))
             raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
-        if chosen == "arcs" and self._by_costs is None:
+        if chosen == "arcs" and (self._by_costs is None or self.ompl is not None):
             raise InvalidValueError(
-                "smooth 'arcs' rounds bends of paths by costs, and this planner plans by lengths: "
-                "give it costs, or take 'line-of-sight'"
+                "smooth 'arcs' rounds bends of paths by costs without OMPL, and this planner plans "
+                "no such paths: give it costs, or take 'line-of-sight'"
             )
         return chosen
 
@@ -339,9 +340,10 @@ class Planning:
         refined = ompl.plan(
             found.cells,
             (first, last),
-            request.closed,
+            self.closed_for_all(request.closed),
             spent_s=now - request.began,
             least_m=found.lower_bound_m if is_any_angle else query.straight_m,
+            along=found,
         )
         found.stats.seconds["ompl"] = time.perf_counter() - now
         bound, path = refined.lower_bound, refined.path

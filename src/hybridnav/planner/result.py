@@ -82,8 +82,8 @@ class Refinement:
     """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
     by: Answer
     """What answered: `circumscribed disc`, whose path is valid with every heading; `inscribed
-    disc`, which proves that there is no path; `OMPL`; or `grid`, whose path, shortened by line of
-    sight, counts where all else failed."""
+    disc`, which proves that there is no path, or whose cheapest path the robot can drive; `OMPL`;
+    or `grid`, whose path, shortened by line of sight, counts where all else failed."""
     trace: tuple[tuple[float, float], ...] = ()
     """Seconds and cost of each better path."""
     iterations: int = 0

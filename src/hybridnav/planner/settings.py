@@ -35,9 +35,8 @@ def _class_name(refine: str) -> str:
     """Refuse what is neither the grid search nor written like the name of a class."""
     if refine == "grid-astar" or _OWN.fullmatch(refine):
         return refine
-    raise PydanticCustomError(
-        "refiner", "input should be 'grid-astar' or a class of your own, module:Class"
-    )
+    why = "input should be 'grid-astar' or a class of your own, module:Class"
+    raise PydanticCustomError("refiner", why)
 
 
 _Float = Annotated[float, BeforeValidator(no_boolean)]
@@ -158,10 +157,8 @@ class PlannerSettings(Section):
         def __getattr__(self, name: str) -> Any: ...
 
 
-_WITH_COSTS = (
-    "costs go with method cheapest, as in preset robot, with grid-astar and with paper, without a "
-    "refiner of your own"
-)
+_WITH_COSTS = """costs go with method cheapest, as in preset robot, with grid-astar and paper, \
+without a refiner of your own, and with ompl for a footprint that turns on the spot"""
 
 
 class ShortestSettings(PlannerSettings):
@@ -311,8 +308,7 @@ class OmplPlannerSettings(PlannerSettings):
 
     method: Literal["ompl"] = "ompl"
     along: Literal["shortest", "paper", "grid-astar"] = "shortest"
-    """Method whose path chooses the fields in which OMPL begins; with `grid-astar` it begins on the
-    whole map."""
+    """Method whose path chooses where OMPL begins; with `grid-astar` the whole map."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields in which OMPL begins: those of the path, or also their neighbours."""
     ompl: OmplSettings = OmplSettings()
@@ -329,8 +325,12 @@ class OmplPlannerSettings(PlannerSettings):
         allowed = self.allow_unexplored
         if self.along == "paper":
             return PaperSettings(allow_unexplored=allowed, corridor=self.corridor)
-        kind = ShortestSettings if self.along == "shortest" else GridSettings
-        return kind(allow_unexplored=allowed)
+        return SECTIONS[self.along](allow_unexplored=allowed)
+
+    def refusal_of_costs(self) -> str | None:
+        """Return why these settings cannot plan by costs, None if they can."""
+        can = self.ompl.footprint and self.ompl.follows_discs and self.along == "shortest"
+        return None if can else super().refusal_of_costs()
 
 
 def _own_method(method: str) -> str:

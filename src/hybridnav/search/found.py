@@ -76,6 +76,12 @@ class ClosedCells:
         found: BoolArray = self.flat[at] == flat
         return found
 
+    def __or__(self, other: ClosedCells) -> ClosedCells:
+        """Return the cells that either closes."""
+        solids = [each.solid for each in (self, other) if each.solid is not None]
+        solid = np.unique(np.concatenate(solids)) if solids else None
+        return ClosedCells(np.union1d(self.flat, other.flat), solid)
+
     def meets(self, cells: LongArray, grid: OccupancyGrid) -> bool:
         """Return whether a path stands on a closed cell, or illegally passes one on a diagonal.
 

@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.planner.settings import CheapestSettings
 
 if TYPE_CHECKING:
     from hybridnav.planner import PlannerSettings
@@ -32,7 +33,9 @@ def make_method(known: KnownMap, settings: PlannerSettings) -> Method:
     PresetError
         When the settings name a refiner of the user's own that cannot be used.
     """
-    settings = settings.underlying
+    by_costs = settings.sampling is not None and known.costs is not None
+    allowed = settings.allow_unexplored
+    settings = CheapestSettings(allow_unexplored=allowed) if by_costs else settings.underlying
     if settings.method not in _METHODS:
         from hybridnav.planner.methods.own_method import own_method  # noqa: PLC0415 - for these alone
 

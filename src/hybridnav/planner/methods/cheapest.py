@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs import CostLayer, cost_along
@@ -22,11 +23,13 @@ from hybridnav.search.lattice import LatticeSearch, build_lattice
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.planner.settings import CheapestSettings
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query
 
-_GRAIN = 2.0**24
+_FEWER = 8
+"""Landmarks of a lattice that was renewed, which is to be ready soon."""
 _KEPT = 8
 """Number of lattices round closed cells that are kept for queries with equal closures."""
 
@@ -72,6 +75,16 @@ class OverLattice(Method):
         allowed = self._settings.allow_unexplored
         self._line = CostLine(self._grid, self._layer, allow_unexplored=allowed)
 
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map."""
+        return self._grid
+
+    def may_enter(self, query: Query) -> bool:
+        """Return whether the cells of start and goal may be entered."""
+        free = self._line.free
+        return bool(free[query.cells[0]] and free[query.cells[1]])
+
     def prepare(self, progress: Progress = no_progress) -> LatticeSearch:
         """Build the lattice, once; see `Method`."""
         if self._search is None:
@@ -103,7 +116,7 @@ class OverLattice(Method):
             return None
         was = search.lattice
         differs = np.flatnonzero((was.free != line.free) | (was.factors != line.factors))
-        return LatticeSearch(was.renewed(line.free, line.factors, differs).with_landmarks())
+        return LatticeSearch(was.renewed(line.free, line.factors, differs).with_landmarks(_FEWER))
 
     def find(self, query: Query) -> Found:
         """Find a cheapest path between two points; see `Method`. Its cells are found when somebody
@@ -148,7 +161,7 @@ class OverLattice(Method):
         """Return the position of a point in a cell, on the grain of exact tests."""
         position = self._grid.frame.position_of(*point.tolist())
         row, col = (
-            min(max(round(at * _GRAIN) / _GRAIN, float(low)), low + 1.0)
+            min(max(round(at * GRAIN) / GRAIN, float(low)), low + 1.0)
             for at, low in zip(position, cell, strict=True)
         )
         return row, col

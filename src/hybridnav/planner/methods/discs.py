@@ -11,16 +11,24 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.costs import cost_along
+from hybridnav.planner.costs import CostFinish
 from hybridnav.planner.endpoints import refusal
+from hybridnav.planner.methods.cheapest import OverLattice
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.methods.shortest import OverMesh
-from hybridnav.planner.settings import ShortestSettings
+from hybridnav.planner.settings import CheapestSettings, ShortestSettings
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, LongArray
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import Path
     from hybridnav.refine.footprint import Footprint
     from hybridnav.search.found import Found, Query
+
+    Disc = OverMesh | OverLattice
+    """Finds paths of a disc."""
 
 _ROUNDING_CELLS = 1e-6
 """More than rounding moves a body: the discs are smaller, and larger, by this."""
@@ -30,7 +38,8 @@ _BESIDE = 1.5
 
 @copies_alike
 class Discs:
-    """Shortest paths of the largest disc inside a footprint, and of the smallest one round it.
+    """Best paths of the largest disc inside a footprint, and of the smallest one round it: the
+    shortest, or with costs the cheapest, counted along the path of the base.
 
     A cell is blocked for the inscribed disc if that meets an obstacle wherever in the cell its
     centre is: without a path of it the robot has none, and no path of the robot is shorter. A cell
@@ -45,17 +54,24 @@ class Discs:
         The robot.
     allow_unexplored
         Whether unexplored cells may be entered.
+    costs
+        Costs of the cells; None for lengths.
     """
 
     def __init__(
-        self, grid: OccupancyGrid, footprint: Footprint, *, allow_unexplored: bool = False
+        self,
+        grid: OccupancyGrid,
+        footprint: Footprint,
+        *,
+        allow_unexplored: bool = False,
+        costs: CostLayer | None = None,
     ) -> None:
-        self._grid, self._footprint = grid, footprint
-        self._settings = ShortestSettings(allow_unexplored=allow_unexplored)
+        self._grid, self._footprint, self._costs = grid, footprint, costs
+        self._allow_unexplored = allow_unexplored
         self._grown: dict[ClosedCells, ClosedCells] = {}
 
     @cached_property
-    def inscribed(self) -> OverMesh | None:
+    def inscribed(self) -> Disc | None:
         """Finds paths of the inscribed disc; None if the map is that of the disc already."""
         radius = self._footprint.inscribed_radius_m / self._grid.resolution_m - _ROUNDING_CELLS
         if radius < 0:
@@ -65,18 +81,18 @@ class Discs:
         return self._method(blocked) if blocked.any() else None
 
     @cached_property
-    def circumscribed(self) -> OverMesh:
+    def circumscribed(self) -> Disc:
         """Finds paths of the circumscribed disc."""
         return self._method(self._near(self._obstacles))
 
     def below(self, query: Query) -> Found | None:
-        """Return a shortest path of the inscribed disc, or that it has none; None if its map is
-        the one that is given."""
+        """Return a best path of the inscribed disc, or that it has none; None if its map is the one
+        that is given."""
         disc = self.inscribed
         return disc.find(query) if disc is not None and disc.may_enter(query) else None
 
     def above(self, query: Query) -> Found | None:
-        """Return a shortest path of the circumscribed disc; None without one."""
+        """Return a best path of the circumscribed disc; None without one."""
         disc, closed = self.circumscribed, query.closed
         if closed is not None and closed.solid is not None:
             closed = self._around(closed, closed.solid)
@@ -110,10 +126,30 @@ class Discs:
             found = self._grown[closed] = ClosedCells(flat)
         return found
 
-    def _method(self, blocked: BoolArray) -> OverMesh:
-        """Return the method of the map with more blocked cells, its mesh built."""
+    def _method(self, blocked: BoolArray) -> Disc:
+        """Return the method of the map with more blocked cells, prepared."""
         values = {one.name: getattr(self._grid, one.name) for one in fields(self._grid)}
         values["classes"] = np.where(blocked, np.uint8(CellClass.OCCUPIED), self._grid.classes)
-        method = OverMesh(KnownMap(OccupancyGrid.restored(**values), None), self._settings)
+        known, allowed = KnownMap(OccupancyGrid.restored(**values), None), self._allow_unexplored
+        if self._costs is None:
+            method: Disc = OverMesh(known, ShortestSettings(allow_unexplored=allowed))
+        else:
+            settings = CheapestSettings(allow_unexplored=allowed)
+            method = OverLattice(known._replace(costs=self._costs), settings)
         method.prepare()
         return method
+
+    def cost_m(self, path: Path) -> float:
+        """Return what a path costs, in metres; its length without costs."""
+        if self._costs is None:
+            return path.length_m
+        return max(cost_along(self._grid, self._costs, path.points), path.length_m)
+
+    def bound_m(self, query: Query, cost_m: float) -> float:
+        """Return a lower bound on the cost of all paths of the inscribed disc, at most the cost of
+        a path that is known."""
+        assert self._costs is not None  # noqa: S101 - the plan is by costs
+        method = self.inscribed
+        grid = self._grid if method is None else method.grid
+        settings = CheapestSettings(allow_unexplored=self._allow_unexplored)
+        return CostFinish(grid, self._costs, settings).bound(query, cost_m)

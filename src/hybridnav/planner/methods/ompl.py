@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,25 +20,31 @@ from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.planner.methods.discs import Discs
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import driven, shortest_curve
-from hybridnav.refine.ompl import Clearance, OmplQuery, Setup, Worker
+from hybridnav.refine.ompl import Clearance, Corridors, OmplQuery, Setup, Worker
 from hybridnav.search.found import Query
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Metric
     from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.result import Answer
     from hybridnav.planner.settings import OmplPlannerSettings
     from hybridnav.refine.ompl import Reply, Search
-    from hybridnav.search.found import ClosedCells, Method
+    from hybridnav.search.found import ClosedCells, Found, Method
 
 
 NEAR_BOUND = 1.05
 """A path of the circumscribed disc that is at most this times the bound is the answer at once;
 OMPL, which may find a way through a narrow door, tries to beat a longer one in its time."""
+
+
+_DRIVEN = ("cheapest path of the inscribed disc: driven",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +53,11 @@ class OmplPlan:
 
     status: PlanStatus
     metric: Metric
-    path: Path | None
-    weighted_cost: float | None
-    lower_bound: float
     refinement: Refinement
+    path: Path | None = None
+    weighted_cost: float | None = None
+    lower_bound: float | Callable[[], float] = math.inf
+    """The bound, or how to find it."""
     search: Search | None = None
 
 
@@ -82,7 +89,16 @@ def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings)
     if len(free):  # kernels loaded at the first query would use up its budget
         cell, (point,) = (int(free[0, 0]), int(free[0, 1])), grid.frame.points_of(free)
         _ = method.find(Query((cell, cell), (point, point))).cells
-    return OmplPlanner(grid, settings, field_of)
+    return OmplPlanner(grid, settings, field_of, known.costs)
+
+
+def _query_of(
+    cells: LongArray, endpoints: tuple[FloatArray, FloatArray], closed: ClosedCells | None
+) -> Query:
+    """Return the query of the base."""
+    first, last = cells[[0, -1]].tolist()
+    points = endpoints[0][:2], endpoints[1][:2]
+    return Query(((first[0], first[1]), (last[0], last[1])), points, closed)
 
 
 @copies_alike
@@ -103,6 +119,8 @@ class OmplPlanner:
     field_of
         int16 or int32 (rows, cols), the field of each cell; None where the whole map is the
         corridor.
+    costs
+        Costs of the cells, for a footprint that can follow a disc; None for lengths.
 
     Raises
     ------
@@ -115,15 +133,16 @@ class OmplPlanner:
         grid: OccupancyGrid,
         settings: OmplPlannerSettings,
         field_of: NDArray[np.int16 | np.int32] | None,
+        costs: CostLayer | None = None,
     ) -> None:
-        self._grid = grid
+        self._grid, self._costs = grid, costs
         self._settings = settings
         self.ompl, self.body = settings.ompl, settings.ompl.body
         self.discs: Discs | None = None
         if self.body is not None and not grid.corner_cutting:
             allowed = settings.allow_unexplored
-            self.discs = Discs(grid, self.body, allow_unexplored=allowed)
-        self._field_of = field_of
+            self.discs = Discs(grid, self.body, allow_unexplored=allowed, costs=costs)
+        self._corridors = Corridors(field_of, widened=settings.corridor == "neighbours")
         self._one_at_a_time = threading.Lock()
         self._confined: dict[ClosedCells, MotionCheck] = {}
         self._worker = Worker(Setup(grid, field_of, self.ompl, settings.allow_unexplored))
@@ -137,6 +156,7 @@ class OmplPlanner:
         *,
         spent_s: float = 0.0,
         least_m: float = 0.0,
+        along: Found | None = None,
         tells_search: bool = False,
     ) -> OmplPlan:
         """Find a path of the state space along a path of cells.
@@ -153,42 +173,54 @@ class OmplPlanner:
             Seconds of the budget that are spent already.
         least_m
             A proved bound on the length of all paths.
+        along
+            The answer of the method, whose path the cells are; None if it has no line.
         tells_search
             Whether to return the states and trees of the search too.
         """
         began = time.monotonic() - spent_s
         refused = self._refused(endpoints, closed)
         if refused is not None:
-            return self._without_path(refused, Refinement((), "OMPL"))
+            return OmplPlan(refused, self._metric, Refinement((), "OMPL"))
         between = _Between(cells, endpoints, closed, least_m)
         if self.discs is not None and not tells_search:
-            found = self._by_discs(self.discs, between)
+            found = self._by_discs(self.discs, between, along)
             if isinstance(found, OmplPlan):
                 return found
             between = found
         left_s = max(self.ompl.budget_s - (time.monotonic() - began), 0.0)
         return self._sampled(between, left_s, tells_search=tells_search)
 
-    def _without_path(self, status: PlanStatus, how: Refinement) -> OmplPlan:
-        return OmplPlan(status, self._metric, None, None, math.inf, how)
-
-    def _by_discs(self, discs: Discs, asked: _Between) -> OmplPlan | _Between:
+    def _by_discs(self, discs: Discs, asked: _Between, along: Found | None) -> OmplPlan | _Between:
         """Return the answer of one of the discs, or what they leave for OMPL."""
         cells, endpoints, closed, least_m, *_ = asked
-        first, last = cells[[0, -1]].tolist()
-        points = endpoints[0][:2], endpoints[1][:2]
-        query = Query(((first[0], first[1]), (last[0], last[1])), points, closed)
+        query = _query_of(cells, endpoints, closed)
         below = discs.below(query)
         if below is not None:
             if not below.has_path:
-                return self._without_path(PlanStatus.NO_PATH, self.no_path)
+                return OmplPlan(PlanStatus.NO_PATH, self._metric, self.no_path)
             least_m = max(least_m, below.lower_bound_m)
             cells = below.cells if self._settings.along == "shortest" else cells
-        disc, steps = self._along_disc(discs, query, endpoints, least_m)
-        if disc is not None and disc.length_m <= least_m * NEAR_BOUND:
-            how, bound = Refinement(steps, "circumscribed disc"), min(least_m, disc.length_m)
-            return OmplPlan(PlanStatus.SOLVED, self._metric, disc, None, bound, how)
+            along = below
+        if self._costs is not None and along is not None:
+            # The robot often can drive a path of that disc, which by costs keeps its distance.
+            assert along.points is not None  # noqa: S101 - any-angle methods state them
+            own = self._turning(along.points, along.cells, endpoints, closed)
+            if own is not None:
+                return self._solved(own, query, least_m, Refinement(_DRIVEN, "inscribed disc"))
+        near_m = NEAR_BOUND * (least_m if self._costs is None or along is None else along.cost_m)
+        disc, steps = self._along_disc(discs, query, endpoints, near_m)
+        if disc is not None and discs.cost_m(disc) <= near_m:
+            return self._solved(disc, query, least_m, Refinement(steps, "circumscribed disc"))
         return _Between(cells, endpoints, closed, least_m, disc, steps)
+
+    def _solved(self, path: Path, query: Query, least_m: float, how: Refinement) -> OmplPlan:
+        """Return the answer with a path and a bound, which by costs is found when it is read."""
+        cost = self._weighted_cost(path)
+        bound: float | Callable[[], float] = min(least_m, path.length_m if cost is None else cost)
+        if self._costs is not None and self.discs is not None and cost is not None:
+            bound = partial(self.discs.bound_m, query, cost)
+        return OmplPlan(PlanStatus.SOLVED, self._metric, how, path, cost, bound)
 
     def _sampled(self, asked: _Between, left_s: float, *, tells_search: bool) -> OmplPlan:
         """Return the answer of OMPL, or the path that is known where it finds no shorter one."""
@@ -196,7 +228,7 @@ class OmplPlanner:
         flat, solid = (None, None) if closed is None else (closed.flat, closed.solid)
         with self._one_at_a_time:
             self._worker.ensure()
-            corridors, deadline_s = self._corridors(cells), time.monotonic() + left_s
+            corridors, deadline_s = self._corridors.of(cells), time.monotonic() + left_s
             query = OmplQuery(*endpoints, cells, deadline_s, corridors, flat, solid, tells_search)
             self._worker.send(query)
             # Made while the worker plans, so that a path exists when its time is up.
@@ -209,7 +241,7 @@ class OmplPlanner:
         status = PlanStatus(reply.outcome)
         is_solved = status is PlanStatus.SOLVED
         if disc is not None:
-            if path is None or not is_solved or path.length_m >= disc.length_m:
+            if path is None or not is_solved or self._cost_m(path) >= self._cost_m(disc):
                 path, status, by = disc, PlanStatus.SOLVED, "circumscribed disc"
                 steps.append("circumscribed disc: shorter than OMPL's path")
         elif not is_solved:
@@ -219,18 +251,19 @@ class OmplPlanner:
             if by_line is not None:
                 path, status, by = by_line, PlanStatus.SOLVED, "grid"
         cost, bound = None, max(math.dist(*(end[:2] for end in endpoints)), reply.bound_m, least_m)
+        how = Refinement(tuple(steps), by, reply.trace, reply.iterations)
         if path is not None and status is PlanStatus.SOLVED:
+            if self._costs is not None:
+                return self._solved(path, _query_of(cells, endpoints, closed), bound, how)
             cost = self._weighted_cost(path)
             bound = min(bound, path.length_m if cost is None else cost)
-        how = Refinement(tuple(steps), by, reply.trace, reply.iterations)
-        return OmplPlan(status, self._metric, path, cost, bound, how, reply.search)
+        return OmplPlan(status, self._metric, how, path, cost, bound, reply.search)
 
     def _along_disc(
-        self, discs: Discs, query: Query, endpoints: tuple[FloatArray, FloatArray], least_m: float
+        self, discs: Discs, query: Query, endpoints: tuple[FloatArray, FloatArray], near_m: float
     ) -> tuple[Path | None, tuple[str, ...]]:
         """Return the path of the circumscribed disc with turns on the spot, and how it went."""
-        can_follow = self.ompl.space in {"se2", "differential"}
-        if not can_follow or self.ompl.objective != "length":
+        if not self.ompl.follows_discs:
             return None, ()
         found, step = discs.above(query), "circumscribed disc"
         points = None if found is None else found.points
@@ -239,9 +272,10 @@ class OmplPlanner:
         path = self._turning(points, found.cells, endpoints, query.closed)
         if path is None:
             return None, (f"{step}: no",)
-        if path.length_m <= least_m * NEAR_BOUND:
+        cost_m = self._cost_m(path)
+        if cost_m <= near_m:
             return path, (f"{step}: solved",)
-        return path, (f"{step}: {100 * (path.length_m / least_m - 1):.0f} % over the bound",)
+        return path, (f"{step}: {100 * (cost_m * NEAR_BOUND / near_m - 1):.0f} % over the bound",)
 
     def close(self) -> None:
         """End the process once no query waits for it; the next query starts another one."""
@@ -277,8 +311,6 @@ class OmplPlanner:
 
     def _warm_up(self) -> None:
         """Build all shared objects, so that no query's time includes them."""
-        if self._field_of is not None:
-            _ = self._beside
         free = np.argwhere(self._grid.enterable())[:1]
         if len(free):
             (centre,) = self._grid.frame.points_of(free)
@@ -298,38 +330,13 @@ class OmplPlanner:
 
     @property
     def _metric(self) -> Metric:
+        if self._costs is not None:
+            return "any-angle-weighted"
         if self.ompl.objective == "clearance":
             return "clearance-weighted"
         if self.ompl.space == "dubins":
             return "dubins"
         return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
-
-    def _corridors(self, cells: LongArray) -> tuple[tuple[str, BoolArray | None], ...]:
-        if self._field_of is None:
-            return (("whole map", None),)
-        n_fields, tails, heads = self._beside
-        passed = np.zeros(n_fields, dtype=np.bool_)
-        passed[self._field_of[cells[:, 0], cells[:, 1]]] = True
-        wider = passed.copy()
-        wider[heads[passed[tails]]] = True
-        wider[tails[passed[heads]]] = True
-        widened = ("widened corridor", wider)
-        if self._settings.corridor == "neighbours":
-            return (widened,)
-        return (("corridor", passed), widened)
-
-    @cached_property
-    def _beside(self) -> tuple[int, LongArray, LongArray]:
-        """Return the number of fields, and the pairs of neighbours, in either order, each once."""
-        fields = self._field_of
-        assert fields is not None  # noqa: S101 - only called if it is set
-        n_fields = int(fields.max(initial=-1)) + 1
-        keys = []
-        for one, other in ((fields[:, :-1], fields[:, 1:]), (fields[:-1], fields[1:])):
-            differ = (one != other) & (one >= 0) & (other >= 0)
-            keys.append(one[differ].astype(np.int64) * n_fields + other[differ])
-        pairs = np.unique(np.concatenate(keys))
-        return n_fields, pairs // max(n_fields, 1), pairs % max(n_fields, 1)
 
     def _path(self, cells: LongArray, reply: Reply) -> Path:
         """Return the path of a reply; along curves its poses are one cell apart."""
@@ -394,38 +401,33 @@ class OmplPlanner:
         endpoints: tuple[FloatArray, FloatArray],
         closed: ClosedCells | None,
     ) -> Path | None:
-        """Return the path along a polyline with turns on the spot; None if the robot cannot."""
-        poses = self._poses_along(points, endpoints, closed)
-        if not len(poses):
-            return None
-        headings = poses[:, 2].copy()
-        return self._path_through(poses[:, :2].copy(), headings, cells, polyline_length(points))
-
-    def _poses_along(
-        self,
-        points: FloatArray,
-        endpoints: tuple[FloatArray, FloatArray],
-        closed: ClosedCells | None,
-    ) -> FloatArray:
-        """Return the poses of a robot along a polyline, float64 (n, 3).
-
-        The robot turns on the spot at every bend and drives ahead in between; without rows if it
-        cannot.
-        """
+        """Return the path of a robot that turns on the spot at every bend of a polyline and drives
+        ahead in between; None if it cannot."""
         check = self._check_of(closed)
         steps = np.diff(points, axis=0)
         ahead = directions(steps[:, 1], steps[:, 0])
         if self.ompl.space == "differential":
             poses = np.column_stack([points, [endpoints[0][2], *ahead]])
-            return driven(check, np.vstack([poses, endpoints[1]]), reverses=self.ompl.reverses)
-        headings = np.concatenate([[endpoints[0][2]], np.repeat(ahead, 2), [endpoints[1][2]]])
-        poses = np.column_stack([np.repeat(points, 2, axis=0), headings])
-        return poses if check.path_valid(poses) else np.empty((0, 3))
+            poses = driven(check, np.vstack([poses, endpoints[1]]), reverses=self.ompl.reverses)
+        else:
+            headings = np.concatenate([[endpoints[0][2]], np.repeat(ahead, 2), [endpoints[1][2]]])
+            poses = np.column_stack([np.repeat(points, 2, axis=0), headings])
+            poses = poses if check.path_valid(poses) else poses[:0]
+        if not len(poses):
+            return None
+        headings = poses[:, 2].copy()
+        return self._path_through(poses[:, :2].copy(), headings, cells, polyline_length(points))
 
     def _weighted_cost(self, path: Path | None) -> float | None:
-        if path is None or self._clearance is None:
+        if path is None or (self._clearance is None and self._costs is None):
             return None
-        return self._clearance.cost_of(path.points)
+        return self._cost_m(path)
+
+    def _cost_m(self, path: Path) -> float:
+        """Return what a path costs in the metric of the results."""
+        if self._clearance is not None:
+            return self._clearance.cost_of(path.points)
+        return path.length_m if self.discs is None else self.discs.cost_m(path)
 
     @cached_property
     def _clearance(self) -> Clearance | None:

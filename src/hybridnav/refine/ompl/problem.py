@@ -40,6 +40,48 @@ def boxes_of(field_of: NDArray[np.int16 | np.int32]) -> LongArray:
     return boxes
 
 
+class Corridors:
+    """Corridors of fields along paths of cells.
+
+    Parameters
+    ----------
+    field_of
+        int16 or int32 (rows, cols), the field of each cell, -1 for none; None where the whole map
+        is the only corridor.
+    widened
+        Whether the first corridor has the neighbours of the passed fields too.
+    """
+
+    def __init__(
+        self, field_of: NDArray[np.int16 | np.int32] | None, *, widened: bool = False
+    ) -> None:
+        self._field_of, self._widened = field_of, widened
+        if field_of is None:
+            return
+        # The pairs of neighbours, in either order, each once.
+        self._n_fields = int(field_of.max(initial=-1)) + 1
+        keys = []
+        for one, other in ((field_of[:, :-1], field_of[:, 1:]), (field_of[:-1], field_of[1:])):
+            differ = (one != other) & (one >= 0) & (other >= 0)
+            keys.append(one[differ].astype(np.int64) * self._n_fields + other[differ])
+        pairs = np.unique(np.concatenate(keys))
+        self._beside = pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
+
+    def of(self, cells: LongArray) -> tuple[tuple[str, BoolArray | None], ...]:
+        """Return names of corridors along a path of cells, in their order, and which fields each
+        has; None for the whole map."""
+        if self._field_of is None:
+            return (("whole map", None),)
+        tails, heads = self._beside
+        passed = np.zeros(self._n_fields, dtype=np.bool_)
+        passed[self._field_of[cells[:, 0], cells[:, 1]]] = True
+        wider = passed.copy()
+        wider[heads[passed[tails]]] = True
+        wider[tails[passed[heads]]] = True
+        widened = ("widened corridor", wider)
+        return (widened,) if self._widened else (("corridor", passed), widened)
+
+
 class Base:
     """Tables of the map that the worker makes once.
 

@@ -282,6 +282,11 @@ class OmplSettings(BaseModel):
         return self.space != "r2"
 
     @property
+    def follows_discs(self) -> bool:
+        """Whether the robot can follow a path of a disc, with turns on the spot."""
+        return self.space in {"se2", "differential"} and self.objective == "length"
+
+    @property
     def body(self) -> Footprint | None:
         """The footprint with its padding, which every check takes; None for a disc."""
         if self.footprint is None:
