@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.maps.clearance import within_radius
 
 COUNTS = {"shortest": 200, "octile": 200, "robot": 100, "cheapest": 200} | dict.fromkeys(
     ("grid-astar", "paper", "cheapest-by-noise"), 20
@@ -115,6 +116,28 @@ def test_an_update_and_its_reverse_change_nothing(name: str, is_prepared: bool) 
         assert [told(planner, pair) for pair in pairs] == there
     planner.update(topology=office())
     assert [told(planner, pair) for pair in pairs] == cold
+
+
+def test_a_change_far_away_leaves_a_path_as_it_is() -> None:
+    """Boxes are put where they are 5 m and more from the path."""
+    planner, grid = planner_of("robot"), office().grid
+    planner.prepare()
+    pairs = queries("robot")[:12]
+    paths = [planner.plan(*pair).path for pair in pairs]
+    for pair, path in zip(pairs, paths, strict=True):
+        if path is None:
+            continue
+        near = np.zeros(grid.shape, np.bool_)
+        near[tuple(path.cells.T)] = True
+        far = np.argwhere(~within_radius(near, radius_cells=5 / grid.resolution_m + 8))
+        probability = grid.probability.copy()
+        for row, col in np.random.default_rng(3).choice(far, 12):
+            probability[row : row + 8, col : col + 8] = 1.0
+        planner.update(grid=replace(grid, probability=probability))
+        again = planner.plan(*pair).path
+        planner.update(grid=grid)
+        assert again is not None
+        assert again.points.tobytes() == path.points.tobytes()
 
 
 def test_another_process_answers_alike() -> None:

@@ -194,13 +194,13 @@ def losses(count: int) -> Any:
 
 
 def test_it_is_near_the_cheapest_where_costs_are_smooth() -> None:
-    """Measured on 40 maps of 40 x 40 cells: by 0.2 % on average, by 1.3 % at most. The oracle's 7
+    """Measured on 40 maps of 40 x 40 cells: by 0.07 % on average, by 1.2 % at most. The oracle's 7
     points a side miss the least by 0.1 %, so lines can cost less than its paths."""
     loss = losses(40)
     assert len(loss) >= 15
     assert loss.min() >= -0.01
-    assert np.median(loss) <= 0.005
-    assert (loss <= 0.03).mean() >= 0.99
+    assert loss.mean() <= 0.002
+    assert loss.max() <= 0.015
 
 
 @given(fields(MAX_SIDE), SEEDS)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
 
-_FEW_ROWS = 64
+FEW_ROWS = 64
 """Radius in cells up to which rows are shifted one by one: for more of them scipy is quicker."""
 _ROUNDING = 1e-9
 """Relative slack on a squared radius, so that 0.25 m is 5 cells of 0.05 m and not 4.999..."""
@@ -38,8 +38,9 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
     if radius_cells >= math.hypot(*occupied.shape):
         return np.ones_like(occupied)
     squared = math.floor(radius_cells * radius_cells * (1 + _ROUNDING))
-    if squared <= _FEW_ROWS**2:
-        return _within_rows(occupied, squared)
+    if squared <= FEW_ROWS**2:
+        within: BoolArray = squares_near(occupied, math.isqrt(squared)) <= squared
+        return within
     return _within_distance(occupied, squared)
 
 
@@ -71,19 +72,33 @@ def greatest_within(values: FloatArray, *, radius_cells: float) -> FloatArray:
     return greatest
 
 
-def _within_rows(occupied: BoolArray, most: int) -> BoolArray:
-    """Return the cells that have an occupied cell of some row within a squared distance."""
-    cols = np.arange(occupied.shape[1], dtype=np.int32)
-    far = np.int32(occupied.shape[1] + _FEW_ROWS)
-    before = np.maximum.accumulate(np.where(occupied, cols, -far), axis=1)
-    after = np.minimum.accumulate(np.where(occupied, cols, 2 * far)[:, ::-1], axis=1)[:, ::-1]
-    in_row = np.minimum(cols - before, after - cols)
-    within = np.zeros_like(occupied)
-    for down in range(min(math.isqrt(most) + 1, len(occupied))):
-        near = in_row <= math.isqrt(most - down**2)
-        within[down:] |= near[: len(near) - down]
-        within[: len(near) - down] |= near[down:]
-    return within
+def squares_near(occupied: BoolArray, reach: int) -> AnyArray:
+    """Return the squared distance from each cell to the nearest occupied one, where it is small.
+
+    Parameters
+    ----------
+    occupied
+        Shape `(rows, cols)`.
+    reach
+        Cells, from 0 to 64.
+
+    Returns
+    -------
+    AnyArray
+        uint16, same shape, in cells; exact below the square of `reach + 1`, else not below it.
+    """
+    rows, cols = occupied.shape
+    at, far = np.arange(cols, dtype=np.int32), np.int32(cols + reach + 1)
+    before = np.maximum.accumulate(np.where(occupied, at, -far), axis=1)
+    after = np.minimum.accumulate(np.where(occupied, at, 2 * far)[:, ::-1], axis=1)[:, ::-1]
+    in_row = np.minimum(np.minimum(at - before, after - at), reach + 1).astype(np.uint16)
+    in_row *= in_row
+    least = in_row.copy()
+    for down in range(1, min(reach + 1, rows)):
+        apart = in_row + np.uint16(down * down)
+        np.minimum(least[down:], apart[:-down], out=least[down:])
+        np.minimum(least[:-down], apart[down:], out=least[:-down])
+    return least
 
 
 def _within_distance(occupied: BoolArray, most: int) -> BoolArray:

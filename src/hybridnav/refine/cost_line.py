@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.poses import wrapped
 from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 _SPARE = 0.005
 """Most that arcs may add to the cost of a line, as a part of it."""
-_GRAIN = 2.0**24
 
 
 class ArcLine(NamedTuple):
@@ -42,9 +42,10 @@ class CostLine:
 
     The path becomes a chain of points some three cells apart that is pulled taut by its own cost:
     all points move to their sides at a time, by Newton's method on the integral of the factors,
-    until none would move any more. So the line passes obstacles on the sides that the path takes,
-    and lines that begin near each other end in the same place. New segments are tested exactly: a
-    line never leaves the union of the closed squares of the enterable cells.
+    until none would move any more; then its bends move one at a time. So the line passes obstacles
+    on the sides that the path takes, and lines that begin near each other end in the same place.
+    New segments are tested exactly: a line never leaves the union of the closed squares of the
+    enterable cells.
 
     Parameters
     ----------
@@ -162,7 +163,7 @@ class CostLine:
     def on_grain(self, points: FloatArray) -> FloatArray:
         """Return the positions of points, on the grain of exact tests; what lies on the rim of the
         map stays there."""
-        line = np.rint(self._frame.positions_of(points) * _GRAIN) / _GRAIN
+        line = np.rint(self._frame.positions_of(points) * GRAIN) / GRAIN
         return np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
 
     def in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:

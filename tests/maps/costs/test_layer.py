@@ -72,7 +72,7 @@ def nav2_cost(cells: float, resolution_m: float, inscribed_m: float, scaling: fl
     st.integers(0, 2**32 - 1),
     st.sampled_from([0.025, 0.05, 0.1]),
     st.sampled_from([0.0, 0.22, 0.25]),
-    st.sampled_from([0.3, 0.55, 0.7, 1.0]),
+    st.sampled_from([0.3, 0.55, 0.7, 1.0, 3.3]),
     st.sampled_from([0.0, 1.5, 3.0, 10.0]),
 )
 @settings(max_examples=examples(60))

@@ -113,6 +113,22 @@ def test_a_renewed_lattice_answers_as_one_built_anew(field: Field, seed: int) ->
     assert lines(LatticeSearch(back), ends) == lines(LatticeSearch(anew), ends)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_lines_in_the_open_do_not_depend_on_landmarks(seed: int) -> None:
+    """Where all cells cost alike, many lines over the lattice would tie without its hashes."""
+    rng = np.random.default_rng(seed)
+    free = np.ones((90, 90), np.bool_)
+    for row, col, down, over in rng.integers([0, 0, 1, 1], [85, 85, 15, 15], (8, 4)):
+        free[row : row + down, col : col + over] = False
+    lattice = build_lattice(free, np.ones(free.shape, np.float32))
+    ends = rng.choice(np.argwhere(free), (60, 2)) + 0.5
+    found = [
+        [line for line, _ in lines(LatticeSearch(lattice.with_landmarks(n)), ends)]
+        for n in (0, 3, 12)
+    ]
+    assert found[0] == found[1] == found[2]
+
+
 @pytest.mark.parametrize("shape", [(21, 18), (1, 40), (40, 1), (3, 3)])
 def test_hundreds_of_changes_are_answered_as_by_one_built_anew(shape: tuple[int, int]) -> None:
     """So many that it is built anew in between, with which its unused nodes are gone."""

@@ -16,7 +16,7 @@ from hybridnav._base.trig import exp
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass
 from hybridnav.maps.cells import MAX_CELLS
-from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.clearance import FEW_ROWS, clearance_cells, squares_near
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -182,8 +182,16 @@ def inflated_costs(
     cell whose centre is that far.
     """
     resolution_m = grid.resolution_m
-    distance = clearance_cells(grid.measured == CellClass.OCCUPIED)
+    occupied = grid.measured == CellClass.OCCUPIED
     reach = min(math.ceil(inflation_m / resolution_m), sum(grid.shape))
+    if reach <= FEW_ROWS:  # the quick way: a table for all squares
+        cost_of = [
+            cost_at(math.sqrt(number) * resolution_m, scaling, inscribed_m)
+            for number in range(reach**2 + 1)
+        ]
+        beyond = squares_near(occupied, reach)
+        return np.array([*cost_of, 0], dtype=np.uint8)[np.minimum(beyond, reach**2 + 1)]
+    distance = clearance_cells(occupied)
     costs = np.zeros(grid.shape, dtype=np.uint8)
     is_near = distance <= reach
     # Distances between centres are roots of whole numbers.

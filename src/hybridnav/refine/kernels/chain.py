@@ -1,4 +1,4 @@
-"""Kernels of Newton's method on a chain of points that move to their sides.
+"""Kernels that move the points of a chain: all to their sides, by Newton's method, or one by one.
 
 Positions are those of `taut`.
 """
@@ -8,10 +8,23 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
+from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
+FINE = 2.0**12
+"""Points of a chain are rounded to this part of a cell."""
 _BESIDE = 0.4
 """Cells to both sides at which the slope of the factors is measured."""
 _DAMPING = 1e-3
+_SWEEPS = 16
+"""Most times that each point of a line that has settled is tried elsewhere."""
+_FIRST_REACH, _LAST_REACH = 1.0, 0.1
+"""How far away, in cells, at first and at last."""
+# The directions in which points are tried: four, and in every other sweep those between them.
+_AROUND = np.array(
+    [[-1, 0], [1, 0], [0, -1], [0, 1], [-0.7, -0.7], [-0.7, 0.7], [0.7, -0.7], [0.7, 0.7]]
+)
+_GAIN = 1e-5
+"""Share of the cost of its two segments that it must save."""
 
 
 @njit(cache=True, nogil=True)
@@ -125,3 +138,64 @@ def solve(slope, bend, link, held, farthest, step):
         step[i] -= above[i] * step[i + 1]
     for i in range(1, n - 1):
         step[i] = min(max(step[i], -farthest[i]), farthest[i])
+
+
+@njit(cache=True, nogil=True)
+def costs_of(factors, line):
+    """Return the cost of each segment of a line, float64 (n,), the first being 0."""
+    costs = np.zeros(line.shape[0])
+    for i in range(1, line.shape[0]):
+        costs[i] = segment_cost(factors, line[i - 1, 0], line[i - 1, 1], line[i, 0], line[i, 1])
+    return costs
+
+
+@njit(cache=True, nogil=True)
+def polish(free, factors, line):
+    """Move the points of a line, one at a time, to where it costs less, by compass search: what a
+    chain that was held by an obstacle leaves undone.
+
+    Parameters
+    ----------
+    free, factors
+        See `settle`.
+    line
+        float64 (n, 2), changed.
+    """
+    n, rows, cols = line.shape[0], free.shape[0] + 0.0, free.shape[1] + 0.0
+    reach = np.full(n, _FIRST_REACH)
+    costs = costs_of(factors, line)
+    is_still = np.zeros(n, np.bool_)
+    for sweep in range(_SWEEPS):
+        first_way = 4 * (sweep % 2)
+        for i in range(1, n - 1):
+            if is_still[i]:
+                continue
+            # The cheapest of the places around it that its segments may lead to.
+            row, col = line[i]
+            whole = costs[i] + costs[i + 1]
+            least, first_least = whole * (1 - _GAIN), 0.0
+            to_row, to_col = row, col
+            for k in range(first_way, first_way + 4):
+                new_row = np.rint((row + reach[i] * _AROUND[k, 0]) * FINE) / FINE
+                new_col = np.rint((col + reach[i] * _AROUND[k, 1]) * FINE) / FINE
+                if not (0 <= new_row <= rows and 0 <= new_col <= cols):
+                    continue
+                first = legal_cost(
+                    free, factors, line[i - 1, 0], line[i - 1, 1], new_row, new_col, least
+                )
+                if first >= least:
+                    continue
+                now = first + legal_cost(
+                    free, factors, new_row, new_col, line[i + 1, 0], line[i + 1, 1], least - first
+                )
+                if now < least:
+                    least, first_least, to_row, to_col = now, first, new_row, new_col
+            if to_row != row or to_col != col:
+                line[i, 0], line[i, 1] = to_row, to_col
+                costs[i], costs[i + 1] = first_least, least - first_least
+                is_still[i - 1] = is_still[i + 1] = False
+            else:
+                reach[i] *= 0.5
+                is_still[i] = reach[i] < _LAST_REACH
+        if is_still[1 : n - 1].all():
+            break

@@ -3,7 +3,8 @@
 A line is moved as a chain that is pulled taut: its points shift to their sides, all at a time, by
 Newton's method on the integral of the factors, which are interpolated between the centres of cells
 for it. That integral has few local optima, so lines that begin near each other end on one. What a
-line costs, and whether it is legal, is decided on the cells themselves.
+line costs, and whether it is legal, is decided on the cells themselves. In the end the points at
+bends, the only ones left, move one at a time, by the cost itself.
 
 Positions are those of `taut`.
 """
@@ -13,12 +14,10 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.maps.costs.integral import legal_cost, segment_cost
-from hybridnav.refine.kernels.chain import slopes_of, solve
+from hybridnav._base.kernels.exact import GRAIN
+from hybridnav.maps.costs.integral import legal_cost
+from hybridnav.refine.kernels.chain import FINE, costs_of, polish, slopes_of, solve
 
-_GRAIN = 2.0**24
-_FINE = 2.0**12
-"""Points of a chain are rounded to this part of a cell."""
 _SPANS = np.array([2, 3, 4, 8, 16], np.int64)
 """Segments of a line that one may replace."""
 _COARSE, _FINE_SPACING = 9.0, 3.0
@@ -70,7 +69,7 @@ def line_of_cells(cells, endpoints, corner_cutting):
             if i == first - 1 or i == last:
                 end = 0 if i == first - 1 else 1
                 cell = cells[0 if end == 0 else n - 1, k]
-                position = np.rint(endpoints[end, k] * _GRAIN) / _GRAIN
+                position = np.rint(endpoints[end, k] * GRAIN) / GRAIN
                 line[size, k] = min(max(position, cell + 0.0), cell + 1.0)
             else:
                 line[size, k] = cells[i, k] + 0.5
@@ -80,25 +79,16 @@ def line_of_cells(cells, endpoints, corner_cutting):
 
 
 @njit(cache=True, nogil=True)
-def _costs_of(factors, line):
-    """Return the cost of each segment of a line, float64 (n,), the first being 0."""
-    costs = np.zeros(line.shape[0])
-    for i in range(1, line.shape[0]):
-        costs[i] = segment_cost(factors, line[i - 1, 0], line[i - 1, 1], line[i, 0], line[i, 1])
-    return costs
-
-
-@njit(cache=True, nogil=True)
 def cost_of(factors, line):
     """Return the cost of a line, in cells."""
-    return _costs_of(factors, line).sum()
+    return costs_of(factors, line).sum()
 
 
 @njit(cache=True, nogil=True)
 def _cut_short(free, factors, line):
     """Return the cheapest line that leaves out points of a line, by dynamic programming."""
     n = line.shape[0]
-    costs = _costs_of(factors, line)
+    costs = costs_of(factors, line)
     total, before = np.zeros(n), np.arange(-1, n - 1)
     for j in range(1, n):
         row, col = line[j, 0], line[j, 1]
@@ -150,8 +140,8 @@ def _spread(free, factors, line, spacing):
             down, over = line[ahead, 0] - row, line[ahead, 1] - col
             step, left = math.hypot(down, over), whole * k / m - passed
             if step > left:
-                at[0] = np.rint((row + left / step * down) * _FINE) / _FINE
-                at[1] = np.rint((col + left / step * over) * _FINE) / _FINE
+                at[0] = np.rint((row + left / step * down) * FINE) / FINE
+                at[1] = np.rint((col + left / step * over) * FINE) / FINE
                 break
             passed += step
             ahead += 1
@@ -195,7 +185,7 @@ def _move(free, factors, chain, aside, step, moved, is_off):
         row = chain[i, 0] + step[i] * aside[i, 0]
         col = chain[i, 1] + step[i] * aside[i, 1]
         if step[i] != 0:
-            row, col = np.rint(row * _FINE) / _FINE, np.rint(col * _FINE) / _FINE
+            row, col = np.rint(row * FINE) / FINE, np.rint(col * FINE) / FINE
         moved[i, 0], moved[i, 1] = min(max(row, 0.0), rows + 0.0), min(max(col, 0.0), cols + 0.0)
     is_legal, is_off[:] = True, False
     for i in range(1, n):
@@ -345,6 +335,8 @@ def settle(free, factors, path):
     # Costs that jump from cell to cell are not always those between the centres of cells.
     if now <= least * (1 + _WORSE):
         best, least = line, now
+    polish(free, factors, best)
+    least = cost_of(factors, best)
     if least > whole:
         return path.copy(), whole, whole
     return best, least, whole

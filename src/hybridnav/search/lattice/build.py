@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.threads import cores
 from hybridnav.errors import InvalidValueError
 from hybridnav.search.lattice.kernels.build import NO_PART, REACH, lay_edges, lay_nodes
-from hybridnav.search.lattice.kernels.landmarks import costs_from_landmarks
+from hybridnav.search.lattice.kernels.landmarks import choose_landmarks, costs_from
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
@@ -108,8 +110,10 @@ class Lattice:
         made = _laid(free, factors, side, laid, before)
         return _built(free, factors) if made.is_spent or _side_of(free) != side else made
 
-    def with_landmarks(self) -> Lattice:
-        """Return the lattice with landmarks; it is the same whether it was renewed or built anew.
+    def with_landmarks(self, n: int = _LANDMARKS) -> Lattice:
+        """Return the lattice with landmarks, at most `n`, found on all cores.
+
+        Lines do not depend on them: costs of edges are such that hardly two lines cost the same.
 
         Notes
         -----
@@ -120,7 +124,15 @@ class Lattice:
             used[self.nodes_of[self.nodes_of[:, 1] > extra, 0] + extra] = True
         nodes = np.flatnonzero(used)
         order = nodes[np.argsort(self.cells[nodes], kind="stable")]
-        table = costs_from_landmarks(self.edges_of, self.to, self.costs, order, _LANDMARKS)
+        cols = self.free.shape[1]
+        chosen = choose_landmarks(self.edges_of, self.to, self.cells, cols, order, n)
+        table = np.full((len(self.cells), len(chosen)), np.inf, np.float32)
+
+        def fill(k: int) -> None:
+            table[:, k] = costs_from(self.edges_of, self.to, self.costs, chosen[k])
+
+        with ThreadPoolExecutor(cores()) as pool:
+            list(pool.map(fill, range(len(chosen))))
         return replace(self, landmarks=table)
 
     @property

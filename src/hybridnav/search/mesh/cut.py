@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.threads import cores
 from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
@@ -88,8 +88,7 @@ def shortest_paths(
         [rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1
     )
     endpoints = np.ascontiguousarray(endpoints[:, [1, 0, 3, 2]])
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    n_parts = max(1, min(cores or 1, len(where) // _LEAST))
+    n_parts = max(1, min(cores(), len(where) // _LEAST))
     parts = np.array_split(np.arange(len(where)), n_parts)
 
     def answer(part: LongArray) -> MeshPaths:

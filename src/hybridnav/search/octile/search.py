@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav._base.threads import Pool
+from hybridnav._base.threads import Pool, cores
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import legs_that_follow
 
@@ -109,8 +108,7 @@ class JumpSearch:
     def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
         """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
         endpoints = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        n_parts = max(1, min(cores or 1, len(endpoints) // _LEAST))
+        n_parts = max(1, min(cores(), len(endpoints) // _LEAST))
         if n_parts == 1:
             found = [self._paths(endpoints)]
         else:

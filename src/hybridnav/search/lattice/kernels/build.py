@@ -24,6 +24,8 @@ NO_PART = 255
 _DOWN = np.array([0, 0, -1, 1, -1, -1, 1, 1, -1, -1, 1, 1, -2, -2, 2, 2], np.int64)
 _ACROSS = np.array([-1, 1, 0, 0, -1, 1, -1, 1, -2, 2, -2, 2, -1, 1, -1, 1], np.int64)
 _AT_A_side = 4
+_MOST_MORE = 2.0**-12
+"""Most by which an edge counts as dearer than it is, as a part of its cost."""
 REACH = 2
 """Blocks from a node's block to the farthest that its edges lead to."""
 
@@ -188,6 +190,18 @@ def path_inside(free, factors, side, parts, a, b, path):
 
 
 @njit(cache=True, nogil=True)
+def _more(a, b):
+    """Return the factor, a little above 1, by which the edge between two cells counts as dearer.
+
+    It is a hash of the cells. Without it, lines in the open often cost the same, and which one is
+    found depends on the order in which nodes are expanded: on what is known of the whole map.
+    """
+    mixed = (a * 0x9E3779B1 + b * 0x85EBCA6B) & 0xFFFFFFFF
+    mixed = ((mixed ^ (mixed >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
+    return 1 + _MOST_MORE * ((mixed ^ (mixed >> 12)) & 0xFFFFF) / 0x100000
+
+
+@njit(cache=True, nogil=True)
 def _edge_cost(free, factors, side, parts, a, b, room):
     """Return the cost of the edge between two nodes: below 0 for one inside their parts, infinite
     for none.
@@ -207,7 +221,7 @@ def _edge_cost(free, factors, side, parts, a, b, room):
     a_row, a_col, b_row, b_col = a // cols, a % cols, b // cols, b % cols
     straight = legal_cost(free, factors, a_row + 0.5, a_col + 0.5, b_row + 0.5, b_col + 0.5, np.inf)
     if straight < np.inf:
-        return straight
+        return straight * _more(a, b)
     first = a_row // side * side, a_col // side * side
     second = b_row // side * side, b_col // side * side
     if abs(first[0] - second[0]) + abs(first[1] - second[1]) > side:
@@ -218,7 +232,7 @@ def _edge_cost(free, factors, side, parts, a, b, room):
         first, second, a_part, b_part = second, first, b_part, a_part
     if not _meet(parts, side, first, second, a_part, b_part):
         return np.inf
-    return -path_inside(free, factors, side, parts, a, b, room)[0]
+    return -path_inside(free, factors, side, parts, a, b, room)[0] * _more(a, b)
 
 
 @guarded

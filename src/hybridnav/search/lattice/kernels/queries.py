@@ -14,10 +14,12 @@ from hybridnav.search.lattice.kernels.build import path_inside
 
 _NEAR = 12
 """Cells up to which the straight line between both ends is tried."""
-_UNITS = 256.0
-"""Units of a cell in keys of the open list; of equal keys, the lower cell comes first."""
-_MOST = 2.0**31 - 1
+_UNITS = 2.0**20
+"""Units of a cell in keys of the open list."""
+_MOST = 2.0**62
 """Largest key, in units: costs above it are searched in any order."""
+_ROUNDING = 2.0**-23
+"""Relative slack of lower bounds, which are read from float32."""
 _MOST_NODES = 8
 """Most parts of a block of 16 cells."""
 FULL = -1
@@ -81,13 +83,16 @@ def _costs_towards(landmarks, starts):
             at = landmarks[starts[0][i], j]
             towards[0, j] = min(towards[0, j], at + starts[1][i])
             towards[1, j] = max(towards[1, j], at - starts[1][i])
+    for j in range(k):
+        towards[0, j] -= _ROUNDING * towards[0, j]
+        towards[1, j] += _ROUNDING * towards[1, j]
     return towards
 
 
 @njit(cache=True, nogil=True)
 def _cost_left(landmarks, towards, node, down, over):
     """Return a lower bound on the cost from a node to the start, which lies so far from it."""
-    least = math.hypot(down, over)
+    least = math.hypot(down, over) * (1 - _ROUNDING)
     for j in range(landmarks.shape[1]):
         at = landmarks[node, j]
         if at < np.inf:
@@ -101,7 +106,8 @@ def _search(lattice, start, starts, goals, most, work):
     and whether the open list was full.
 
     The last node is -1 if there is no path that costs less than `most`. The distance to the start
-    bounds what is left, because no factor is below 1.
+    bounds what is left, because no factor is below 1. Bounds differ from each other by roundings,
+    so a node may be expanded again.
 
     Parameters
     ----------
@@ -133,13 +139,13 @@ def _search(lattice, start, starts, goals, most, work):
         row, col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
         left = _cost_left(landmarks, towards, node, row - start[0], col - start[1])
         key = np.int64(min((first + left) * _UNITS, _MOST))
-        push(heap, size, key << 32 | cells[node], node)
+        push(heap, size, key, node)
         size += 1
     while size > 0:
-        key = heap[0, 0] >> 32
+        key = heap[0, 0]
         node = pop(heap, size)
         size -= 1
-        if key >= min(most * _UNITS, _MOST + 1):  # nothing that is left is cheaper
+        if key > min(most * _UNITS, _MOST):  # nothing that is left is cheaper
             break
         if mark[node] == closed:
             continue
@@ -157,7 +163,7 @@ def _search(lattice, start, starts, goals, most, work):
         for edge in range(first, first + count):
             other = to[edge]
             whole = here + abs(edge_costs[edge])
-            if mark[other] < opened or (mark[other] == opened and whole < cost[other]):
+            if mark[other] < opened or whole < cost[other]:
                 row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
                 least = whole + _cost_left(
                     landmarks, towards, other, row - start[0], col - start[1]
@@ -165,7 +171,7 @@ def _search(lattice, start, starts, goals, most, work):
                 if least < most:
                     cost[other], before[other], mark[other] = whole, node, opened
                     key = np.int64(min(least * _UNITS, _MOST))
-                    push(heap, size, key << 32 | cells[other], other)
+                    push(heap, size, key, other)
                     size += 1
     # Leave the work arrays as they were.
     for k in range(len(starts[0])):
