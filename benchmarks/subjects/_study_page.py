@@ -243,7 +243,7 @@ _FINDINGS = tuple(
     f"* {line}\n"
     for line in (
         (
-            "The source paper's rule (`paper`) is {paper_octile} % longer than the octile optimum "
+            "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile optimum "
             "in the mean and {paper_any} % longer than the any-angle optimum; the octile optimum "
             "itself is {grid_any} % longer."
         ),

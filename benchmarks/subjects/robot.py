@@ -12,6 +12,8 @@ maps 0. Pairs are drawn from the largest connected part. Columns:
     gap         mean and 95 % quantile of `gap`, %
     steady      part of the plans from points along a path, to its goal, that stay within a cell of
                 its rest, and the farthest that one leaves it, in cells
+    moved       the same for starts moved by 5 cm; of paths that leave the old one by more than a
+                cell, what the old one costs more from there (`keep`), the mean in %
     duplicates  queries that got another path when they were asked again, in reverse order
 """
 
@@ -43,8 +45,9 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
 
-MEASURED = ("plan", "A*", "A*, arcs", "bound", "gap", "steady")
-COLUMNS = ("map", *MEASURED[:3], "speedup", "of arcs", *MEASURED[3:], "duplicates")
+MEASURED = ("plan", "A*", "A*, arcs", "bound", "gap", "steady", "moved", "dearer")
+COLUMNS = ("map", *MEASURED[:3], "speedup", "of arcs", *MEASURED[3:-1], "duplicates")
+MOVED_M = 0.05
 
 
 def strayed_cells(
@@ -64,6 +67,24 @@ def strayed_cells(
     return found
 
 
+def moved(
+    planner: hn.HybridPlanner, pair: FloatArray, result: hn.PlanResult, angle: float
+) -> tuple[list[float], list[float]]:
+    """Plan from a start that moved a little; return how far the path leaves the old one in cells,
+    and, if by more than a cell, what the old one costs more from there, as a share; none where a
+    plan ends in a wall."""
+    start = pair[0] + MOVED_M * np.array([np.cos(angle), np.sin(angle)])
+    again = planner.plan(start, pair[1], smooth="line-of-sight")
+    kept = planner.plan(start, pair[1], smooth="line-of-sight", keep=result)
+    if again.path is None or kept.path is None or result.path is None:
+        return [], []
+    cell_m = planner.grid.resolution_m
+    lines = (again.path.points, result.path.points)
+    new, old = (shapely.segmentize(shapely.LineString(line), cell_m) for line in lines)
+    apart = float(shapely.hausdorff_distance(old, new)) / cell_m
+    return [apart], [kept.cost / again.cost - 1] if apart > 1 + MOVED_M / cell_m else []
+
+
 def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[str, Any]:
     """Return the figures of one map."""
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
@@ -73,7 +94,8 @@ def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[s
     planner.plan(*pairs[0]).gap  # noqa: B018 - kernels load
     rival.plan(*pairs[0])
     seconds, rival_seconds, arc_seconds, bound_seconds = [], [], [], []
-    gaps, strayed, paths = [], [], []
+    gaps, strayed, apart, dearer, paths = [], [], [], [], []
+    angles = np.random.default_rng(0).uniform(0, 2 * np.pi, len(pairs))
     for start, goal in pairs:
         result, s = timed(lambda: planner.plan(start, goal), 2)  # noqa: B023 - called at once
         _, rival_s = timed(lambda: rival.plan(start, goal), 2)  # noqa: B023
@@ -87,9 +109,14 @@ def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[s
         gaps.append(result.gap)
         paths.append(result.path.points)
     for start, goal in pairs[:n_steady]:
-        line = planner.plan(start, goal, smooth="line-of-sight").path
-        assert line is not None  # noqa: S101
-        strayed += strayed_cells(planner, line.points, 50, grid.resolution_m)
+        path = planner.plan(start, goal, smooth="line-of-sight").path
+        assert path is not None  # noqa: S101
+        strayed += strayed_cells(planner, path.points, 50, grid.resolution_m)
+    for pair, angle in zip(pairs, angles, strict=True):
+        line = planner.plan(*pair, smooth="line-of-sight")
+        farther, more = moved(planner, pair, line, angle)
+        apart += farther
+        dearer += more
     again = [planner.plan(start, goal).path for start, goal in pairs[::-1]][::-1]
     return {
         "plan": np.array(seconds),
@@ -98,6 +125,8 @@ def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[s
         "bound": np.array(bound_seconds),
         "gap": np.array(gaps),
         "steady": np.array(strayed),
+        "moved": np.array(apart),
+        "dearer": np.array(dearer),
         "duplicates": sum(
             path is None or not np.array_equal(path.points, points)
             for path, points in zip(again, paths, strict=True)
@@ -113,7 +142,8 @@ def ms(seconds: FloatArray) -> str:
 def row(name: str, found: dict[str, Any]) -> None:
     """Print the line of a map."""
     speedups = [found[rival] / found["plan"] for rival in MEASURED[1:3]]
-    gap, steady = 100 * found["gap"], found["steady"]
+    gap, steady, apart = 100 * found["gap"], found["steady"], found["moved"]
+    more = 100 * found["dearer"].mean() if found["dearer"].size else 0.0
     print_row(
         name,
         ms(found["plan"]),
@@ -123,6 +153,7 @@ def row(name: str, found: dict[str, Any]) -> None:
         ms(found["bound"]),
         f"{gap.mean():.2f} / {np.quantile(gap, 0.95):.2f}",
         f"{100 * np.mean(steady <= 1):.1f} %, {steady.max():.1f}" if steady.size else "",
+        f"{100 * np.mean(apart <= 1):.0f} %, {apart.max():.1f}; {more:.2f}" if apart.size else "",
         found["duplicates"],
     )
 

@@ -102,7 +102,7 @@ class CoarseRoute:
 
 
 class MaxDistanceSearch:
-    """Cheapest routes by the max-distance attribute of arcs, the paper's own rule.
+    """Cheapest routes by the max-distance attribute of arcs, our reading of the source paper.
 
     A route costs the sum of `max_distance_m` over its arcs. The sum of `through_m` decides between
     routes of equal cost, such as those through two doors between the same rooms. Dijkstra's

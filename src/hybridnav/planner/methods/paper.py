@@ -1,6 +1,7 @@
-"""Method `paper`: the source paper's own rule, from a route of places to a path of cells.
+"""Method `paper`: from a route of places to a path of cells, our reading of the source paper.
 
-The cheapest coarse route by the max-distance attribute of the arcs chooses receptive fields, and
+That paper has arcs with a maximum attribute, and neither a planner nor a cost of routes. The
+cheapest coarse route by the max-distance attribute of the arcs chooses receptive fields, and
 grid A* finds the path inside them.
 """
 
