@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 54_150,
-    "lines": 90_150,
-    "files": 388,
-    "code outside ext": 37_200,
+    "code": 54_340,
+    "lines": 90_470,
+    "files": 389,
+    "code outside ext": 37_405,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 62,
     "arrows, with single modules": 78,
-    "files visited by paper": 51,
-    "lines visited by paper": 12_770,
-    "modules of a plan and a picture": 133,
+    "files visited by paper": 52,
+    "lines visited by paper": 13_125,
+    "modules of a plan and a picture": 134,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
     "parameters of commands, shared ones once": 110,
-    "lines of tests": 57_420,
+    "lines of tests": 57_640,
 }
 
 
