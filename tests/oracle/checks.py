@@ -254,12 +254,24 @@ def check_step(lower: LevelLike, upper: LevelLike) -> AnyArray:
     return result
 
 
-def passes(level: LevelLike, *, linkage: str, limit_m: float, resolution_m: float) -> AnyArray:
-    """Whether each arc may be contracted under a linkage, whichever end survives."""
+def passes(
+    level: LevelLike,
+    *,
+    linkage: str,
+    limit_m: float,
+    resolution_m: float,
+    parts: AnyArray | None = None,
+) -> AnyArray:
+    """Whether each arc may be contracted under a linkage, whichever end survives.
+
+    `parts` has the part of each vertex: two of different ones do not merge, -1 merges with any.
+    """
     fields = cells_of(level.field_of)
     passing = np.zeros(level.n_arcs, dtype=bool)
     for arc, (u, v) in enumerate(level.arcs.tolist()):
         if u == v or level.classes[u] != level.classes[v]:
+            continue
+        if parts is not None and parts[u] != parts[v] and min(parts[u], parts[v]) >= 0:
             continue
         survivors = level.cells[[u]], level.cells[[v]]
         if linkage == "survivor":

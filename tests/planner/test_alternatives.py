@@ -186,7 +186,7 @@ def test_one_obstacle_has_two_sides_and_no_turns_round_it():
     """However often a route goes round a pillar: the classes of such turns are without end."""
     classes = np.ones((15, 25), np.uint8)
     classes[6:9, 11:14] = 0
-    planner = planner_of(classes, merge_distance_m=30.0)
+    planner = planner_of(classes, merge_distance_m=300.0)
     assert planner.topology.n_places == 1
     found = by_homotopy(planner, (1.5, 6.5), (23.5, 6.5), 20)
     assert len(found) == 2

@@ -384,7 +384,7 @@ def test_a_result_records_how_the_pyramid_was_built_and_not_what_the_preset_says
         assert settings["planner"] == planner.preset.planner.model_dump()
         assert settings["pyramid"] == {
             "merge_distance_m": 3.0,
-            "linkage": "radius",
+            "linkage": "throats",
             "seed": 7,
             "robot_radius_m": 0.5,
         }

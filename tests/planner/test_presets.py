@@ -57,7 +57,7 @@ def test_paper_is_the_papers_rule_and_the_default():
     assert paper.planner.corridor == "route"
     assert paper.planner.refine == "grid-astar"
     assert not paper.planner.allow_unexplored
-    assert paper.pyramid.linkage == "radius"
+    assert paper.pyramid.linkage == "throats"
     assert paper.pyramid.merge_distance_m == 4
     # What a file leaves out is as in the paper.
     assert (paper.pyramid, paper.planner) == (PyramidSettings(), planner_settings("paper"))

@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 54_300,
-    "lines": 90_400,
-    "files": 388,
-    "code outside ext": 37_370,
+    "code": 54_520,
+    "lines": 90_780,
+    "files": 389,
+    "code outside ext": 37_580,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 62,
     "arrows, with single modules": 78,
-    "files visited by paper": 51,
-    "lines visited by paper": 12_790,
-    "modules of a plan and a picture": 133,
+    "files visited by paper": 52,
+    "lines visited by paper": 13_150,
+    "modules of a plan and a picture": 134,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
     "parameters of commands, shared ones once": 110,
-    "lines of tests": 57_480,
+    "lines of tests": 57_760,
 }
 
 

@@ -66,7 +66,9 @@ def test_a_merge_distance_is_positive(distance):
 
 @pytest.mark.parametrize("linkage", ["single", "", "RADIUS", "radius ", None, 0])
 def test_an_unknown_linkage_is_named_with_those_there_are(linkage):
-    with pytest.raises(hn.errors.InvalidValueError, match="survivor, radius, diameter") as error:
+    with pytest.raises(
+        hn.errors.InvalidValueError, match="throats, survivor, radius, dia"
+    ) as error:
         built([".."], linkage=linkage)
     assert repr(linkage) in str(error.value)
 

@@ -204,7 +204,7 @@ def test_the_report_is_for_people(apex):
     assert text == [
         "3 vertices, 4 arcs; a simple graph keeps 2 and drops 1 parallel arc and 1 self-loop",
         "  between 1 and 2: arcs 0, 3, one of them is kept",
-        "  at 1: self-loop 2",
+        "  at 2: self-loop 2",
     ]
 
 

@@ -24,9 +24,10 @@ from tests.oracle.checks import (
 )
 from tests.oracle.pyramid import Base, Dart
 from tests.oracle.reference import PlaneMap
+from tests.oracle.throats import labels_of, parts_of
 from tests.strategies import IS_FULL, MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
-LINKAGES = ("radius", "survivor", "diameter")
+LINKAGES = ("radius", "survivor", "diameter", "throats")
 ORDINARY = settings(max_examples=examples(40, full=1000), deadline=None)
 ARRAYS = (
     "field_of",
@@ -69,10 +70,15 @@ def check_merging(levels, scene, linkage):
             distance = scene.merge_distance_m / scene.resolution_m
             waiting = in_pieces(scene.classes, distance, lower.index)
             check_links(lower, upper, waiting, **cap)
+    top, parts = levels[-1], None
+    if linkage == "throats":
+        linkage = "radius"
+        parts = labels_of(scene.classes, scene.merge_distance_m / scene.resolution_m)
+        parts = parts[tuple(top.cells.T)]
     if linkage != "survivor":
         for level in levels:
             check_cap(level, linkage=linkage, **cap)
-    assert not passes(levels[-1], linkage=linkage, **cap).any()
+    assert not passes(top, linkage=linkage, parts=parts, **cap).any()
 
 
 def check_all_attributes(levels, scene):
@@ -264,7 +270,10 @@ def open_scenes(draw):
 def check_blocks(scene, linkage):
     pyramid = scene.pyramid(linkage)
     distance = scene.merge_distance_m / scene.resolution_m
-    for block in blocks(scene.classes, distance):
+    kinds = scene.classes
+    if linkage == "throats":  # blocks lie in one fine part
+        kinds = np.where(kinds == 0, 0, 3 * (parts_of(kinds, distance)[0] + 1) + kinds)
+    for block in blocks(kinds, distance):
         assert len(pyramid) > block.whole_at
         for level in range(block.whole_at + 1):
             field_of = pyramid[level].field_of

@@ -93,8 +93,8 @@ def test_nothing_becomes_of_the_apex(figure1):
 
 def test_levels_are_panels_with_their_own_fields(figure1):
     axes = plot_levels(figure1, [2, 5, -1], columns=2, graph_up_to=30)
-    assert [ax.get_title().split()[:2] for ax in axes] == [["level", n] for n in "258"]
-    for ax, index in zip(axes, (2, 5, 8), strict=True):
+    assert [ax.get_title().split()[:2] for ax in axes] == [["level", n] for n in "259"]
+    for ax, index in zip(axes, (2, 5, 9), strict=True):
         level = figure1[index]
         image = np.asarray(ax.images[0].get_array())[..., :3].astype(np.int64) @ [65536, 256, 1]
         inside = level.field_of >= 0

@@ -70,7 +70,8 @@ def plan(rooms):
 
 @pytest.fixture(scope="module")
 def figure1():
-    return _topology(hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0))
+    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0)
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=10.0))
 
 
 def _find(ax, gid):

@@ -56,12 +56,12 @@ class PyramidSettings(Section):
     --------
     >>> from hybridnav.planner import PyramidSettings
     >>> PyramidSettings(merge_distance_m=2.0).linkage
-    'radius'
+    'throats'
     """
 
     merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
     """U_d in metres, infinity (.inf) allowed."""
-    linkage: Literal["survivor", "radius", "diameter"] = "radius"
+    linkage: Literal["throats", "survivor", "radius", "diameter"] = "throats"
     """What stays below U_d."""
     seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
     """Breaks ties."""

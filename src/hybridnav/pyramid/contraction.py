@@ -151,9 +151,13 @@ class Decimation:
 
     def exhaust(self) -> None:
         """Contract until no edge may be contracted, and record the level reached."""
+        self.contract_all()
+        self.stats.tops.append(self._level)
+
+    def contract_all(self) -> None:
+        """Contract until no edge may be contracted."""
         while self.step():
             pass
-        self.stats.tops.append(self._level)
 
     def lift_limit(self) -> None:
         """Let vertices merge however far apart they are."""
@@ -168,6 +172,12 @@ class Decimation:
         """Reduce the kind of each vertex to its class."""
         kinds = self._vertices.classes
         kinds[:] = (kinds - 1) % N_CLASSES + 1
+
+    def rename_rooms(self, room_of: IntArray) -> None:
+        """Let some rooms become one: int32 (n_rooms,), the room that each one lies in."""
+        kinds = self._vertices.classes
+        room, of_class = np.divmod(kinds.astype(np.int64) - 1, N_CLASSES)
+        kinds[:] = N_CLASSES * (np.append(room_of, -1)[room - 1] + 1) + of_class + 1
 
     def step(self) -> bool:
         """Build the next level; return False if this one is the apex."""

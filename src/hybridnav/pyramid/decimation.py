@@ -23,7 +23,7 @@ from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, Linkage, Record
-from hybridnav.pyramid.start import Start, kinds_of, start_at_base, start_at_level
+from hybridnav.pyramid.start import Start, kinds_of, parts_of, start_at_base, start_at_level
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,7 @@ KERNEL = _kernels.select_stars
 """The kernel whose compiled form shows that a pyramid was built before."""
 
 _LINKAGES: dict[Linkage, int] = {
+    "throats": _kernels.RADIUS,
     "survivor": _kernels.SURVIVOR,
     "radius": _kernels.RADIUS,
     "diameter": _kernels.DIAMETER,
@@ -62,9 +63,13 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
 ) -> tuple[Record, BuildStats, CombinatorialMap]:
     """Contract stars level by level until no edge may be contracted.
 
-    With rooms there are three rounds: below the limit and inside rooms, which makes the places;
-    inside rooms without a limit, which makes the rooms; and without rooms. With a resistance the
-    last round ends when every arc resists; the labels that it keeps apart, if any, stand for rooms.
+    With the linkage "throats" the places are made in two rounds, first inside the fine parts of the
+    map, then inside its parts (see `start.parts_of`).
+
+    With rooms there are no parts, and three rounds: below the limit and inside rooms, which makes
+    the places; inside rooms without a limit, which makes the rooms; and without rooms. With a
+    resistance there are none either, and the last round ends when every arc resists; the labels
+    that it keeps apart, if any, stand for rooms.
 
     Parameters
     ----------
@@ -89,11 +94,21 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         The darts of the places: from the record they take longer than a build.
     """
     labels = rooms if resistance is None else resistance.kept_apart
-    kinds = classes if labels is None else kinds_of(classes, labels)
     began = time.perf_counter()
+    parts = None
+    if linkage == "throats" and rooms is None and resistance is None:
+        parts = parts_of(classes, limit)
+    parted = time.perf_counter()
+    if parts is not None:
+        kinds = parts.kinds
+    else:
+        kinds = classes if labels is None else kinds_of(classes, labels)
     start = start_at_base(kinds, limit)
     run = Decimation(start, seed, _LINKAGES[linkage], limit)
-    run.stats.seconds["base"] = time.perf_counter() - began
+    run.stats.seconds |= {"parts": parted - began, "base": time.perf_counter() - parted}
+    if parts is not None:
+        run.contract_all()
+        run.rename_rooms(parts.part_of)
     run.exhaust()
     places = run.plane_map()
     if labels is not None:

@@ -70,7 +70,7 @@ class DualGraphPyramid:
         grid: OccupancyGrid,
         *,
         merge_distance_m: float = 4.0,
-        linkage: Linkage = "radius",
+        linkage: Linkage = "throats",
         seed: int = 0,
         rooms: RoomLabels | None = None,
         resistance: Resists | None = None,
@@ -92,7 +92,9 @@ class DualGraphPyramid:
             `"survivor"`: the distance between the two surviving cells when one is contracted into
             the other; it holds for each such link, not for the field. `"radius"`: the distance from
             every cell of a field to its surviving cell. `"diameter"`: the distance between every
-            two cells of a field (complete linkage).
+            two cells of a field (complete linkage). `"throats"`: as `"radius"`, and no field lies
+            on both sides of a throat, a narrow passage between wider parts of the map such as a
+            door. With rooms or a resistance it is `"radius"`: they decide where fields part.
         seed
             Breaks ties; equal input and seed give an equal pyramid.
         rooms

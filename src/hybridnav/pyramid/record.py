@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid.darts import Resists
 
 
-Linkage = Literal["survivor", "radius", "diameter"]
+Linkage = Literal["throats", "survivor", "radius", "diameter"]
 
 SURVIVES = 255
 """End of a vertex or edge that still exists at the apex."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybridnav.pyramid.darts import Darts
 from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
+from hybridnav.pyramid.kernels import throats as _throat_kernels
 from hybridnav.pyramid.kernels.decimation import Vertices
 from hybridnav.pyramid.record import SURVIVES, Record
 
@@ -52,9 +53,80 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     """
     n_kinds = N_CLASSES * (int(rooms.max()) + 2) + 1
     kinds = np.where(classes == 0, 0, N_CLASSES * (rooms + 1) + classes)
-    kinds = kinds.astype(next(kind for kind in _KINDS if n_kinds <= np.iinfo(kind).max + 1))
+    kinds = kinds.astype(_type_for(n_kinds))
     kinds.flags.writeable = False  # as the classes are: another type is compiled once more
     return kinds
+
+
+def _type_for(n_kinds: int) -> type[np.integer[Any]]:
+    """Return the least type of kinds that has so many."""
+    return next(kind for kind in _KINDS if n_kinds <= np.iinfo(kind).max + 1)
+
+
+class Parts(NamedTuple):
+    """The free cells of a map, divided at its throats."""
+
+    classes: ByteArray
+    """uint8 `CellClass` (rows, cols)."""
+    fine_of_square: IntArray
+    """int32, the fine part of the free cells of each square of 2 x 2, -1 for none; a square at the
+    last row or column may have fewer cells."""
+    part_of: IntArray
+    """int32 (n_fine,), the part that each fine part lies in."""
+
+    @property
+    def kinds(self) -> KindArray:
+        """The kind of each cell, (rows, cols); see `kinds_of`, with fine parts as rooms."""
+        kinds = np.empty(self.classes.shape, _type_for(N_CLASSES * (len(self.part_of) + 1) + 1))
+        _throat_kernels.kinds_of_parts(self.classes, self.fine_of_square, kinds)
+        kinds.flags.writeable = False
+        return kinds
+
+    def at(self, cells: LongArray) -> IntArray:
+        """Return the part of each of some cells, (n, 2), int32: -1 for those that are not free."""
+        row, col = cells.T
+        fine = np.where(self.classes[row, col] == 1, self.fine_of_square[row // 2, col // 2], -1)
+        labels: IntArray = np.append(self.part_of, np.int32(-1))[fine]
+        return labels
+
+
+# Shares of the merge distance, so that a map in other units has the same parts. At 4 m: passages
+# of up to 2.4 m, and parts with 0.4 m2 (fine ones with 0.05 m2) that are wider than their passages.
+_WIDEST = 0.3
+_LEAST_AREA, _LEAST_FINE_AREA = 1 / 40, 1 / 320
+_LEAST_CELLS = 9
+"""Parts have more cells than this before they meet others: less is the roughness of a wall."""
+_DEPTH = 3 * _throat_kernels.STRAIGHT
+"""Clearance that a throat has less than what lies on either side: three cells."""
+_FARTHEST = 60_000
+"""Clearances are 16 bits wide."""
+
+
+def parts_of(classes: ByteArray, limit: int) -> Parts:
+    """Divide the free cells of a map at its throats.
+
+    A watershed of the distance to the nearest cell that is not free: parts are the catchment basins
+    of wide places, and meet where the passage between them is narrowest. Two basins are one part
+    unless both are large enough and the passage is narrower than either by some cells.
+
+    L. Vincent, P. Soille: Watersheds in digital spaces, IEEE PAMI 13(6), 1991; that narrow passages
+    are where a topological map of a building is divided is the idea of S. Thrun's critical lines
+    (Artificial Intelligence 99(1), 1998).
+
+    Parameters
+    ----------
+    classes
+        uint8 `CellClass`, shape `(rows, cols)`.
+    limit
+        See `decimation.squared_limit`.
+    """
+    farthest = _WIDEST * _throat_kernels.STRAIGHT * limit**0.5
+    most = int(min(max(farthest, _throat_kernels.STRAIGHT), _FARTHEST))
+    clearance = _throat_kernels.clearances(classes, most)
+    small, slight = (
+        max(share * limit, _LEAST_CELLS) / 4 for share in (_LEAST_FINE_AREA, _LEAST_AREA)
+    )
+    return Parts(classes, *_throat_kernels.divide(classes, clearance, most, small, slight, _DEPTH))
 
 
 class Blocks(NamedTuple):

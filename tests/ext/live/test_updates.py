@@ -48,7 +48,8 @@ def check_version(version):
         check_cap(level, linkage="radius", **cap)
     for lower, upper in itertools.pairwise(levels):
         check_step(lower, upper)
-    assert not passes(levels[-1], linkage="radius", **cap).any()
+    parts = version.state.places.read(version.place_numbers)["part"]
+    assert not passes(levels[-1], linkage="radius", parts=parts, **cap).any()
     sizes = [(level.n_vertices, level.n_arcs) for level in levels]
     assert sizes == [(size.vertices, size.arcs) for size in pyramid.stats.sizes]
 
@@ -348,7 +349,7 @@ def test_a_pyramid_with_rooms_is_refused():
 @pytest.mark.parametrize("linkage", ["survivor", "diameter"])
 def test_a_pyramid_of_another_linkage_is_refused(linkage):
     grid = occupancy_grid(np.ones((4, 4), np.uint8))
-    with pytest.raises(InvalidValueError, match=f"linkage '{linkage}', expected 'radius'") as error:
+    with pytest.raises(InvalidValueError, match=f"linkage '{linkage}', expected 'thro") as error:
         OnlinePyramid.of(hn.DualGraphPyramid.build(grid, linkage=linkage))
     assert "\n" not in str(error.value)
 
@@ -371,3 +372,19 @@ def test_cells_that_an_area_left_out_are_found_by_a_later_update():
     assert update.cells.tolist() == [[4, 4]]
     assert update.version.place_at((4, 4)) == -1
     check_version(update.version)
+
+
+def test_a_door_that_is_shut_and_opened_again_stays_a_border():
+    classes = np.zeros((52, 104), np.uint8)
+    classes[1:51, 1:51] = classes[1:51, 53:103] = classes[20:28, 51:53] = 1
+    opened = occupancy_grid(classes, resolution_m=0.1)
+    shut = classes.copy()
+    shut[20:28, 51:53] = 0
+    version = OnlinePyramid.of(hn.DualGraphPyramid.build(opened))
+    for changed in (shut, classes):
+        version = version.update(occupancy_grid(changed, resolution_m=0.1)).version
+    west, east = version.number_of[1:51, 1:51], version.number_of[1:51, 53:103]
+    assert not set(np.unique(west)) & set(np.unique(east))
+    old = OnlinePyramid.of(hn.DualGraphPyramid.build(opened, linkage="radius"))
+    west, east = old.number_of[1:51, 1:51], old.number_of[1:51, 53:103]
+    assert set(np.unique(west)) & set(np.unique(east))

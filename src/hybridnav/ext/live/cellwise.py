@@ -38,7 +38,7 @@ class CellDraft:
     before
         The version before.
     criterion
-        When two fields merge; its linkage is "radius".
+        When two fields merge; its linkage is "throats" or "radius".
     """
 
     def __init__(self, before: State, criterion: Criterion) -> None:
@@ -177,7 +177,7 @@ class _Window:
         """
         low = np.array(self.low)
         rows = np.zeros(len(boxes), PLACE)
-        rows["area"], rows["box"] = 1, boxes + np.tile(low, 2)
+        rows["area"], rows["part"], rows["box"] = 1, -1, boxes + np.tile(low, 2)
         rows["cell"] = (boxes[:, :2] + boxes[:, 2:]) // 2 + low
         numbers = self._new(rows)
         sides = boxes[:, 2:] - boxes[:, :2] - 1
@@ -195,7 +195,7 @@ class _Window:
         fields = contract_alone(of_class * mask, self._draft.criterion)
         rows = np.zeros(len(fields.survivors), PLACE)
         low = np.array(self.low) + box[:2]
-        rows["area"], rows["is_stale"] = fields.areas, True
+        rows["area"], rows["part"], rows["is_stale"] = fields.areas, -1, True
         rows["cell"] = np.stack(np.divmod(fields.survivors, mask.shape[1]), axis=1) + low
         rows["box"] = fields.boxes + np.array([0, 0, 1, 1]) + np.tile(low, 2)
         new = self._new(rows)

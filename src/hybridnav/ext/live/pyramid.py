@@ -61,7 +61,7 @@ class OnlinePyramid:
     """The map of this version."""
     merge_distance_m: float
     linkage: Linkage
-    """Always "radius"."""
+    """`"throats"` or `"radius"`."""
     seed: int
     low: tuple[int, int]
     """Row and column of cell (0, 0) among the cells of the first version, negative where the map
@@ -76,7 +76,8 @@ class OnlinePyramid:
         Parameters
         ----------
         pyramid
-            A pyramid without rooms, of the linkage "radius"; levels above its places are left out.
+            A pyramid without rooms, of the linkage "throats" or "radius"; levels above its places
+            are left out.
 
         Raises
         ------
@@ -88,10 +89,10 @@ class OnlinePyramid:
                 "the pyramid was built with rooms, expected one without: "
                 "build it without rooms, and find them on a version"
             )
-        if pyramid.linkage != "radius":
+        if pyramid.linkage not in {"throats", "radius"}:
             raise InvalidValueError(
                 f"the pyramid was built with the linkage {brief(pyramid.linkage)}, expected "
-                "'radius', the default: places of other linkages do not follow a map"
+                "'throats', the default, or 'radius': places of others do not follow a map"
             )
         check_sides(pyramid.grid)
         # Loading a version needs no decimation.
@@ -116,6 +117,9 @@ class OnlinePyramid:
         Places that hold no changed cell keep their cells, their levels and their numbers, unless
         they take in new cells, or may merge with what changed beside them. The other places give
         away and take in single cells. Levels are made when they are read.
+
+        Under the linkage "throats" places of different parts of the first map stay apart, and new
+        places may merge with any: throats of new cells are found by a build alone.
 
         Parameters
         ----------
@@ -312,7 +316,7 @@ def with_levels(state: State, box: Box, criterion: Criterion) -> State:
     box
         All cells, by the rows and columns of the tiles.
     criterion
-        When two fields merge; its linkage is "radius".
+        When two fields merge; its linkage is "throats" or "radius".
     """
     if state.has_levels:
         return state

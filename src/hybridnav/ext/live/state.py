@@ -27,12 +27,14 @@ PLACE = np.dtype(
         ("area", np.int64),
         ("cell", np.int32, (2,)),
         ("box", np.int32, (4,)),
+        ("part", np.int32),
         ("is_stale", np.bool_),
     ],
     align=True,
 )
 """A place: its cells, 0 where there is no place; its surviving cell; its least row and column, and
-the first ones beyond it; whether the levels in it are those of older cells."""
+the first ones beyond it; the part of the map that it lies in, which keeps it from places of other
+parts, -1 for none (see `start.parts_of`); whether the levels in it are those of older cells."""
 
 
 _NONE = np.iinfo(np.int64).max
@@ -117,10 +119,10 @@ class PlaceTable:
         self.write(gone, np.zeros(len(gone), PLACE))
 
     def columns(self) -> tuple[AnyArray, ...]:
-        """Return the numbers, and the areas, cells, boxes and stale ones of `PLACE`, to change."""
+        """Return the numbers, and all of `PLACE` but with the parts last, to change."""
         self._own()
         if self._columns is None:
-            names = "area", "cell", "box", "is_stale"
+            names = "area", "cell", "box", "is_stale", "part"
             self._columns = self._numbers, *(self._rows[name] for name in names)
         return self._columns
 
@@ -260,6 +262,14 @@ def state_of(pyramid: DualGraphPyramid) -> State:
     table = np.zeros(level.n_vertices, PLACE)
     table["area"], table["cell"] = level.areas, level.cells
     table["box"] = level.boxes + np.array([0, 0, 1, 1])
+    table["part"] = -1
+    if pyramid.linkage == "throats":
+        # Loading a version needs no decimation.
+        from hybridnav.pyramid.decimation import squared_limit  # noqa: PLC0415
+        from hybridnav.pyramid.start import parts_of  # noqa: PLC0415
+
+        limit = squared_limit(pyramid.merge_distance_m, pyramid.grid.resolution_m)
+        table["part"] = parts_of(pyramid.grid.classes, limit).at(level.cells)
     places = PlaceTable()
     places.write(range(level.n_vertices), table)
     places.close()

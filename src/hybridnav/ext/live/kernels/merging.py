@@ -18,6 +18,8 @@ _FEW_CELLS = 256
 def merge_pairs(window, low, table, pairs, limit, first):
     """Merge places beside each other until none of them may merge, under the linkage "radius".
 
+    Places of different parts never merge; those of no part, -1, merge with all.
+
     Parameters
     ----------
     window
@@ -37,7 +39,7 @@ def merge_pairs(window, low, table, pairs, limit, first):
     int64 (m, 2)
         The pairs that cannot be decided on in the window.
     """
-    numbers, area, _, box, _ = table
+    numbers, area, box = table[0], table[1], table[3]
     place = window[0]
     stack, size = with_space(pairs, len(pairs), 64), len(pairs)
     beyond, n_beyond = np.empty((8, 2), np.int64), 0
@@ -94,7 +96,7 @@ def absorbing(window, low, table, lost, limit):
     int64 (m, 2)
         Pairs, as `merge_pairs` takes them.
     """
-    numbers, area, survivor, box, _ = table
+    numbers, area, survivor, box, _, _ = table
     place, of_class = window
     pairs, count = np.empty((16, 2), np.int64), 0
     around = np.empty(4, np.int64)
@@ -149,7 +151,7 @@ def absorbing(window, low, table, lost, limit):
 def are_beside(window, low, table, rows):
     """Return whether a place is beside another one of its class, which lies in the window."""
     place, of_class = window
-    numbers, _, _, box, _ = table
+    numbers, box = table[0], table[3]
     i, j = rows
     one, other = numbers[i], numbers[j]
     n_rows, n_cols = place.shape
@@ -192,8 +194,10 @@ def is_inside(box, low, shape, margin):
 @njit(cache=True, nogil=True)
 def may_merge(place, low, table, rows, limit):
     """Return whether two places may merge, and the row of the one whose cell survives."""
-    area, survivor = table[1], table[2]
+    _, area, survivor, _, _, part = table
     i, j = rows
+    if part[i] != part[j] and min(part[i], part[j]) >= 0:
+        return _NO, i
     apart_rows = np.int64(survivor[i, 0]) - survivor[j, 0]
     apart_cols = np.int64(survivor[i, 1]) - survivor[j, 1]
     if apart_rows * apart_rows + apart_cols * apart_cols >= limit:
@@ -214,7 +218,7 @@ def reaches(place, low, table, rows, limit):
 
     A place has a cell at each side of its box, which decides on most of them.
     """
-    numbers, _, survivor, box, _ = table
+    numbers, _, survivor, box, _, _ = table
     i, j = rows
     row, col = np.int64(survivor[i, 0]), np.int64(survivor[i, 1])
     of_rows = max(abs(row - box[j, 0]), abs(box[j, 2] - 1 - row))
@@ -235,7 +239,7 @@ def reaches(place, low, table, rows, limit):
 @njit(cache=True, nogil=True)
 def merge(place, low, table, rows, survives):
     """Put the cells of a place, which lies in the window, into another one."""
-    numbers, area, survivor, box, is_stale = table
+    numbers, area, survivor, box, is_stale, part = table
     stays, goes = rows
     number, gone = numbers[stays], numbers[goes]
     for row in range(box[goes, 0] - low[0], box[goes, 2] - low[0]):
@@ -245,6 +249,7 @@ def merge(place, low, table, rows, survives):
     area[stays] += area[goes]
     area[goes] = 0
     is_stale[stays], is_stale[goes] = True, False
+    part[stays] = max(part[stays], part[goes])
     survivor[stays, 0], survivor[stays, 1] = survivor[survives, 0], survivor[survives, 1]
     for k in range(2):
         box[stays, k] = min(box[stays, k], box[goes, k])

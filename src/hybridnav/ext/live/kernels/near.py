@@ -64,7 +64,7 @@ def look_again(place, low, table, numbers, limit):
     int64 (k,)
         The places that have another surviving cell.
     """
-    all_numbers, area, survivor, _, is_stale = table
+    all_numbers, area, survivor, _, is_stale, _ = table
     moved, n_moved = np.empty(numbers.size, np.int64), 0
     cells, n_cells = np.empty(16, np.int64), 0
     around = np.empty(4, np.int64)
