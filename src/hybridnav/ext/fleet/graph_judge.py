@@ -167,7 +167,7 @@ def judge_building_graph(
     >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
     >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
     >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
-    >>> matched = match_graph(house, building_graph(house, nodes=20))
+    >>> matched = match_graph(house, building_graph(house))
     >>> judge_building_graph(matched, pairs=20).counts["all"].answers
     {'solved': 20}
     """

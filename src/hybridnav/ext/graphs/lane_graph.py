@@ -146,12 +146,19 @@ def build_lane_graph(
     sketch.add_chords(_CHORD * layout.apart, _DETOUR, _CHORD_RAD)
     sketch.split(_LONGEST * layout.apart)
     _connect(sketch, space)
+    known = None if keep is None else grid.frame.positions_of(keep.points)
+    if known is not None:
+        same = _same(sketch, known, cell_m)
+        aim = sketch.positions.copy()
+        aim[same >= 0] = known[same[same >= 0]]
+        sketch.move(aim)
     sketch.make_plane()
     progress(4, _STEPS)
-    known = None if keep is None else _moved(sketch, grid.frame.positions_of(keep.points), cell_m)
     graph = _described(topology, space, sketch)
     progress(_STEPS, _STEPS)
-    return graph if keep is None or known is None else _renamed(graph, keep, known)
+    if keep is None or known is None:
+        return graph
+    return _renamed(graph, keep, _same(sketch, known, cell_m))
 
 
 def _drawn(
@@ -234,8 +241,8 @@ def _connect(sketch: Sketch, space: FreeSpace) -> None:
     sketch.set_edges(edges)
 
 
-def _moved(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
-    """Move nodes to those of a graph before; return which one each of them is, -1 for none."""
+def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
+    """Return which node of a graph before each node is, int64 (n,), -1 for none."""
     from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 
     to_known = np.asarray(KDTree(known).query(sketch.positions)[1], dtype=np.int64)
@@ -243,7 +250,6 @@ def _moved(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
     steps = known[to_known] - sketch.positions
     is_same = to_own[to_known] == np.arange(len(to_known))
     is_same &= np.hypot(steps[:, 0], steps[:, 1]) * cell_m <= _SAME_M
-    sketch.move(np.where(is_same[:, None], known[to_known], sketch.positions))
     return np.where(is_same, to_known, -1)
 
 

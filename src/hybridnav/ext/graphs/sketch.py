@@ -267,7 +267,16 @@ class Sketch:
         self.set_edges(edges)
 
     def make_plane(self) -> None:
-        """Put a node wherever edges cross or touch, or leave out one that is not needed."""
+        """Put a node wherever edges cross or touch, or leave out an edge that is not needed.
+
+        Nodes at one place become one.
+        """
+        first = {tuple(at): node for node, at in reversed([*enumerate(self.positions.tolist())])}
+        index = np.array([first[tuple(at)] for at in self.positions.tolist()], dtype=np.int64)
+        np.maximum.at(self.kinds, index, self.kinds)
+        kept = np.unique(index)
+        self.positions, self.kinds = self.positions[kept], self.kinds[kept]
+        self.set_edges(np.searchsorted(kept, index[self.edges]).tolist())
         for _ in range(_ROUNDS):
             found = self._crossing()
             if found is None:
