@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.graphs.kernels.edges import least_along
-from hybridnav.ext.graphs.sketch import DOOR, NOTHING, Sketch
+from hybridnav.ext.graphs.sketch import DOOR, NOTHING, ROOM, Sketch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
@@ -172,8 +172,8 @@ class Drawing:
             self._add(ends[0], ends[1], np.concatenate([first, second[1:]]))
 
     def merge(self, near: float) -> None:
-        """Make one node of two that are nearer than a distance along a line; doors stay apart from
-        what lies beyond half of it."""
+        """Make one node of two that are nearer than a distance along a line, if only one is a room
+        or a door; doors stay apart from what lies beyond half of it."""
         heap = [(line.length, key) for key, line in self._lines.items()]
         heapq.heapify(heap)
         while heap and heap[0][0] < near:
@@ -181,8 +181,8 @@ class Drawing:
             line = self._lines.get(key)
             if line is None or line.tail == line.head:
                 continue
-            doors = sum(self._kinds[node] >= DOOR for node in (line.tail, line.head))
-            if doors < 1 + (length <= near / 2):
+            kinds = sorted(self._kinds[node] for node in (line.tail, line.head))
+            if kinds[0] < ROOM and (kinds[1] < DOOR or length <= near / 2):
                 self._drop(key)
                 for new in self._merged(line):
                     heapq.heappush(heap, (self._lines[new].length, new))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
 from hybridnav.ext.graphs.drawing import Drawing, Passage
+from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
-from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
+from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
 from hybridnav.ext.graphs.strands import Layout, RoomCells, lines_of, strands_of
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
 from hybridnav.maps import CellClass
@@ -53,6 +54,8 @@ _LONGEST = 1.25
 nodes."""
 _SAME_M = 1.0
 """Distance in metres within which a node is the same as one of a graph to keep."""
+_STANDS = 0.4
+"""Distance within which a node before stands for a new one, in distances between lanes."""
 _STEPS = 5
 
 
@@ -81,8 +84,9 @@ def build_lane_graph(
     margin_m
         Clearance beyond the robot's radius that lanes keep where there is as much, in metres.
     keep
-        A graph of the map as it was: nodes within 1 m of its nodes keep their place, if their edges
-        have room there, and their ids; edges keep the ids of edges between the same nodes.
+        A graph of the map as it was: its nodes and edges stay where the robot can still follow
+        them, with their ids, and only what they lack is added. A node that is moved by 1 m at most
+        keeps its id too. No id of that graph goes to anything else.
     progress
         Called with the number of steps done and of all steps.
 
@@ -147,11 +151,10 @@ def build_lane_graph(
     sketch.split(_LONGEST * layout.apart)
     _connect(sketch, space)
     known = None if keep is None else grid.frame.positions_of(keep.points)
-    if known is not None:
+    if keep is not None and known is not None:
         same = _same(sketch, known, cell_m)
-        aim = sketch.positions.copy()
-        aim[same >= 0] = known[same[same >= 0]]
-        sketch.move(aim)
+        sketch.keep(settled(known), keep.edges, same, _STANDS * layout.apart)
+        _connect(sketch, space)
     sketch.make_plane()
     progress(4, _STEPS)
     graph = _described(topology, space, sketch)
@@ -176,8 +179,8 @@ def _drawn(
     kinds = np.where(ends, END, NOTHING)
     if rooms is not None:
         passed = np.argwhere(lines & (part_of >= 0))
-        _mark_rooms(kinds, passed, label_of, cells)
         _mark_doors(kinds, passed, rooms)
+        _mark_rooms(kinds, passed[kinds[tuple(passed.T)] < DOOR], label_of, cells)
     at, strands = strands_of(lines, kinds != NOTHING)
     passage = Passage(space, clearance[1:-1, 1:-1], margin)
     middles = np.asarray(_freed(at, part_of) + 0.5, dtype=np.float64)
@@ -256,45 +259,38 @@ def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
 def _described(topology: TopologicalMap, space: FreeSpace, sketch: Sketch) -> RouteGraph:
     """Return the route graph of a sketch."""
     degree = np.bincount(sketch.edges.ravel(), minlength=len(sketch.kinds))
-    names = {END: "end", ROOM: "room"}
+    by_degree = np.array(["end", "end", "bend", "crossing"])[np.minimum(degree, 3)].tolist()
     kinds = [
-        "door" if kind >= DOOR else names.get(kind, "bend" if count == 2 else "crossing")  # noqa: PLR2004
-        for kind, count in zip(sketch.kinds.tolist(), degree.tolist(), strict=True)
+        "door" if kind >= DOOR else "room" if kind == ROOM else known
+        for kind, known in zip(sketch.kinds.tolist(), by_degree, strict=True)
     ]
     doors = np.maximum(sketch.kinds - (DOOR - 1), 0).tolist()
     nodes = Nodes(space, len(kinds), sketch.positions, kinds, doors)
     return described(topology, nodes, np.concatenate([sketch.edges, sketch.edges[:, ::-1]]))
 
 
-def _renamed(graph: RouteGraph, keep: RouteGraph | WaypointGraph, known: LongArray) -> RouteGraph:
-    """Return a graph with the ids of nodes and edges that are the same as before."""
-    names: tuple[object, ...] = (
-        keep.names if isinstance(keep, WaypointGraph) else tuple(keep.ids[0])
-    )
-    edge_names = keep.edge_names if isinstance(keep, WaypointGraph) else tuple(keep.ids[1])
-    ends = keep.edges.tolist()
-    edge_of = {(one, other): name for (one, other), name in zip(ends, edge_names, strict=True)}
-    pairs = known[graph.edges].tolist()
-    wanted = [names[node] if node >= 0 else None for node in known.tolist()]
-    wanted += [edge_of.get((one, other)) for one, other in pairs]
-    ids = _numbered(wanted)
+def _renamed(graph: RouteGraph, keep: RouteGraph | WaypointGraph, same: LongArray) -> RouteGraph:
+    """Return a graph with the ids of nodes and edges that are the same as before; all others get
+    ids that nothing had."""
+    if isinstance(keep, RouteGraph):
+        nodes, edges = (each.tolist() for each in keep.ids)
+    else:
+        nodes, edges = list(keep.names), list(keep.edge_names)
+    id_of = dict(zip(map(tuple, keep.edges.tolist()), edges, strict=True))
+    wanted = [nodes[node] if node >= 0 else None for node in same.tolist()]
+    wanted += [id_of.get((tail, head)) for tail, head in same[graph.edges].tolist()]
+    following = 1 + max((name for name in (*nodes, *edges) if _is_id(name)), default=-1)
+    found: list[int] = []
+    used: set[int] = set()
+    for name in wanted:
+        number = name if _is_id(name) and name not in used else following
+        following += number == following
+        found.append(number)
+        used.add(number)
+    ids = np.array(found, dtype=np.int64)
     return replace(graph, ids=(frozen(ids[: graph.n_nodes]), frozen(ids[graph.n_nodes :])))
 
 
-def _numbered(wanted: list[object]) -> LongArray:
-    """Return an id for each node and edge: the wanted one, or the least that none has."""
-    taken: set[int] = set()
-    for name in wanted:
-        if isinstance(name, int | np.integer) and name >= 0:
-            taken.add(int(name))
-    used: set[int] = set()
-    following, found = 0, []
-    for name in wanted:
-        number = int(name) if isinstance(name, int | np.integer) and name >= 0 else -1
-        if number < 0 or number in used:
-            while following in taken:
-                following += 1
-            number, following = following, following + 1
-        used.add(number)
-        found.append(number)
-    return np.array(found, dtype=np.int64)
+def _is_id(name: Any) -> TypeGuard[int]:
+    """Return whether a name is an id that files for Nav2 hold."""
+    return isinstance(name, int) and 0 <= name <= MOST_ID

@@ -81,10 +81,11 @@ def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
 
     Nodes at rooms, doors, places, crossings and ends of lanes stay. Two of them are joined by the
     shortest route over the nodes that are left out, where the way over other polylines is longer
-    than `stretch` allows; so nodes are connected where they were. The cost of an edge is the length of that polyline in
-    metres; its metadata are those of `export_nav2`, and where it bends `polyline`, with `x_values`
-    and `y_values` in metres. A robot must follow the polyline: straight from node to node there may
-    be walls, and Nav2's route server of its own accord does not read it.
+    than `stretch` allows; so nodes are connected where they were. The cost of an edge is the length
+    of that polyline in metres; its metadata are those of `export_nav2`, and where it bends
+    `polyline`, with `x_values` and `y_values` in metres. A robot must follow the polyline: straight
+    from node to node there may be walls, and Nav2's route server of its own accord does not read
+    it.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
+from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, way
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -125,11 +125,8 @@ class Sketch:
 
     def move(self, aim: FloatArray) -> None:
         """Move nodes, float64 (n, 2), where all their edges keep their room."""
-        start, free = self.positions, self._passage.space.free
-        aim = settled(aim)
-        inside = np.asarray(((aim > 0) & (aim < free.shape)).all(axis=1), dtype=np.bool_)
-        inside[inside] = free[tuple(aim[inside].astype(np.int64).T)]
-        now = np.where(inside[:, None], aim, start)
+        start, aim = self.positions, settled(aim)
+        now = np.where(self._is_free(aim)[:, None], aim, start)
         want = np.minimum(self._passage.comfort, _KEPT * self._least(start, self.edges))
         while True:
             back = np.unique(self.edges[self._least(now, self.edges) < want])
@@ -242,16 +239,83 @@ class Sketch:
             (one, other), length = pairs[k].tolist(), float(lengths[k])
             if length <= 0 or max(len(beside[one]), len(beside[other])) >= _MOST_BESIDE:
                 continue
-            if _way(beside, one, other, detour * length) < math.inf:
+            if way(beside, one, other, detour * length) < math.inf:
                 continue
             both = ((one, other), (other, one))
-            if any(_beside(at, a, b, list(beside[a]), least_rad) for a, b in both):
+            if any(is_beside(at, a, b, list(beside[a]), least_rad) for a, b in both):
                 continue
-            if edges and _crosses(at[one], at[other], *at[np.array(edges)].swapaxes(0, 1)).any():
+            if edges and crosses(at[one], at[other], *at[np.array(edges)].swapaxes(0, 1)).any():
                 continue
             edges.append([one, other])
             beside[one][other] = beside[other][one] = length
         self.set_edges(edges)
+
+    def keep(self, known: FloatArray, edges: LongArray, same: LongArray, near: float) -> None:
+        """Keep a graph before where the robot can follow it, and add what it lacks.
+
+        Parameters
+        ----------
+        known
+            float64 (k, 2), the nodes of that graph.
+        edges
+            int64 (m, 2), its edges.
+        same
+            int64 (n,), which node of it each node is, -1 for none.
+        near
+            Distance in cells within which one of its nodes stands for a node that it sees.
+        """
+        from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
+
+        space, count = self._passage.space, len(known)
+        is_free = self._is_free(known)
+        edges = edges[is_free[edges].all(axis=1)]
+        edges = edges[self._least(known, edges) >= 0]
+        is_free[np.setdiff1d(np.arange(count), edges)] = False
+        # A node stands for itself, for one before at its place, or for one before that is near.
+        stands = np.where((same >= 0) & is_free[same], same, count + np.arange(len(same)))
+        own, kept = np.flatnonzero(stands >= count), np.flatnonzero(is_free)
+        if len(own) and len(kept):
+            away, at = KDTree(known[kept]).query(self.positions[own])
+            other = kept[np.asarray(at, dtype=np.int64)]
+            sees = (np.asarray(away) <= near) & (same[own] < 0)
+            sees[sees] = space.joins(self.positions[own[sees]], known[other[sees]])
+            stands[own[sees]] = other[sees]
+        kinds = np.full(count, NOTHING, dtype=np.int64)
+        np.maximum.at(kinds, stands[stands < count], self.kinds[stands < count])
+        new = stands[self.edges]
+        both = np.concatenate([known, self.positions])
+        new = new[(self._least(both, new) >= 0) & (new[:, 0] != new[:, 1])]
+        self.positions, self.kinds = both, np.append(kinds, self.kinds)
+        self.set_edges([*edges.tolist(), *self._lacking(edges, new)])
+        used = np.unique(np.append(self.edges, stands))
+        self.positions, self.kinds = self.positions[used], self.kinds[used]
+        self.set_edges(np.searchsorted(used, self.edges).tolist())
+
+    def _is_free(self, positions: FloatArray) -> BoolArray:
+        free = self._passage.space.free
+        inside = np.asarray(
+            ((positions > 0) & (positions < free.shape)).all(axis=1), dtype=np.bool_
+        )
+        inside[inside] = free[tuple(positions[inside].astype(np.int64).T)]
+        return inside
+
+    def _lacking(self, edges: LongArray, new: LongArray) -> list[list[int]]:
+        """Return the new edges without which some ways are twice as long, and that cross none."""
+        at = self.positions
+        beside: list[dict[int, float]] = [{} for _ in at]
+        known = edges.tolist()
+        for one, other in known:
+            beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
+        added: list[list[int]] = []
+        for one, other in new.tolist():
+            length = math.dist(at[one], at[other])
+            if way(beside, one, other, 2 * length) < math.inf:
+                continue
+            ends = np.array([*known, *added], dtype=np.int64).reshape(-1, 2)
+            if not crosses(at[one], at[other], at[ends[:, 0]], at[ends[:, 1]]).any():
+                added.append([one, other])
+                beside[one][other] = beside[other][one] = length
+        return added
 
     def split(self, longest: float) -> None:
         """Divide edges into equal ones of about a length in cells at most."""
@@ -278,31 +342,10 @@ class Sketch:
         self.positions, self.kinds = self.positions[kept], self.kinds[kept]
         self.set_edges(np.searchsorted(kept, index[self.edges]).tolist())
         for _ in range(_ROUNDS):
-            found = self._crossing()
+            found = crossing(self.positions, self.edges, _TOUCHING)
             if found is None:
                 return
             self._part(*found)
-
-    def _crossing(self) -> tuple[list[int], FloatArray] | None:
-        """Return two edges that cross, or one that a node touches, and where."""
-        import shapely  # noqa: PLC0415 - on demand
-
-        lines = np.asarray(shapely.linestrings(self.positions[self.edges]))
-        tree = shapely.STRtree(list(lines))
-        near, edge = tree.query(
-            shapely.points(self.positions), predicate="dwithin", distance=_TOUCHING
-        )
-        on = np.flatnonzero((self.edges[edge] != near[:, None]).all(axis=1))
-        if len(on):
-            return [int(edge[on[0]])], self.positions[near[on[0]]]
-        one, other = tree.query(lines, predicate="crosses")
-        apart = (self.edges[one][:, :, None] != self.edges[other][:, None]).all(axis=(1, 2))
-        pairs = np.flatnonzero((one < other) & apart)
-        if not len(pairs):
-            return None
-        first = pairs[0]
-        point = shapely.intersection(lines[one[first]], lines[other[first]])
-        return [int(one[first]), int(other[first])], shapely.get_coordinates(point)[0]
 
     def _part(self, which: list[int], at: FloatArray) -> None:
         """Lead edges through a common node, or leave the longest out that is not needed."""
@@ -324,7 +367,7 @@ class Sketch:
             for one, other in edges.tolist():
                 beside[one][other] = beside[other][one] = 1.0
             tail, head = self.edges[which[k]].tolist()
-            if _way(beside, tail, head, math.inf) < math.inf:
+            if way(beside, tail, head, math.inf) < math.inf:
                 self.set_edges(edges.tolist())
                 return
 
@@ -358,44 +401,3 @@ def _aligned(
     for one in np.unique(group).tolist():
         found[members[one]] = np.clip(value[members[one]].mean(), low[one], high[one])
     return found
-
-
-def _way(beside: list[dict[int, float]], start: int, goal: int, limit: float) -> float:
-    """Return the length of the way between two nodes, infinite above a limit."""
-    costs = {start: 0.0}
-    heap = [(0.0, start)]
-    while heap:
-        cost, here = heapq.heappop(heap)
-        if here == goal:
-            return cost
-        for there, length in beside[here].items() if cost <= costs[here] else ():
-            through = cost + length
-            if through <= limit and through < costs.get(there, math.inf):
-                costs[there] = through
-                heapq.heappush(heap, (through, there))
-    return math.inf
-
-
-def _beside(at: FloatArray, node: int, head: int, others: list[int], least_rad: float) -> bool:
-    """Return whether an edge makes a smaller angle with another one of its node."""
-    steps = at[[head, *others]] - at[node]
-    steps /= np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
-    return bool((steps[1:] @ steps[0] > cos(least_rad)).any())
-
-
-def _crosses(one: FloatArray, other: FloatArray, tails: FloatArray, heads: FloatArray) -> BoolArray:
-    """Return which segments have a point in common with a segment, but no end; bool (m,)."""
-
-    def side(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
-        step, away = second - first, third - first
-        across = step[..., 0] * away[..., 1] - step[..., 1] * away[..., 0]
-        found: FloatArray = np.sign(across)
-        return found
-
-    meets = side(tails, heads, one) * side(tails, heads, other) <= 0
-    meets &= side(one, other, tails) * side(one, other, heads) <= 0
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    meets &= ((np.maximum(one, other) >= low) & (np.minimum(one, other) <= high)).all(axis=1)
-    for end in (one, other):
-        meets &= ~((tails == end).all(axis=1) | (heads == end).all(axis=1))
-    return np.asarray(meets, dtype=np.bool_)

@@ -27,6 +27,8 @@ _COVER = 0.9
 lanes."""
 _ROOM = 0.75
 """The same for the point of a room that a strand passes already."""
+_MIDDLE_CELLS = 0.6
+"""How much less clearance an end may have than any cell of its part, in cells."""
 _ROUNDS = 12
 
 
@@ -168,11 +170,11 @@ def _uncovered(away: FloatArray, clearance: FloatArray, layout: Layout) -> LongA
     parts, count = ndimage.label(far)
     flat = np.flatnonzero(far)
     part = parts.ravel()[flat]
-    # The farthest cell of those with about as much room as any.
+    # The farthest cell of those in the middle, so that the line there is straight.
     room = np.minimum(clearance.ravel()[flat], cover / 3)
     most = np.zeros(count + 1)
     np.maximum.at(most, part, room)
-    score = np.where(room >= 0.8 * most[part], away.ravel()[flat], 0.0)
+    score = np.where(room >= most[part] - _MIDDLE_CELLS, away.ravel()[flat], 0.0)
     order = np.lexsort((flat, -score, part))
     found: LongArray = flat[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
     return found
@@ -187,7 +189,7 @@ def strands_of(lines: BoolArray, marks: BoolArray) -> tuple[LongArray, list[Stra
     Parameters
     ----------
     lines
-        bool (rows, cols), as of `lines_of`.
+        bool (rows, cols), 4-connected lines one cell wide.
     marks
         bool (rows, cols), cells of lines that are nodes, beside crossings and ends.
 
@@ -196,16 +198,17 @@ def strands_of(lines: BoolArray, marks: BoolArray) -> tuple[LongArray, list[Stra
     tuple
         int64 (n, 2), the cell of each node; the strands between them, of which some may be rings.
     """
+    lines = np.pad(lines, 1)
     cols = lines.shape[1]
     cells = np.argwhere(lines)
     flat: list[int] = (cells @ np.array([cols, 1])).tolist()
+    on = lines.ravel()
     near = {
-        cell: [
-            cell + row * cols + col for row, col in _SIDES if lines.flat[cell + row * cols + col]
-        ]
+        cell: [cell + row * cols + col for row, col in _SIDES if on[cell + row * cols + col]]
         for cell in flat
     }
-    nodes = {cell: 0 for cell in flat if len(near[cell]) != 2 or marks.flat[cell]}  # noqa: PLR2004
+    is_marked = np.pad(marks, 1).ravel()
+    nodes = {cell: 0 for cell in flat if len(near[cell]) != 2 or is_marked[cell]}  # noqa: PLR2004
     strands: list[tuple[list[int], int, int]] = []
     passed: set[int] = set(nodes)
     done: set[tuple[int, int]] = set()
@@ -229,8 +232,8 @@ def strands_of(lines: BoolArray, marks: BoolArray) -> tuple[LongArray, list[Stra
             nodes[cell] = 0
             walk(cell)
     index = {cell: k for k, cell in enumerate(nodes)}
-    at = np.stack(np.divmod(np.array(list(nodes), dtype=np.int64), cols), axis=1)
+    at = np.stack(np.divmod(np.array(list(nodes), dtype=np.int64), cols), axis=1) - 1
     return at, [
-        Strand(index[one], index[other], np.stack(np.divmod(np.array(chain), cols), axis=1) + 0.5)
+        Strand(index[one], index[other], np.stack(np.divmod(np.array(chain), cols), axis=1) - 0.5)
         for chain, one, other in strands
     ]
