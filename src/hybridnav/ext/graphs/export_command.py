@@ -166,11 +166,6 @@ def export(
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
     _check_out(kind, out)
-    _check_style(
-        style,
-        {"--nodes": nodes is not None, "--stretch": stretch != _STRETCH and not polylines},
-        {"--keep": keep is not None},
-    )
     if polylines and (report is not None or plot is not None or lanes_m is not None):
         raise UsageError(
             "--polylines does not go with --report, --plot and --lanes, which are for straight "
@@ -193,6 +188,8 @@ def export(
             "--plot": plot is not None,
         }
         _check_plain(kind, given)
+    is_stretched = stretch != _STRETCH and not polylines
+    _check_style(style, {"--nodes": nodes, "--stretch": is_stretched or None}, {"--keep": keep})
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -260,7 +257,7 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     _check_out(kind, out)
-    _check_style(style, {"--nodes": nodes is not None, "--stretch": stretch != _STRETCH}, {})
+    _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
@@ -325,13 +322,13 @@ def _check_out(kind: str, out: Path) -> None:
     check_output(out, "--out", _ENDINGS[kind])
 
 
-def _check_style(style: str, of_roadmaps: dict[str, bool], of_lanes: dict[str, bool]) -> None:
+def _check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
     """Refuse styles that are none, and options of the other one."""
     if style not in _STYLES:
         raise UsageError(f"--style must be one of {', '.join(_STYLES)}, got {style!r:.80}")
     other = _STYLES[style == "lanes"]
-    for option, is_given in (of_roadmaps if style == "lanes" else of_lanes).items():
-        if is_given:
+    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
+        if given is not None:
             raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
 
 

@@ -31,7 +31,7 @@ _FRACTION = 2.0**10
 """Parts of a cell to which positions that were computed are rounded."""
 _RIM = 2.0**-5
 """Least distance of these from the sides of their cell, in cells."""
-_TOUCHING = 0.1
+_TOUCHING = 1e-6
 """Distance in cells from an edge at which a node lies on it."""
 _MOST_BESIDE = 5
 """Edges of a node from which on it gets no chord: people draw crossings, no stars."""
@@ -76,12 +76,16 @@ class Sketch:
     def _least(self, positions: FloatArray, edges: LongArray) -> FloatArray:
         return self._passage.least(positions[edges[:, 0]], positions[edges[:, 1]])
 
-    def _with_nodes(self, positions: FloatArray, kind: int = NOTHING) -> range:
-        """Add nodes; return their indices."""
-        first = len(self.positions)
-        self.positions = np.concatenate([self.positions, positions])
-        self.kinds = np.append(self.kinds, np.full(len(positions), kind, dtype=np.int64))
-        return range(first, len(self.positions))
+    def _with_nodes(self, positions: FloatArray) -> list[int]:
+        """Return the nodes at some positions; they are added where there are none."""
+        found: list[int] = []
+        for at in positions:
+            known = np.flatnonzero((self.positions == at).all(axis=1))
+            found.append(int(known[0]) if len(known) else len(self.positions))
+            if not len(known):
+                self.positions = np.concatenate([self.positions, at[None]])
+                self.kinds = np.append(self.kinds, NOTHING)
+        return found
 
     def add_path(self, tail: int, head: int, inner: FloatArray) -> list[tuple[int, int]]:
         """Add nodes between two; return the edges from one to the next."""
@@ -341,7 +345,7 @@ class Sketch:
         kept = np.unique(index)
         self.positions, self.kinds = self.positions[kept], self.kinds[kept]
         self.set_edges(np.searchsorted(kept, index[self.edges]).tolist())
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS + 4 * len(self.edges)):
             found = crossing(self.positions, self.edges, _TOUCHING)
             if found is None:
                 return
@@ -349,27 +353,39 @@ class Sketch:
 
     def _part(self, which: list[int], at: FloatArray) -> None:
         """Lead edges through a common node, or leave the longest out that is not needed."""
-        there = np.flatnonzero((self.positions == at).all(axis=1))
-        ends = np.unique(self.edges[which])
+        space, there = self._passage.space, np.flatnonzero((self.positions == at).all(axis=1))
+        ends = np.unique(self.edges[which]).tolist()
         rest = np.delete(self.edges, which, axis=0).tolist()
-        cell = np.floor(at) + 0.5
-        aims = self.positions[there] if len(there) else np.stack([settled(at), cell])
+        near = np.floor(
+            at + np.array([(down, right) for down in (-1, 1) for right in (-1, 1)]) / 512
+        )
+        aims = (
+            self.positions[there] if len(there) else np.concatenate([settled(at[None]), near + 0.5])
+        )
+        aims = aims[self._is_free(aims)]
         for aim in aims:
             spots = np.repeat(aim[None], len(ends), axis=0)
-            if self._passage.space.joins(spots, self.positions[ends]).all():
-                node = int(there[0]) if len(there) else self._with_nodes(aim[None])[0]
-                self.set_edges([*rest, *((node, end) for end in ends.tolist())])
+            if space.joins(spots, self.positions[ends]).all():
+                (node,) = self._with_nodes(aim[None])
+                self.set_edges([*rest, *((node, end) for end in ends)])
                 return
         lengths = np.diff(self.positions[self.edges[which]], axis=1)[:, 0]
         for k in np.argsort(-np.hypot(*lengths.T), kind="stable").tolist():
-            edges = np.delete(self.edges, which[k], axis=0)
+            edges = np.delete(self.edges, which[k], axis=0).tolist()
             beside: list[dict[int, float]] = [{} for _ in self.positions]
-            for one, other in edges.tolist():
+            for one, other in edges:
                 beside[one][other] = beside[other][one] = 1.0
             tail, head = self.edges[which[k]].tolist()
             if way(beside, tail, head, math.inf) < math.inf:
-                self.set_edges(edges.tolist())
+                self.set_edges(edges)
                 return
+        # Both are needed, and no straight edges lead there: paths do.
+        (node,) = self._with_nodes(aims[-1:])
+        spots = np.repeat(self.positions[node][None], len(ends), axis=0)
+        paths = space.paths(spots, self.positions[ends])
+        for end, line in zip(ends, np.split(paths.positions, paths.path_start[1:-1]), strict=True):
+            rest += self.add_path(node, end, space.joinable(line)[1:-1])
+        self.set_edges(rest)
 
 
 def _remove(node: int, beside: dict[int, set[int]]) -> None:
