@@ -234,6 +234,7 @@ def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
 
 def _connect(sketch: Sketch, space: FreeSpace) -> None:
     """Join parts of the graph that free space connects."""
+    sketch.unify()  # else parts that meet at one place are joined in vain
     nodes = Nodes(space, len(sketch.positions), sketch.positions)
     edges = [*map(tuple, sketch.edges.tolist())]
     while missing := missing_bends(nodes, np.array(edges, dtype=np.int64).reshape(-1, 2)):

@@ -334,17 +334,21 @@ class Sketch:
             edges += self.add_path(tail, head, inner) if is_free else [(tail, head)]
         self.set_edges(edges)
 
-    def make_plane(self) -> None:
-        """Put a node wherever edges cross or touch, or leave out an edge that is not needed.
-
-        Nodes at one place become one.
-        """
+    def unify(self) -> None:
+        """Make one node of those at one place."""
         first = {tuple(at): node for node, at in reversed([*enumerate(self.positions.tolist())])}
         index = np.array([first[tuple(at)] for at in self.positions.tolist()], dtype=np.int64)
         np.maximum.at(self.kinds, index, self.kinds)
         kept = np.unique(index)
         self.positions, self.kinds = self.positions[kept], self.kinds[kept]
         self.set_edges(np.searchsorted(kept, index[self.edges]).tolist())
+
+    def make_plane(self) -> None:
+        """Put a node wherever edges cross or touch, or leave out an edge that is not needed.
+
+        Nodes at one place become one.
+        """
+        self.unify()
         for _ in range(_ROUNDS + 4 * len(self.edges)):
             found = crossing(self.positions, self.edges, _TOUCHING)
             if found is None:
