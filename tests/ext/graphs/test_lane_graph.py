@@ -48,7 +48,7 @@ def checked(topology, **options):
     ends = graph.points[graph.edges[graph.edges[:, 0] < graph.edges[:, 1]]]
     lines = [shapely.LineString(pair) for pair in ends]
     network = shapely.node(shapely.MultiLineString(lines))
-    assert len(getattr(network, "geoms", [network])) == len(lines) or not len(lines)
+    assert len(getattr(network, "geoms", [network])) == len(lines) or not lines
     # Parts of the graph are those of free space, of 1 m² or more.
     free = grid.enterable(allow_unexplored=False)
     labels, count = ndimage.label(free)

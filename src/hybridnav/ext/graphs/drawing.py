@@ -65,7 +65,7 @@ class _Line:
     """Its least clearance, without its ends."""
 
 
-class Drawing:
+class ChainGraph:
     """A plane graph of chains of cells.
 
     Parameters

@@ -13,12 +13,12 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.drawing import Drawing, Passage
+from hybridnav.ext.graphs.drawing import ChainGraph, Passage
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
-from hybridnav.ext.graphs.strands import Layout, RoomCells, lines_of, strands_of
+from hybridnav.ext.graphs.strands import Layout, RoomAnchors, lines_of, strands_of
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
@@ -114,8 +114,8 @@ def build_lane_graph(
     >>> grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
     >>> graph = build_lane_graph(topology)
-    >>> graph.points[:, 1].round(1).tolist()  # in the middle of a corridor
-    [1.2, 1.2, 1.2]
+    >>> bool((abs(graph.points[:, 1] - 1.2) <= 0.1).all())  # in the middle of a corridor
+    True
     """
     checked_type("topology", topology, TopologicalMap)
     checked_between("spacing_m", spacing_m, 0.5, 100)
@@ -166,14 +166,14 @@ def build_lane_graph(
 
 def _drawn(
     topology: TopologicalMap, space: FreeSpace, part_of: IntArray, layout: Layout, margin: float
-) -> Drawing:
+) -> ChainGraph:
     """Return the lines of lanes, with a node in each room and door that they pass."""
     parts = np.pad(part_of, 1, constant_values=-1)
     clearance = clearance_cells(parts < 0)
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
     label_of = np.full_like(part_of, -1) if rooms is None else rooms.labels.label_of
     cells = np.empty((0, 2), np.int64) if rooms is None else _room_cells(rooms, space, part_of)
-    known = RoomCells(np.pad(label_of, 1, constant_values=-1), cells + 1)
+    known = RoomAnchors(np.pad(label_of, 1, constant_values=-1), cells + 1)
     padded = lines_of(parts, clearance, known, layout)
     lines, ends = (np.ascontiguousarray(each[1:-1, 1:-1]) for each in padded)
     kinds = np.where(ends, END, NOTHING)
@@ -184,7 +184,7 @@ def _drawn(
     at, strands = strands_of(lines, kinds != NOTHING)
     passage = Passage(space, clearance[1:-1, 1:-1], margin)
     middles = np.asarray(_freed(at, part_of) + 0.5, dtype=np.float64)
-    return Drawing(middles, kinds[tuple(at.T)], strands, passage)
+    return ChainGraph(middles, kinds[tuple(at.T)], strands, passage)
 
 
 def _room_cells(rooms: Rooms, space: FreeSpace, part_of: IntArray) -> LongArray:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 
-def way(beside: list[dict[int, float]], start: int, goal: int, limit: float) -> float:
+def length_between(beside: list[dict[int, float]], start: int, goal: int, limit: float) -> float:
     """Return the length of the way between two nodes, infinite above a limit."""
     costs = {start: 0.0}
     heap = [(0.0, start)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
-from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, way
+from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, length_between
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -243,7 +243,7 @@ class Sketch:
             (one, other), length = pairs[k].tolist(), float(lengths[k])
             if length <= 0 or max(len(beside[one]), len(beside[other])) >= _MOST_BESIDE:
                 continue
-            if way(beside, one, other, detour * length) < math.inf:
+            if length_between(beside, one, other, detour * length) < math.inf:
                 continue
             both = ((one, other), (other, one))
             if any(is_beside(at, a, b, list(beside[a]), least_rad) for a, b in both):
@@ -313,7 +313,7 @@ class Sketch:
         added: list[list[int]] = []
         for one, other in new.tolist():
             length = math.dist(at[one], at[other])
-            if way(beside, one, other, 2 * length) < math.inf:
+            if length_between(beside, one, other, 2 * length) < math.inf:
                 continue
             ends = np.array([*known, *added], dtype=np.int64).reshape(-1, 2)
             if not crosses(at[one], at[other], at[ends[:, 0]], at[ends[:, 1]]).any():
@@ -380,7 +380,7 @@ class Sketch:
             for one, other in edges:
                 beside[one][other] = beside[other][one] = 1.0
             tail, head = self.edges[which[k]].tolist()
-            if way(beside, tail, head, math.inf) < math.inf:
+            if length_between(beside, tail, head, math.inf) < math.inf:
                 self.set_edges(edges)
                 return
         # Both are needed, and no straight edges lead there: paths do.

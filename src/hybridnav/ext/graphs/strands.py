@@ -47,7 +47,7 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class RoomCells:
+class RoomAnchors:
     """The rooms of a map."""
 
     label_of: IntArray
@@ -67,7 +67,7 @@ class Strand:
 
 
 def lines_of(
-    part_of: IntArray, clearance: FloatArray, rooms: RoomCells, layout: Layout
+    part_of: IntArray, clearance: FloatArray, rooms: RoomAnchors, layout: Layout
 ) -> tuple[BoolArray, BoolArray]:
     """Find the cells of strands.
 
