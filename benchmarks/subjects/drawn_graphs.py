@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.scenes import Pair
     from hybridnav.harness.tables import Row
 
-_GRAPHS = {
+GRAPHS = {
     "nav2/graphs/nav2_bringup/depot_graph.geojson": "nav2/maps/depot.yaml",
     "nav2/graphs/nav2_bringup/turtlebot3_graph.geojson": "nav2/maps/tb3_sandbox.yaml",
     "nav2/graphs/nav2_route/aws_graph.geojson": "aws_small_warehouse/005/map.yaml",
@@ -116,7 +116,7 @@ OPTIONS = [
 def main(given: Namespace) -> None:
     """Print the table."""
     rows: list[Row] = []
-    for file, map_file in _GRAPHS.items():
+    for file, map_file in GRAPHS.items():
         graph = hn.ext.graphs.load_graph(given.data / file)
         grid = read(given.data / map_file, given.radius)
         rooms = hn.find_rooms(grid)

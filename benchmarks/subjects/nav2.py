@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.graphs import Excess
     from hybridnav.harness.tables import Row
 
-_BUILDINGS = (
+BUILDINGS = (
     "bwi_gdc/2/2.yaml",
     "bwi_gdc/3/3.yaml",
     "bwi_gdc/3ne/3ne.yaml",
@@ -117,7 +117,7 @@ OPTIONS = [
 
 def main(given: Namespace) -> int:
     """Print the tables."""
-    names = [name for name in _BUILDINGS if not given.maps or matches(name, given.maps)]
+    names = [name for name in BUILDINGS if not given.maps or matches(name, given.maps)]
     files = [OFFICE] if not given.maps or matches("office", given.maps) else []
     files += [given.data / name for name in names] if given.data else []
     rows: list[Row] = []

@@ -14,7 +14,7 @@ from tests.nav2_reader import read_nav2
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 OFFICE = FIGURE.parents[1] / "office" / "office.yaml"
-SMALL = ("--robot-radius", "0", "--spacing", "1")
+SMALL = ("--robot-radius", "0", "--spacing", "1", "--style", "roadmap")
 
 
 def test_a_map_becomes_a_graph_with_a_report_and_a_picture(cli, tmp_path):
@@ -73,13 +73,34 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
 def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
     def nodes(*more):
         given = ("export", FIGURE, "-o", tmp_path / f"g.{more[1] if more else 'json'}", "--json")
-        return cli(*given, *SMALL[:2], *more[2:]).answer["nodes"]
+        return cli(*given, *SMALL[:2], *SMALL[4:], *more[2:]).answer["nodes"]
 
     near, far = nodes(), nodes("", "json", "--spacing", 2)
     assert near == nodes("", "json", "--spacing", 1)
     assert near > far
     assert nodes("", "yaml", "--format", "rmf") == far
     assert nodes("", "json", "--lanes", 1) == nodes("", "json", "--lanes", 1, "--spacing", 2)
+
+
+def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
+    first, second = tmp_path / "a.geojson", tmp_path / "b.geojson"
+    done = cli("export", FIGURE, "-o", first, *SMALL[:2], "--json")
+    assert (done.code, done.err) == (0, "")
+    assert set(done.answer["kinds"]) <= {"room", "door", "crossing", "end", "bend"}
+    few = done.answer["nodes"]
+    assert few < cli("export", FIGURE, "-o", second, *SMALL, "--json").answer["nodes"]
+    facts = read_nav2(first).node_facts
+    assert {one["class"] for one in facts.values()} == set(done.answer["kinds"])
+    done = cli("export", FIGURE, "-o", second, *SMALL[:2], "--keep", first, "--json")
+    assert (done.code, first.read_bytes()) == (0, second.read_bytes())
+    done = cli("export", FIGURE, "-o", second, *SMALL[:4], "--style", "lanes", "--json")
+    assert done.answer["nodes"] >= few
+    given = ("export", FIGURE, "-o", second, *SMALL[:2])
+    assert cli(*given, "--style", "dense").refuses(2, "--style", "lanes, roadmap")
+    assert cli(*given, "--nodes", 5).refuses(2, "--nodes is for --style roadmap")
+    assert cli(*given, "--stretch", 2).refuses(2, "--stretch is for --style roadmap")
+    assert cli(*given, *SMALL[4:], "--keep", first).refuses(2, "--keep is for --style lanes")
+    assert cli(*given, "--keep", tmp_path / "no.geojson").refuses(3, "no.geojson")
 
 
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
@@ -203,7 +224,7 @@ def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
 
 def test_what_a_format_does_not_hold_is_printed(cli, tmp_path):
     out = tmp_path / "a.yaml"
-    done = cli("export", OFFICE, "-o", out, "--format", "rmf", "--nodes", "50", "--no-doors")
+    done = cli("export", OFFICE, "-o", out, "--format", "rmf", "--no-doors")
     assert done.code == 0
     assert "left out   doors: as asked\n" in done.out
     assert hn.ext.fleet.load_building_graph(out).floors[0].doors == ()

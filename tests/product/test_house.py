@@ -5,9 +5,9 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 54_520,
-    "lines": 90_780,
-    "files": 389,
+    "code": 55_520,
+    "lines": 92_270,
+    "files": 395,
     "code outside ext": 37_580,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
@@ -20,8 +20,8 @@ LIMITS = {
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
-    "parameters of commands, shared ones once": 110,
-    "lines of tests": 57_760,
+    "parameters of commands, shared ones once": 112,
+    "lines of tests": 58_030,
 }
 
 

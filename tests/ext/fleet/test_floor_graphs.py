@@ -196,7 +196,7 @@ def test_nodes_of_a_layout_are_joined_exactly_where_the_building_has_a_route(
     """The file of a building, read again: components of nodes against plans over floors."""
     building = random_building(seed, most_floors=3).building
     try:
-        graph = hn.ext.fleet.building_graph(building, nodes=30)
+        graph = hn.ext.fleet.building_graph(building)
     except hn.errors.InvalidValueError:
         assume(False)
     file = tmp_path_factory.mktemp("lif") / "layout.json"

@@ -342,11 +342,8 @@ def test_wrong_routes_are_refused_in_one_line(
 
 
 def test_ids_that_messages_cannot_hold_are_refused(graph: hn.ext.graphs.RouteGraph) -> None:
-    """Nodes that no edge leads to push the ids of edges over 65,535."""
-    many = np.zeros((65_536, 2))
-    many[: graph.n_nodes] = graph.positions
-    large = replace(graph, positions=many)
-    assert route_messages(large, [65_535])["route"]["nodes"][0]["nodeid"] == 65_535
+    large = replace(graph, ids=(graph.ids[0] + 65_535, graph.ids[1] + 65_535))
+    assert route_messages(large, [0])["route"]["nodes"][0]["nodeid"] == 65_535
     with pytest.raises(hn.errors.InvalidValueError, match="build the graph with fewer nodes"):
         route_messages(large, graph.edges[0].tolist())
 

@@ -37,7 +37,7 @@ class BuildingGraphCheck:
     >>> from hybridnav.ext.fleet import check_building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> graph = building_graph(house, nodes=20)
+    >>> graph = building_graph(house)
     >>> check = check_building_graph(match_graph(house, graph))
     >>> check.count, list(check.floors)
     (0, ['1', '2'])
@@ -85,7 +85,7 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     >>> from hybridnav.ext.fleet import check_building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> drawn = building_graph(Building(house.floors[:1]), nodes=20)
+    >>> drawn = building_graph(Building(house.floors[:1]))
     >>> check = check_building_graph(match_graph(house, drawn))
     >>> [found.kind for found in check.findings]
     ['floor-missing']

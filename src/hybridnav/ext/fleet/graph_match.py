@@ -61,7 +61,7 @@ class MatchedGraph:
     >>> from hybridnav.ext.fleet import Building, Floor, building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> matched = match_graph(house, building_graph(house, nodes=20))
+    >>> matched = match_graph(house, building_graph(house))
     >>> list(matched.floors), matched.unknown_floors
     (['1', '2'], ())
     """
@@ -135,7 +135,7 @@ def match_graph(
     >>> from hybridnav.ext.fleet import Building, Floor, building_graph, match_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> house = Building([Floor("ground", hn.HybridPlanner(topology))])
-    >>> drawn = building_graph(Building([Floor("L1", house.floors[0].planner)]), nodes=20)
+    >>> drawn = building_graph(Building([Floor("L1", house.floors[0].planner)]))
     >>> list(match_graph(house, drawn, floors={"L1": "ground"}).floors)
     ['ground']
     """

@@ -12,6 +12,7 @@ from .judge import (
     GraphReport as GraphReport,
     judge_route_graph as judge_route_graph,
 )
+from .lane_graph import build_lane_graph as build_lane_graph
 from .lanes import keep_right as keep_right
 from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
 from .polylines import merge_bends as merge_bends

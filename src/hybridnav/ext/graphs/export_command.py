@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -46,19 +47,40 @@ _ENDINGS = {
 """Endings of the file of each format."""
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
+_STYLES = ("lanes", "roadmap")
 _STRETCH = 1.05
-_NEAR_M, _FAR_M = 1.0, 2.0
-"""Spacing of graphs for Nav2, which joins them at the nearest node, and of all others: lanes need
-long edges."""
+_APART_M, _NEAR_M, _FAR_M = 4.0, 1.0, 2.0
+"""Spacing of lanes; of roadmaps for Nav2, which joins them at the nearest node; and of all other
+roadmaps: one-way lanes need long edges."""
 _MOST_PAIRS = 1_000_000
 
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
 ]
+StyleOption = Annotated[
+    str,
+    typer.Option(
+        "--style",
+        metavar="NAME",
+        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
+        "nodes, for routes nearly as short as paths.",
+    ),
+]
+KeepOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--keep",
+        metavar="FILE",
+        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
+    ),
+]
 NodesOption = Annotated[
     int | None,
     typer.Option(
-        "--nodes", metavar="N", min=1, help="Nodes to aim at: fewer nodes, longer routes."
+        "--nodes",
+        metavar="N",
+        min=1,
+        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
     ),
 ]
 SpacingOption = Annotated[
@@ -66,8 +88,9 @@ SpacingOption = Annotated[
     typer.Option(
         "--spacing",
         metavar="D",
-        help=f"Distance in metres within which points see a node; by default {_NEAR_M:g}, with "
-        f"--lanes and in formats other than nav2 {_FAR_M:g}.",
+        help=f"Distance in metres between the lanes of a hall, by default {_APART_M:g}; of a "
+        f"roadmap, within which points see a node, by default {_NEAR_M:g}, with --lanes and in "
+        f"formats other than nav2 {_FAR_M:g}.",
     ),
 ]
 StretchOption = Annotated[
@@ -115,6 +138,8 @@ def export(
     map_file: options.MapOrBuildingArgument,
     out: options.OutOption[Path],
     kind: FormatOption = "nav2",
+    style: StyleOption = "lanes",
+    keep: KeepOption = None,
     nodes: NodesOption = None,
     spacing_m: SpacingOption = None,
     stretch: StretchOption = _STRETCH,
@@ -152,6 +177,8 @@ def export(
         raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:
         given = {
+            "--style": style != _STYLES[0],
+            "--keep": keep is not None,
             "--nodes": nodes is not None,
             "--spacing": spacing_m is not None,
             "--stretch": stretch != _STRETCH,
@@ -161,6 +188,8 @@ def export(
             "--plot": plot is not None,
         }
         _check_plain(kind, given)
+    is_stretched = stretch != _STRETCH and not polylines
+    _check_style(style, {"--nodes": nodes, "--stretch": is_stretched or None}, {"--keep": keep})
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -174,14 +203,21 @@ def export(
         return
     began = time.perf_counter()
     with progress_bar("building the graph") as advance:
-        graph = hn.ext.graphs.build_route_graph(
-            topology,
-            nodes=nodes,
-            spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
-            stretch=stretch,
-            seed=settings.pyramid.seed,
-            progress=advance,
-        )
+        if style == "lanes":
+            before = None if keep is None else hn.ext.graphs.load_graph(keep)
+            apart_m = _APART_M if spacing_m is None else spacing_m
+            graph = hn.ext.graphs.build_lane_graph(
+                topology, spacing_m=apart_m, keep=before, progress=advance
+            )
+        else:
+            graph = hn.ext.graphs.build_route_graph(
+                topology,
+                nodes=nodes,
+                spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
+                stretch=stretch,
+                seed=settings.pyramid.seed,
+                progress=advance,
+            )
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
@@ -209,6 +245,7 @@ def _export_over_floors(
     map_file: Path,
     out: Path,
     kind: str,
+    style: str,
     nodes: int | None,
     spacing_m: float | None,
     stretch: float,
@@ -220,6 +257,7 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     _check_out(kind, out)
+    _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
@@ -229,16 +267,20 @@ def _export_over_floors(
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    began = time.perf_counter()
-    with progress_bar("building the graphs") as advance:
-        graph = hn.ext.fleet.building_graph(
-            building,
-            name=map_file.stem,
+    apart_m = _APART_M if spacing_m is None else spacing_m
+    build = partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
+    if style != "lanes":
+        build = partial(
+            hn.ext.graphs.build_route_graph,
             nodes=nodes,
             spacing_m=_spacing(spacing_m, is_near=False),
             stretch=stretch,
             seed=reading.seed or 0,
-            progress=advance,
+        )
+    began = time.perf_counter()
+    with progress_bar("building the graphs") as advance:
+        graph = hn.ext.fleet.building_graph(
+            building, name=map_file.stem, build=build, progress=advance
         )
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
@@ -278,6 +320,16 @@ def _check_out(kind: str, out: Path) -> None:
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
+
+
+def _check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
+    """Refuse styles that are none, and options of the other one."""
+    if style not in _STYLES:
+        raise UsageError(f"--style must be one of {', '.join(_STYLES)}, got {style!r:.80}")
+    other = _STYLES[style == "lanes"]
+    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
+        if given is not None:
+            raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
 
 
 def _spacing(given_m: float | None, *, is_near: bool) -> float:
@@ -358,6 +410,8 @@ def _ids_line(graph: RouteGraph | WaypointGraph) -> list[str]:
     from hybridnav._base.messages import MOST_ID  # noqa: PLC0415 - on demand
 
     most = graph.n_nodes + graph.n_edges - 1
+    if isinstance(graph, hn.ext.graphs.RouteGraph):
+        most = max(int(ids.max(initial=0)) for ids in graph.ids)
     if most <= MOST_ID:
         return []
     held = f"messages of ComputeRoute hold {MOST_ID:,}"

@@ -67,8 +67,9 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
         clearances_m=clearances,
         left_m=sides[:, 0],
         right_m=sides[:, 1],
+        ids=(np.arange(len(positions)), len(positions) + np.arange(len(edges))),
     )
-    for array in vars(graph).values():
+    for array in (*vars(graph).values(), *graph.ids):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
     return graph

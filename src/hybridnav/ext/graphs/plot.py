@@ -182,6 +182,8 @@ _KINDS = {
     "cover": ("further nodes", style.ARC, "o", 1.6),
     "lane": ("lanes", style.SELF_LOOP, "o", 1.6),
     "bend": ("bends", style.PARALLEL, "o", 2.0),
+    "end": ("ends", style.PARALLEL, "s", 3.0),
+    "crossing": ("crossings", style.INK, "o", 3.0),
     "place": ("places", style.INK, "o", 3.0),
     "room": ("rooms", style.PATH, "s", 4.0),
     "door": ("doors", style.HOLE, "D", 4.0),

@@ -69,7 +69,7 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
 
 # Edges that bend: a graph of rooms, doors and places, with polylines instead of nodes at bends.
 
-_LANDMARKS = frozenset({"room", "door", "place"})
+_LANDMARKS = frozenset({"room", "door", "place", "crossing", "end"})
 _ROUNDING = 1e-9
 """Relative slack on the length of a route, which is a sum of rounded numbers."""
 _AT_ONCE = 64
@@ -79,12 +79,13 @@ _AT_ONCE = 64
 def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
     """Leave out the nodes of a route graph that only bend routes or cover space.
 
-    Nodes at rooms, doors and places stay. Two of them are joined by the shortest route over the
-    nodes that are left out, where the way over other polylines is longer than `stretch` allows; so
-    nodes are connected where they were. The cost of an edge is the length of that polyline in
-    metres; its metadata are those of `export_nav2`, and where it bends `polyline`, with `x_values`
-    and `y_values` in metres. A robot must follow the polyline: straight from node to node there may
-    be walls, and Nav2's route server of its own accord does not read it.
+    Nodes at rooms, doors, places, crossings and ends of lanes stay. Two of them are joined by the
+    shortest route over the nodes that are left out, where the way over other polylines is longer
+    than `stretch` allows; so nodes are connected where they were. The cost of an edge is the length
+    of that polyline in metres; its metadata are those of `export_nav2`, and where it bends
+    `polyline`, with `x_values` and `y_values` in metres. A robot must follow the polyline: straight
+    from node to node there may be walls, and Nav2's route server of its own accord does not read
+    it.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ def route_messages(
     graph
         The graph.
     nodes
-        The nodes of the route in order, as indices into `graph.points`. Nodes have these ids and
-        edges those that follow, as in the file of `export_nav2`.
+        The nodes of the route in order, as indices into `graph.points`. Messages have the ids of
+        `graph.ids`, as the file of `export_nav2`.
     frame_id
         Name of the map frame.
     spacing_m
@@ -69,11 +69,12 @@ def route_messages(
     if not passed:
         raise InvalidValueError("a route needs at least one node, got none")
     edges = [_edge_of(graph, *pair) for pair in pairwise(passed)]
-    ids = [graph.n_nodes + edge for edge in edges]
-    if max([*passed, *ids]) > MOST_ID:
+    node_ids, edge_ids = graph.ids[0][passed].tolist(), graph.ids[1][edges].tolist()
+    most = max([*node_ids, *edge_ids])
+    if most > MOST_ID:
         raise InvalidValueError(
-            f"the route has the id {max([*passed, *ids])}, and messages of Nav2 hold at most "
-            f"{MOST_ID}: build the graph with fewer nodes"
+            f"the route has the id {most}, and messages of Nav2 hold at most {MOST_ID}: build the "
+            "graph with fewer nodes"
         )
     points = graph.points[passed]
     places = [{"x": x, "y": y, "z": 0.0} for x, y in points.tolist()]
@@ -84,11 +85,11 @@ def route_messages(
             "route_cost": float(graph.lengths_m[edges].sum()),
             "nodes": [
                 {"nodeid": node, "position": place}
-                for node, place in zip(passed, places, strict=True)
+                for node, place in zip(node_ids, places, strict=True)
             ],
             "edges": [
                 {"edgeid": edge, "start": start, "end": end}
-                for edge, start, end in zip(ids, places, places[1:], strict=False)
+                for edge, start, end in zip(edge_ids, places, places[1:], strict=False)
             ],
         },
         "path": path_message(poses, frame_id, stamp_ns),

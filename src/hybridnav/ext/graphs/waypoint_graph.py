@@ -205,8 +205,8 @@ class RouteGraph:
     positions: FloatArray
     """float64 (n, 2), (row, col) of each node in grid units."""
     kinds: tuple[str, ...]
-    """The kind of each node: room, door, place, bend (near a bend of shortest paths), cover (for
-    points that would see no node nearby), lane (of a lane that `keep_right` makes)."""
+    """The kind of each node: room, door, crossing, end (of a lane), bend, place, cover (for points
+    that would see no node nearby), lane (of a lane that `keep_right` makes)."""
     rooms: tuple[str | None, ...]
     """The room of each node, None for no room."""
     doors: LongArray
@@ -226,6 +226,9 @@ class RouteGraph:
     """float64 (m,), the least free distance to the left of each edge, in metres."""
     right_m: FloatArray
     """float64 (m,), the least free distance to the right."""
+    ids: tuple[LongArray, LongArray]
+    """int64 (n,) and (m,), the ids of nodes and edges in files and messages, each once: nodes from
+    0, edges after them, unless `build_lane_graph` has kept those of a graph before."""
 
     @property
     def n_nodes(self) -> int:

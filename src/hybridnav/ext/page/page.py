@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.graphs import build_route_graph
+from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.graphs.files import export_nav2
 from hybridnav.ext.page.tiles import TILE
 from hybridnav.planner import export_path, export_rooms
@@ -228,7 +228,7 @@ def exported_floor(session: Session, kind: str, folder: Path) -> tuple[str, byte
     _check_kind(kind, [each for each in KINDS if each not in WHOLE])
     topology = session.planning.topology
     if kind == "nav2":
-        graph = build_route_graph(topology)
+        graph = build_lane_graph(topology)
         return _content(kind, lambda file: export_nav2(graph, file), folder)
     return _content(kind, lambda file: export_rooms(topology.rooms, file), folder)
 

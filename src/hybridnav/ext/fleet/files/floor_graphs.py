@@ -12,7 +12,7 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph
 from hybridnav.ext.fleet.link_nodes import Stub, node_at, with_stubs
-from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_route_graph
+from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_lane_graph
 from hybridnav.ext.graphs.attach import Network, placed_points
 from hybridnav.ext.graphs.polylines import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
@@ -21,7 +21,7 @@ from hybridnav.topology import TopologicalMap
 from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from hybridnav._base.progress import Progress
     from hybridnav.ext.fleet import Link
@@ -47,7 +47,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         edge passes: none that are closed to the robot, or lead nowhere. They are called
         "FLOOR_doorNUMBER" and "FLOOR_openingNUMBER".
     graph
-        Its route graph, as `build_route_graph` and `keep_right` make it.
+        Its route graph, as `build_lane_graph`, `build_route_graph` and `keep_right` make it.
     name
         Name of the floor.
     elevation_m
@@ -103,14 +103,11 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     )
 
 
-def building_graph(  # noqa: PLR0913 - all but the first have defaults
+def building_graph(
     building: Building,
     *,
     name: str = "building",
-    nodes: int | None = None,
-    spacing_m: float = 2.0,
-    stretch: float = 1.05,
-    seed: int = 0,
+    build: Callable[[TopologicalMap], RouteGraph] = build_lane_graph,
     progress: Progress = no_progress,
 ) -> BuildingGraph:
     """Return the graph of a building: a route graph of each floor, and the links between them.
@@ -121,10 +118,8 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
         The building. Links that its robot does not fit in are left out.
     name
         Name of the building in files.
-    nodes
-        Number of nodes of each floor to aim at, as in `build_route_graph`.
-    spacing_m, stretch, seed
-        See `build_route_graph`.
+    build
+        Makes the route graph of a floor, as `build_lane_graph` and `build_route_graph` do.
     progress
         Called after each floor with the number of floors done and of all floors.
 
@@ -136,7 +131,7 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
     Raises
     ------
     InvalidValueError
-        As `build_route_graph` and `floor_graph` do.
+        As `build` and `floor_graph` do.
 
     Examples
     --------
@@ -145,7 +140,7 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
     >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
     >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
     >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
-    >>> graph = building_graph(house, nodes=20)
+    >>> graph = building_graph(house)
     >>> [floor.name for floor in graph.floors], [link.name for link in graph.links]
     (['1', '2'], ['lift'])
     """
@@ -155,9 +150,7 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
     floors = []
     for number, floor in enumerate(building.floors, start=1):
         topology = floor.planner.topology
-        graph = build_route_graph(
-            topology, nodes=nodes, spacing_m=spacing_m, stretch=stretch, seed=seed
-        )
+        graph = build(topology)
         height = floor.elevation_m
         floors.append(
             floor_graph(topology, graph, name=floor.name, elevation_m=height, links=links)

@@ -25,7 +25,7 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     """Write a route graph as Nav2's route server reads it, a GeoJSON file.
 
     A node is a `Point`, an edge a `LineString` in one direction; coordinates are metres in the map
-    frame. Ids are unique over nodes and edges: nodes from 0, edges after them. The `cost` of an
+    frame. Ids are those of `graph.ids`, unique over nodes and edges. The `cost` of an
     edge is its length in metres. The `metadata` of nodes are `class`, and `room` and `door` where
     there is one; those of edges `class` (door or free), `room`, `door` (the first that it passes),
     `doors`, `width_m`, `clearance_m`, `left_m` and `right_m`, and of lanes `lane` (right). Nothing
@@ -87,9 +87,10 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
 
 
 def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
+    ids = graph.ids[0].tolist()
     return [
         _feature(
-            {"id": node, "frame": frame, "metadata": node_metadata(graph, node)},
+            {"id": ids[node], "frame": frame, "metadata": node_metadata(graph, node)},
             {"type": "Point", "coordinates": point},
         )
         for node, point in enumerate(graph.points.tolist())
@@ -98,12 +99,13 @@ def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
 
 def _edges(graph: RouteGraph) -> list[dict[str, Any]]:
     points, lengths_m = graph.points.tolist(), graph.lengths_m.tolist()
+    ids, edge_ids = (each.tolist() for each in graph.ids)
     return [
         _feature(
             {
-                "id": graph.n_nodes + edge,
-                "startid": tail,
-                "endid": head,
+                "id": edge_ids[edge],
+                "startid": ids[tail],
+                "endid": ids[head],
                 "cost": lengths_m[edge],
                 "metadata": edge_metadata(graph, [edge]),
             },

@@ -1,0 +1,297 @@
+"""A route graph of lanes, as a person would draw it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+import numpy as np
+
+from hybridnav._base.copies import frozen
+from hybridnav._base.progress import no_progress
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.graphs.bends import Nodes
+from hybridnav.ext.graphs.build import missing_bends
+from hybridnav.ext.graphs.drawing import ChainGraph, Passage
+from hybridnav.ext.graphs.files.json_graphs import MOST_ID
+from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
+from hybridnav.ext.graphs.lanes import described
+from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
+from hybridnav.ext.graphs.strands import Layout, RoomAnchors, lines_of, strands_of
+from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
+from hybridnav.maps import CellClass
+from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.maps.clearance import clearance_cells
+from hybridnav.topology import TopologicalMap
+from hybridnav.topology.rooms.cutting import wall_directions
+
+if TYPE_CHECKING:
+    from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.topology.rooms import Rooms
+
+_SPECK = 0.125
+"""Side of the largest obstacle that lanes pass on one side only, in distances between lanes."""
+_LEAST_M = 0.3
+"""Clearance beyond the robot's radius below which free space gets no lane for its own sake, in
+metres: maps of laser scans end in many thin rays."""
+_SMALL, _SMALL_NARROW = 1.75, 2.5
+"""Length of the smallest rings of lanes, in distances between lanes; and where there is less room
+than is asked for."""
+_MERGED_M, _NEAR_M = 1.0, 0.7
+"""Length below which a chain, and a straight edge, becomes one node, in metres."""
+_STEP_M = 0.2
+_BEND_M = 1.0
+"""Where chains may bend, and what a bend costs, in metres."""
+_SNAP_M = 0.8
+"""How far nodes move to set edges along walls, in metres."""
+_CHORD, _DETOUR, _CHORD_RAD = 2.5, 1.15, math.radians(22)
+"""Chords: their length in distances between lanes, the detour that they save, and the angle to
+other edges, so that they make no fans."""
+_LONGEST = 1.25
+"""Length of an edge above which it is divided, in distances between lanes: robots join graphs at
+nodes."""
+_SAME_M = 1.0
+"""Distance in metres within which a node is the same as one of a graph to keep."""
+_STANDS = 0.4
+"""Distance within which a node before stands for a new one, in distances between lanes."""
+_STEPS = 5
+
+
+def build_lane_graph(
+    topology: TopologicalMap,
+    *,
+    spacing_m: float = 4.0,
+    margin_m: float = 0.25,
+    keep: RouteGraph | WaypointGraph | None = None,
+    progress: Progress = no_progress,
+) -> RouteGraph:
+    """Build a route graph of lanes: few nodes in the middle of free space, and straight edges.
+
+    One lane runs in the middle of each corridor and aisle; wide halls have a net of lanes. Nodes
+    lie at crossings, doors, rooms and ends of lanes, and where lanes bend. Edges run along the
+    main directions of walls where there is room for it. Each is tested exactly, as in
+    `build_route_graph`. Nodes are connected exactly where free space connects them.
+
+    Parameters
+    ----------
+    topology
+        The map; with rooms, nodes lie in rooms and doors too, and edges name them.
+    spacing_m
+        Distance between the lanes of a hall in metres. Edges are about 1.25 times as long at most,
+        and free space farther than 0.9 times from lanes gets one of its own.
+    margin_m
+        Clearance beyond the robot's radius that lanes keep where there is as much, in metres.
+    keep
+        A graph of the map as it was: its nodes and edges stay where the robot can still follow
+        them, with their ids, and only what they lack is added. A node that is moved by 1 m at most
+        keeps its id too. No id of that graph goes to anything else.
+    progress
+        Called with the number of steps done and of all steps.
+
+    Returns
+    -------
+    RouteGraph
+        Parts of free space below 1 m² have no nodes, nor has free space outside the building.
+
+    Raises
+    ------
+    InvalidValueError
+        When an argument is out of range, the map allows corner cutting, or no part of it is as
+        large as 1 m².
+
+    Notes
+    -----
+    Cells are thinned to lines in the order of their clearance (C. Pudney, 1998); the pillars that
+    make lines a net, and all steps from lines to edges, are ours.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import build_lane_graph
+    >>> cells = np.ones((24, 120))
+    >>> cells[2:-2, 2:-2] = 0.0
+    >>> grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+    >>> graph = build_lane_graph(topology)
+    >>> bool((abs(graph.points[:, 1] - 1.2) <= 0.1).all())  # in the middle of a corridor
+    True
+    """
+    checked_type("topology", topology, TopologicalMap)
+    checked_between("spacing_m", spacing_m, 0.5, 100)
+    checked_between("margin_m", margin_m, 0, 100)
+    grid, cell_m = topology.grid, topology.grid.resolution_m
+    space = FreeSpace.of(grid)
+    is_kept = np.append(space.kept(topology.pyramid.rooms), np.False_)
+    part_of = np.where(is_kept[space.component_of], space.component_of, np.int32(-1))
+    if not (part_of >= 0).any():
+        raise InvalidValueError(
+            f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
+            f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
+        )
+    progress(1, _STEPS)
+    directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
+    layout = Layout(
+        apart=spacing_m / cell_m,
+        speck=(_SPECK * spacing_m + 2 * grid.robot_radius_m) / cell_m,
+        least=_LEAST_M / cell_m,
+        angle_rad=directions[0][0] if directions else 0.0,
+    )
+    drawing = _drawn(topology, space, part_of, layout, margin_m / cell_m)
+    progress(2, _STEPS)
+    drawing.prune(_SMALL * layout.apart, _SMALL_NARROW * layout.apart)
+    drawing.merge(_MERGED_M / cell_m)
+    sketch = drawing.straightened(max(1, round(_STEP_M / cell_m)), _BEND_M / cell_m)
+    progress(3, _STEPS)
+    sketch.repair()
+    for _ in range(2):
+        sketch.simplify(_NEAR_M / cell_m, 2 * layout.apart)
+        sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
+    sketch.add_chords(_CHORD * layout.apart, _DETOUR, _CHORD_RAD)
+    sketch.split(_LONGEST * layout.apart)
+    _connect(sketch, space)
+    known = None if keep is None else grid.frame.positions_of(keep.points)
+    if keep is not None and known is not None:
+        same = _same(sketch, known, cell_m)
+        sketch.keep(settled(known), keep.edges, same, _STANDS * layout.apart)
+        _connect(sketch, space)
+    sketch.make_plane()
+    progress(4, _STEPS)
+    graph = _described(topology, space, sketch)
+    progress(_STEPS, _STEPS)
+    if keep is None or known is None:
+        return graph
+    return _renamed(graph, keep, _same(sketch, known, cell_m))
+
+
+def _drawn(
+    topology: TopologicalMap, space: FreeSpace, part_of: IntArray, layout: Layout, margin: float
+) -> ChainGraph:
+    """Return the lines of lanes, with a node in each room and door that they pass."""
+    parts = np.pad(part_of, 1, constant_values=-1)
+    clearance = clearance_cells(parts < 0)
+    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    label_of = np.full_like(part_of, -1) if rooms is None else rooms.labels.label_of
+    cells = np.empty((0, 2), np.int64) if rooms is None else _room_cells(rooms, space, part_of)
+    known = RoomAnchors(np.pad(label_of, 1, constant_values=-1), cells + 1)
+    padded = lines_of(parts, clearance, known, layout)
+    lines, ends = (np.ascontiguousarray(each[1:-1, 1:-1]) for each in padded)
+    kinds = np.where(ends, END, NOTHING)
+    if rooms is not None:
+        passed = np.argwhere(lines & (part_of >= 0))
+        _mark_doors(kinds, passed, rooms)
+        _mark_rooms(kinds, passed[kinds[tuple(passed.T)] < DOOR], label_of, cells)
+    at, strands = strands_of(lines, kinds != NOTHING)
+    passage = Passage(space, clearance[1:-1, 1:-1], margin)
+    middles = np.asarray(_freed(at, part_of) + 0.5, dtype=np.float64)
+    return ChainGraph(middles, kinds[tuple(at.T)], strands, passage)
+
+
+def _room_cells(rooms: Rooms, space: FreeSpace, part_of: IntArray) -> LongArray:
+    """Return a cell of each room that the robot fits into, int64 (k, 2)."""
+    named = [name for name, fits in zip(rooms.names, rooms.fits.tolist(), strict=True) if fits]
+    found = [checked_position(space, rooms.point_of(name)) for name in named]
+    cells = np.array([np.floor(at) for at in found if at is not None], dtype=np.int64)
+    cells = cells.reshape(-1, 2)
+    return cells[part_of[tuple(cells.T)] >= 0]
+
+
+def _mark_rooms(kinds: LongArray, passed: LongArray, label_of: IntArray, points: LongArray) -> None:
+    """Make a node of the passed cell of each room that is nearest to its point."""
+    label = label_of[tuple(passed.T)]
+    for point in points:
+        cells = passed[label == label_of[tuple(point)]]
+        if len(cells):
+            away = ((cells - point) ** 2).sum(axis=1)
+            kinds[tuple(cells[int(away.argmin())])] = ROOM
+
+
+def _mark_doors(kinds: LongArray, passed: LongArray, rooms: Rooms) -> None:
+    """Make a node of the passed cell of each door that is nearest to its middle."""
+    middles, frame = rooms.level.boundary_middles, rooms.grid.frame
+    flat = passed @ np.array([kinds.shape[1], 1])
+    for door in rooms.listed_doors:
+        cells = passed[np.isin(flat, rooms.cells_beside(door.number))]
+        for arc in door.arcs if len(cells) else ():
+            middle = frame.position_of(*middles[arc.index])
+            away = ((cells + 0.5 - middle) ** 2).sum(axis=1)
+            kinds[tuple(cells[int(away.argmin())])] = DOOR - 1 + door.number
+
+
+def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
+    """Return cells, and instead of those in specks the nearest free ones."""
+    from scipy import ndimage  # noqa: PLC0415 - on demand
+
+    is_blocked = part_of[tuple(cells.T)] < 0
+    if is_blocked.any():
+        nearest = ndimage.distance_transform_edt(
+            part_of < 0, return_distances=False, return_indices=True
+        )
+        cells = cells.copy()
+        cells[is_blocked] = nearest[:, *cells[is_blocked].T].T
+    return cells
+
+
+def _connect(sketch: Sketch, space: FreeSpace) -> None:
+    """Join parts of the graph that free space connects."""
+    sketch.unify()  # else parts that meet at one place are joined in vain
+    nodes = Nodes(space, len(sketch.positions), sketch.positions)
+    edges = [*map(tuple, sketch.edges.tolist())]
+    while missing := missing_bends(nodes, np.array(edges, dtype=np.int64).reshape(-1, 2)):
+        for path in missing:
+            tail, head = nodes.indices_of(path[[0, -1]])
+            edges += sketch.add_path(tail, head, path[1:-1])
+        nodes.positions = sketch.positions
+    sketch.set_edges(edges)
+
+
+def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
+    """Return which node of a graph before each node is, int64 (n,), -1 for none."""
+    from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
+
+    to_known = np.asarray(KDTree(known).query(sketch.positions)[1], dtype=np.int64)
+    to_own = np.asarray(KDTree(sketch.positions).query(known)[1], dtype=np.int64)
+    steps = known[to_known] - sketch.positions
+    is_same = to_own[to_known] == np.arange(len(to_known))
+    is_same &= np.hypot(steps[:, 0], steps[:, 1]) * cell_m <= _SAME_M
+    return np.where(is_same, to_known, -1)
+
+
+def _described(topology: TopologicalMap, space: FreeSpace, sketch: Sketch) -> RouteGraph:
+    """Return the route graph of a sketch."""
+    degree = np.bincount(sketch.edges.ravel(), minlength=len(sketch.kinds))
+    by_degree = np.array(["end", "end", "bend", "crossing"])[np.minimum(degree, 3)].tolist()
+    kinds = [
+        "door" if kind >= DOOR else "room" if kind == ROOM else known
+        for kind, known in zip(sketch.kinds.tolist(), by_degree, strict=True)
+    ]
+    doors = np.maximum(sketch.kinds - (DOOR - 1), 0).tolist()
+    nodes = Nodes(space, len(kinds), sketch.positions, kinds, doors)
+    return described(topology, nodes, np.concatenate([sketch.edges, sketch.edges[:, ::-1]]))
+
+
+def _renamed(graph: RouteGraph, keep: RouteGraph | WaypointGraph, same: LongArray) -> RouteGraph:
+    """Return a graph with the ids of nodes and edges that are the same as before; all others get
+    ids that nothing had."""
+    if isinstance(keep, RouteGraph):
+        nodes, edges = (each.tolist() for each in keep.ids)
+    else:
+        nodes, edges = list(keep.names), list(keep.edge_names)
+    id_of = dict(zip(map(tuple, keep.edges.tolist()), edges, strict=True))
+    wanted = [nodes[node] if node >= 0 else None for node in same.tolist()]
+    wanted += [id_of.get((tail, head)) for tail, head in same[graph.edges].tolist()]
+    following = 1 + max((name for name in (*nodes, *edges) if _is_id(name)), default=-1)
+    found: list[int] = []
+    used: set[int] = set()
+    for name in wanted:
+        number = name if _is_id(name) and name not in used else following
+        following += number == following
+        found.append(number)
+        used.add(number)
+    ids = np.array(found, dtype=np.int64)
+    return replace(graph, ids=(frozen(ids[: graph.n_nodes]), frozen(ids[graph.n_nodes :])))
+
+
+def _is_id(name: Any) -> TypeGuard[int]:
+    """Return whether a name is an id that files for Nav2 hold."""
+    return isinstance(name, int) and 0 <= name <= MOST_ID

@@ -1,0 +1,264 @@
+"""Route graphs of lanes: plane, free, connected as free space is, in the middle, and steady."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from scipy import ndimage
+from scipy.spatial import KDTree
+
+import hybridnav as hn
+from hybridnav.ext.graphs import build_lane_graph
+from hybridnav.ext.graphs.kernels.thinning import spread, thinned
+from hybridnav.ext.graphs.waypoint_graph import components_of
+from hybridnav.harness.judges import segment_faults
+from tests.drawn_rooms import HOUSE, topology_of
+from tests.ext.graphs.test_route_graph import boxes, map_of, slanted
+from tests.nav2_reader import read_nav2
+from tests.nav2_walk import Costmap
+from tests.strategies import class_grids, examples, occupancy_grid
+
+OTHERS = ("aws_small_warehouse/005/map.yaml", "strands/g4s/g4s_y2.yaml", "nav2/maps/depot.yaml")
+
+
+def floor(cells, *, radius_m=0.2, side_m=0.1, **frame):
+    grid = hn.OccupancyGrid(
+        np.asarray(cells, dtype=np.float32), hn.Frame(side_m, **frame), robot_radius_m=radius_m
+    )
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+
+
+def hall(rows, cols):
+    cells = np.ones((rows + 2, cols + 2))
+    cells[1:-1, 1:-1] = 0.0
+    return cells
+
+
+def checked(topology, **options):
+    """Build a graph, and judge it by tests that the builder does not use; return it."""
+    graph = build_lane_graph(topology, **options)
+    grid, costmap = topology.grid, Costmap(topology.grid)
+    for tail, head in graph.edges.tolist():
+        ends = graph.points[[tail, head]]
+        assert segment_faults(grid, ends) == ()
+        assert not costmap.collides(*map(tuple, ends.tolist()))
+    # Two edges have a point in common only where they share a node.
+    ends = graph.points[graph.edges[graph.edges[:, 0] < graph.edges[:, 1]]]
+    lines = [shapely.LineString(pair) for pair in ends]
+    network = shapely.node(shapely.MultiLineString(lines))
+    assert len(getattr(network, "geoms", [network])) == len(lines) or not lines
+    # Parts of the graph are those of free space, of 1 m² or more.
+    free = grid.enterable(allow_unexplored=False)
+    labels, count = ndimage.label(free)
+    part_of = labels[tuple(grid.frame.cells_of(graph.points).T)]
+    large = np.flatnonzero(
+        np.bincount(labels.ravel(), minlength=count + 1) * grid.cell_area_m2 >= 1
+    )
+    parts = components_of(graph.n_nodes, graph.edges, "strong")
+    pairs = set(zip(part_of.tolist(), parts.tolist(), strict=True))
+    assert len(pairs) == len({part for part, _ in pairs}) == len({part for _, part in pairs})
+    assert {part for part, _ in pairs} <= set(large.tolist()) - {0}
+    return graph
+
+
+@given(class_grids(24))
+@settings(max_examples=examples(80), deadline=None)
+def test_any_map(classes):
+    if (classes == hn.CellClass.FREE).any():
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
+        checked(topology, spacing_m=2.0, margin_m=0.5)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_boxes_and_posts(seed):
+    checked(boxes(seed, radius_m=0.1 * (seed % 2)))
+
+
+def test_walls_aslant():
+    checked(slanted())
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_maps_of_others(data, name):
+    checked(map_of(data / name))
+
+
+def test_a_corridor_has_one_lane_in_its_middle_along_its_walls():
+    for yaw_rad in (0.0, 0.4):
+        graph = checked(floor(hall(20, 200), yaw_rad=yaw_rad))
+        turned = graph.positions
+        assert np.ptp(turned[:, 0]) <= 0.5
+        assert abs(turned[:, 0].mean() - 11) <= 0.6
+        assert np.ptp(turned[:, 1]) * 0.1 >= 20 - 2 * 3.6
+        assert graph.n_nodes <= 6
+
+
+def test_a_hall_has_a_net_of_lanes():
+    graph = checked(floor(hall(160, 200)), spacing_m=4.0)
+    lengths = graph.lengths_m
+    assert 2.5 <= np.median(lengths) <= 5.0
+    assert lengths.max() <= 1.25 * 4.0 * 1.3
+    away, _ = KDTree(graph.positions).query(np.argwhere(hall(160, 200) == 0) + 0.5)
+    assert np.max(away) * 0.1 <= 4.0
+    steps = np.abs(np.diff(graph.positions[graph.edges], axis=1)[:, 0])
+    assert (steps.min(axis=1) <= 0.05 * steps.max(axis=1)).mean() >= 0.7
+
+
+def test_rooms_and_doors_have_nodes_and_edges_have_names():
+    topology = topology_of(HOUSE)
+    graph = checked(topology)
+    doors = {door.number for door in topology.rooms.doors}
+    assert set(graph.doors.tolist()) - {0} == doors
+    assert {n for passed in graph.edge_doors for n in passed} == doors
+    rooms = {room for room, kind in zip(graph.rooms, graph.kinds, strict=True) if kind == "room"}
+    assert rooms == set(topology.rooms.names)
+
+
+def test_lanes_keep_their_margin_where_there_is_as_much():
+    # A post leaves 0.6 m on one side and 2 m on the other.
+    cells = hall(40, 160)
+    cells[11:19, 80:84] = 1.0
+    graph = checked(floor(cells, radius_m=0.2), margin_m=0.4)
+    assert graph.clearances_m.min() >= 0.6 - 0.1
+
+
+def test_a_small_post_has_a_lane_on_one_side_only():
+    cells = hall(40, 160)
+    cells[20:22, 80:82] = 1.0
+    graph = checked(floor(cells))
+    assert graph.n_edges == 2 * (graph.n_nodes - 1)
+    cells[16:28, 60:100] = 1.0
+    ring = checked(floor(cells))
+    assert ring.n_edges >= 2 * ring.n_nodes
+
+
+def changed(topology, seed):
+    """The map with boxes on a hundredth of its free cells."""
+    grid, rng = topology.grid, np.random.default_rng(seed)
+    cells = np.where(grid.measured == hn.CellClass.FREE, 0.0, 1.0)
+    free = np.argwhere(cells == 0)
+    for row, col in free[rng.integers(len(free), size=max(1, len(free) // 2500))].tolist():
+        cells[row : row + 5, col : col + 5] = 1.0
+    new = hn.OccupancyGrid(cells.astype(np.float32), grid.frame, robot_radius_m=grid.robot_radius_m)
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(new, merge_distance_m=2.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_changed_map_keeps_nodes_and_ids(seed):
+    topology = boxes(seed, radius_m=0.1)
+    before = build_lane_graph(topology, spacing_m=2.0)
+    after = checked(changed(topology, seed), spacing_m=2.0, keep=before)
+    at = dict(zip(before.ids[0].tolist(), before.points.tolist(), strict=True))
+    now = dict(zip(after.ids[0].tolist(), after.points.tolist(), strict=True))
+    assert len(now.keys() & at.keys()) >= 0.9 * before.n_nodes
+    assert all(np.hypot(*np.subtract(now[n], at[n])) <= 1.0 + 1e-6 for n in now.keys() & at.keys())
+    ends = [
+        dict(zip(one.ids[1].tolist(), one.ids[0][one.edges].tolist(), strict=True))
+        for one in (before, after)
+    ]
+    assert all(ends[0][n] == ends[1][n] for n in ends[0].keys() & ends[1].keys())
+    every = [*after.ids[0].tolist(), *after.ids[1].tolist()]
+    assert len(set(every)) == len(every)
+    # What is new has ids that nothing had.
+    old = {*before.ids[0].tolist(), *before.ids[1].tolist()}
+    assert not old & (ends[1].keys() - ends[0].keys())
+    assert not old & (now.keys() - at.keys())
+
+
+def test_an_unchanged_map_keeps_everything_through_a_file(tmp_path):
+    topology = topology_of(HOUSE)
+    graph = build_lane_graph(topology)
+    hn.ext.graphs.export_nav2(graph, tmp_path / "a.geojson")
+    known = hn.ext.graphs.load_graph(tmp_path / "a.geojson")
+    again = build_lane_graph(topology, keep=known)
+    hn.ext.graphs.export_nav2(again, tmp_path / "b.geojson")
+    assert (tmp_path / "a.geojson").read_bytes() == (tmp_path / "b.geojson").read_bytes()
+    own = build_lane_graph(topology, keep=graph)
+    assert np.array_equal(own.points, graph.points)
+
+
+def test_files_and_messages_have_the_ids_of_the_graph(tmp_path):
+    graph = build_lane_graph(topology_of(HOUSE))
+    ids = graph.ids[0] * 3 + 5, graph.ids[1] * 3 + 6
+    graph = replace(graph, ids=ids)
+    hn.ext.graphs.export_nav2(graph, tmp_path / "a.geojson")
+    read = read_nav2(tmp_path / "a.geojson")
+    assert list(read.points) == ids[0].tolist()
+    assert read.edges == dict(
+        zip(ids[1].tolist(), map(tuple, ids[0][graph.edges].tolist()), strict=True)
+    )
+    route = hn.ext.graphs.route_messages(graph, graph.edges[3].tolist())["route"]
+    assert [node["nodeid"] for node in route["nodes"]] == ids[0][graph.edges[3]].tolist()
+    assert [edge["edgeid"] for edge in route["edges"]] == [ids[1][3]]
+
+
+def test_arguments_out_of_range_are_refused():
+    topology = floor(hall(20, 40))
+    with pytest.raises(hn.errors.InvalidValueError, match="spacing_m"):
+        build_lane_graph(topology, spacing_m=0.1)
+    for value in (-1, np.nan):
+        with pytest.raises(hn.errors.InvalidValueError, match="margin_m"):
+            build_lane_graph(topology, margin_m=value)
+    with pytest.raises(hn.errors.InvalidValueError, match="no free part"):
+        build_lane_graph(floor(np.ones((20, 40))))
+
+
+@given(class_grids(16))
+@settings(max_examples=examples(80))
+def test_thinned_cells_are_as_connected_as_before_and_thin(classes):
+    inside = np.pad(classes == hn.CellClass.FREE, 1)
+    clearance = ndimage.distance_transform_edt(inside)
+    order = np.flatnonzero(inside)
+    order = order[np.argsort(clearance.ravel()[order], kind="stable")]
+    lines = inside.copy()
+    thinned(lines, clearance, order, np.zeros_like(inside))
+    assert not (lines & ~inside).any()
+    around = np.ones((3, 3))
+    for cells, kind in ((lines, None), (~lines, around)):
+        before = inside if kind is None else ~inside
+        labels, count = ndimage.label(cells, structure=kind)
+        _, known = ndimage.label(before, structure=kind)
+        assert count == known
+        if kind is None:
+            whole, _ = ndimage.label(before)
+            assert (
+                len(set(zip(whole[lines].tolist(), labels[lines].tolist(), strict=True))) == count
+            )
+    block = np.zeros_like(lines[2:, 2:], dtype=int)
+    block += sum(lines[i : i + lines.shape[0] - 2, j : j + lines.shape[1] - 2].astype(int)
+                for i in range(3) for j in range(3))  # fmt: skip
+    assert block.max(initial=0) < 9
+
+
+@given(class_grids(16))
+@settings(max_examples=examples(60))
+def test_steps_spread_to_what_is_connected_and_about_as_far(classes):
+    free = np.pad(classes == hn.CellClass.FREE, 1)
+    if not free.any():
+        return
+    source = int(np.flatnonzero(free)[0])
+    steps = spread(free, np.array([source]))
+    labels, _ = ndimage.label(free)
+    assert np.array_equal(steps >= 0, labels == labels.flat[source])
+    for row, col in np.argwhere(steps > 0).tolist():
+        near = steps[row - 1 : row + 2, col - 1 : col + 2]
+        assert near[near >= 0].min() < steps[row, col]
+    row, col = divmod(source, free.shape[1])
+    away = np.hypot(*(np.argwhere(steps >= 0) - (row, col)).T)
+    assert (steps[steps >= 0] >= away / 2**0.5 - 1e-9).all()
+
+
+def test_pairs_of_corners_are_not_needed():
+    """A square ring has four corners and no fan: each node has two neighbours."""
+    cells = hall(80, 80)
+    cells[21:61, 21:61] = 1.0
+    graph = checked(floor(cells))
+    assert (np.bincount(graph.edges[:, 0]) == 2).all()
+    corners = graph.points[[kind == "bend" for kind in graph.kinds]]
+    hull = shapely.convex_hull(shapely.multipoints(graph.points))
+    assert shapely.area(hull) == pytest.approx(
+        shapely.area(shapely.oriented_envelope(hull)), rel=0.05
+    )
+    assert len(corners) >= 4
