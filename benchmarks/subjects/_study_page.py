@@ -243,8 +243,8 @@ _FINDINGS = tuple(
     f"* {line}\n"
     for line in (
         (
-            "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile optimum "
-            "in the mean and {paper_any} % longer than the any-angle optimum; the octile optimum "
+            "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile "
+            "optimum in the mean and {paper_any} % longer than the any-angle optimum; the octile optimum "
             "itself is {grid_any} % longer."
         ),
         (
