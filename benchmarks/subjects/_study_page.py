@@ -244,8 +244,8 @@ _FINDINGS = tuple(
     for line in (
         (
             "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile "
-            "optimum in the mean and {paper_any} % longer than the any-angle optimum; the octile optimum "
-            "itself is {grid_any} % longer."
+            "optimum in the mean and {paper_any} % longer than the any-angle optimum; the octile "
+            "optimum itself is {grid_any} % longer."
         ),
         (
             "Speed-up over A\\*, median of the ratios, and ratio of the mean times: `octile` "
