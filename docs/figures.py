@@ -11,6 +11,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.ext.fleet import plot_building
+from hybridnav.ext.graphs import build_lane_graph, plot_route_graph
 from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_costs,
@@ -110,6 +111,14 @@ def draw_building(file: Path) -> None:
     save_figure(plot_building(building, building.plan("office 5", "2.04"))[0], file, dpi=130)
 
 
+def draw_lanes(file: Path) -> None:
+    """Draw the route graph of lanes of the office."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    pyramid = hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))
+    graph = build_lane_graph(hn.TopologicalMap(pyramid))
+    save_figure(plot_route_graph(graph).figure, file, dpi=150)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -126,6 +135,7 @@ if __name__ == "__main__":
         (draw_search, "mesh-search.png"),
         (draw_robot, "office-robot.png"),
         (draw_building, "building.png"),
+        (draw_lanes, "office-lanes.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)
