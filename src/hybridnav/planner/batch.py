@@ -57,7 +57,8 @@ class PlanBatch:
 
     def __reduce__(self) -> tuple[type[PlanBatch], tuple[Any, ...]]:
         """Copy the bounds themselves, so that copies hold no map."""
-        values = vars(self) | {"bound_source": self.lower_bound}
+        source = self.lower_bound if callable(self.bound_source) else self.bound_source
+        values = vars(self) | {"bound_source": source}
         return PlanBatch, tuple(values[field.name] for field in fields(self))
 
     @cached_property

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.kernels.edges import least_along
 from hybridnav.ext.graphs.sketch import DOOR, NOTHING, ROOM, Sketch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.ext.graphs.judge import FreeSpace
+    from hybridnav.ext.graphs.segments import Passage
     from hybridnav.ext.graphs.strands import Strand
 
 _COARSE = 8
@@ -27,30 +26,6 @@ _SWAY = 0.3
 _LEAST_SWAY = 1.5
 _REACH = 100
 """Most points of a chain that one edge passes."""
-
-
-class Passage:
-    """How much room positions and straight edges have."""
-
-    def __init__(self, space: FreeSpace, clearance: FloatArray, comfort: float) -> None:
-        self.space, self.comfort = space, comfort
-        """Free space; the clearance that is asked for, in cells."""
-        self._clearance = np.ascontiguousarray(clearance)
-
-    def at(self, positions: FloatArray) -> FloatArray:
-        """Return the clearance of positions in cells, float64 (n,)."""
-        found: FloatArray = self._clearance[tuple(positions.astype(np.int64).T)]
-        return found
-
-    def least(self, tails: FloatArray, heads: FloatArray) -> FloatArray:
-        """Return the least clearance of segments in cells, float64 (n,), -1 for those that the
-        robot cannot follow."""
-        found = np.full(len(tails), -1.0)
-        fits = self.space.joins(tails, heads)
-        ends = np.concatenate([tails[fits], heads[fits]])
-        pairs = np.ascontiguousarray(np.arange(len(ends)).reshape(2, -1).T)
-        found[fits] = least_along(self.space.free, self._clearance, ends, pairs)[0]
-        return found
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,11 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.drawing import ChainGraph, Passage
+from hybridnav.ext.graphs.drawing import ChainGraph
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
+from hybridnav.ext.graphs.segments import Passage
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
 from hybridnav.ext.graphs.strands import Layout, RoomAnchors, lines_of, strands_of
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph

@@ -1,4 +1,5 @@
-"""Straight edges in the plane: ways over them, angles between them, and where they cross."""
+"""Straight edges in the plane: how much room they have, ways over them, angles between them, and
+where they cross."""
 
 from __future__ import annotations
 
@@ -8,10 +9,42 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import cos
+from hybridnav._base.trig import cos, sin
+from hybridnav.ext.graphs.kernels.edges import least_along
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.ext.graphs.judge import FreeSpace
+
+
+def turn_of(angle_rad: float) -> FloatArray:
+    """Return the matrix, float64 (2, 2), that turns a main direction into that of rows."""
+    along, across = cos(angle_rad), sin(angle_rad)
+    return np.array([[along, across], [-across, along]])
+
+
+class Passage:
+    """How much room positions and straight edges have."""
+
+    def __init__(self, space: FreeSpace, clearance: FloatArray, comfort: float) -> None:
+        self.space, self.comfort = space, comfort
+        """Free space; the clearance that is asked for, in cells."""
+        self._clearance = np.ascontiguousarray(clearance)
+
+    def at(self, positions: FloatArray) -> FloatArray:
+        """Return the clearance of positions in cells, float64 (n,)."""
+        found: FloatArray = self._clearance[tuple(positions.astype(np.int64).T)]
+        return found
+
+    def least(self, tails: FloatArray, heads: FloatArray) -> FloatArray:
+        """Return the least clearance of segments in cells, float64 (n,), -1 for those that the
+        robot cannot follow."""
+        found = np.full(len(tails), -1.0)
+        fits = self.space.joins(tails, heads)
+        ends = np.concatenate([tails[fits], heads[fits]])
+        pairs = np.ascontiguousarray(np.arange(len(ends)).reshape(2, -1).T)
+        found[fits] = least_along(self.space.free, self._clearance, ends, pairs)[0]
+        return found
 
 
 def length_between(beside: list[dict[int, float]], start: int, goal: int, limit: float) -> float:

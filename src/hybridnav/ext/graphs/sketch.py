@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import cos, sin
-from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, length_between
+from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, length_between, turn_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.drawing import Passage
+    from hybridnav.ext.graphs.segments import Passage
 
 NOTHING, END, ROOM, DOOR = -1, 0, 1, 2
 """What a node is for: its edges only, the end of a lane, a room, a door; door n is
@@ -36,12 +35,6 @@ _TOUCHING = 1e-6
 _MOST_BESIDE = 5
 """Edges of a node from which on it gets no chord: people draw crossings, no stars."""
 _ROUNDS = 50
-
-
-def turn_of(angle_rad: float) -> FloatArray:
-    """Return the matrix, float64 (2, 2), that turns a main direction into that of rows."""
-    along, across = cos(angle_rad), sin(angle_rad)
-    return np.array([[along, across], [-across, along]])
 
 
 def settled(positions: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.ext.graphs.kernels.thinning import spread, thinned
-from hybridnav.ext.graphs.sketch import turn_of
+from hybridnav.ext.graphs.segments import turn_of
 from hybridnav.maps.clearance import clearance_cells
 
 if TYPE_CHECKING:
