@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_520,
+    "code": 55_530,
     "lines": 92_270,
     "files": 395,
-    "code outside ext": 37_580,
+    "code outside ext": 37_590,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,

@@ -28,6 +28,7 @@ def check(field: Field, line: Any) -> Any:
     assert field.faults(found) == ()
     assert field.cost(found) <= field.cost(line) * (1 + SLACK)
     assert settled(field, line).tobytes() == found.tobytes()
+    assert (np.diff(found, axis=0) != 0).any(axis=1).all()  # no point stands there twice
     return found
 
 
@@ -87,6 +88,15 @@ def test_lines_that_graze_obstacles_where_all_costs_are_alike(field: Field, seed
         line = line[np.append(True, (np.diff(line, axis=0) != 0).any(axis=1))]
         if plain.faults(line) == ():
             check(plain, line)
+
+
+def test_the_rest_of_a_line_whose_point_stands_there_twice() -> None:
+    field = Field(np.ones((4, 9), np.bool_), np.ones((4, 9), np.float32))
+    line = CostLine(field.grid, layer_of(field.factors))
+    points = np.array([[0.5, 0.5], [3.5, 2.5], [3.5, 2.5], [8.5, 0.5]])
+    rest = line.rest_of(points, np.array([1.0, 0.5]), 100.0)
+    assert rest is not None
+    assert rest[[0, -1]].tolist() == [[1.0, 0.5], [8.5, 0.5]]
 
 
 def test_a_line_round_the_end_of_a_thin_wall_is_pulled_towards_it() -> None:

@@ -152,7 +152,7 @@ def costs_of(factors, line):
 @njit(cache=True, nogil=True)
 def polish(free, factors, line):
     """Move the points of a line, one at a time, to where it costs less, by compass search: what a
-    chain that was held by an obstacle leaves undone.
+    chain that was held by an obstacle leaves undone. Return the line, no two points in a row equal.
 
     Parameters
     ----------
@@ -165,6 +165,7 @@ def polish(free, factors, line):
     reach = np.full(n, _FIRST_REACH)
     costs = costs_of(factors, line)
     is_still = np.zeros(n, np.bool_)
+    # Sweeps over the points that may still move.
     for sweep in range(_SWEEPS):
         first_way = 4 * (sweep % 2)
         for i in range(1, n - 1):
@@ -190,6 +191,7 @@ def polish(free, factors, line):
                 )
                 if now < least:
                     least, first_least, to_row, to_col = now, first, new_row, new_col
+            # It moves there, and its neighbours may move again; else it looks nearer by.
             if to_row != row or to_col != col:
                 line[i, 0], line[i, 1] = to_row, to_col
                 costs[i], costs[i + 1] = first_least, least - first_least
@@ -199,3 +201,10 @@ def polish(free, factors, line):
                 is_still[i] = reach[i] < _LAST_REACH
         if is_still[1 : n - 1].all():
             break
+    # Points that have met are one.
+    size = 1
+    for i in range(1, n):
+        if line[i, 0] != line[size - 1, 0] or line[i, 1] != line[size - 1, 1]:
+            line[size] = line[i]
+            size += 1
+    return line[:size].copy()

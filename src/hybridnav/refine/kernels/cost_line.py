@@ -335,7 +335,7 @@ def settle(free, factors, path):
     # Costs that jump from cell to cell are not always those between the centres of cells.
     if now <= least * (1 + _WORSE):
         best, least = line, now
-    polish(free, factors, best)
+    best = polish(free, factors, best)
     least = cost_of(factors, best)
     if least > whole:
         return path.copy(), whole, whole
@@ -366,7 +366,8 @@ def rest_of(free, factors, line, start, most):
     for k in range(1, line.shape[0]):
         down, across = line[k, 0] - line[k - 1, 0], line[k, 1] - line[k - 1, 1]
         to_row, to_col = row - line[k - 1, 0], col - line[k - 1, 1]
-        share = (to_row * down + to_col * across) / (down * down + across * across)
+        squared = down * down + across * across
+        share = 0.0 if squared == 0.0 else (to_row * down + to_col * across) / squared
         share = min(max(share, 0.0), 1.0)
         apart = math.hypot(to_row - share * down, to_col - share * across)
         if apart < nearest:
