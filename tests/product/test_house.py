@@ -6,7 +6,7 @@ from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
     "code": 55_530,
-    "lines": 92_270,
+    "lines": 92_280,
     "files": 395,
     "code outside ext": 37_590,
     "lines of a file, median": 300,

@@ -162,6 +162,7 @@ def polish(free, factors, line):
         float64 (n, 2), changed.
     """
     n, rows, cols = line.shape[0], free.shape[0] + 0.0, free.shape[1] + 0.0
+    # How far away each point is tried, what the segment before it costs, and whether it is done.
     reach = np.full(n, _FIRST_REACH)
     costs = costs_of(factors, line)
     is_still = np.zeros(n, np.bool_)
