@@ -12,8 +12,8 @@ maps 0. Pairs are drawn from the largest connected part. Columns:
     gap         mean and 95 % quantile of `gap`, %
     steady      part of the plans from points along a path, to its goal, that stay within a cell of
                 its rest, and the farthest that one leaves it, in cells
-    moved       the same for starts moved by 5 cm; of paths that leave the old one by more than a
-                cell, what the old one costs more from there (`keep`), the mean in %
+    moved       the same for starts moved by 5 cm, which count for nothing; of paths that leave the
+                old one by more than a cell, what that costs more from there (`keep`), mean in %
     duplicates  queries that got another path when they were asked again, in reverse order
 """
 
@@ -81,8 +81,8 @@ def moved(
     cell_m = planner.grid.resolution_m
     lines = (again.path.points, result.path.points)
     new, old = (shapely.segmentize(shapely.LineString(line), cell_m) for line in lines)
-    apart = float(shapely.hausdorff_distance(old, new)) / cell_m
-    return [apart], [kept.cost / again.cost - 1] if apart > 1 + MOVED_M / cell_m else []
+    apart = (float(shapely.hausdorff_distance(old, new)) - MOVED_M) / cell_m
+    return [apart], [kept.cost / again.cost - 1] if apart > 1 else []
 
 
 def measured(grid: hn.OccupancyGrid, pairs: FloatArray, n_steady: int) -> dict[str, Any]:
