@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.ext.graphs.kernels.edges import routes
 
 if TYPE_CHECKING:
@@ -259,9 +260,6 @@ def shortest_routes(
 
 # A waypoint graph on a map: where its nodes lie, and which edges a robot can follow.
 
-_FRACTION = 2.0**24
-"""Parts of a cell to which positions are rounded, as exact tests of segments need it."""
-
 
 @dataclass(frozen=True, eq=False)
 class PlacedGraph:
@@ -381,5 +379,5 @@ def placed_points(
 
 def _rounded(grid: OccupancyGrid, points: FloatArray) -> FloatArray:
     """Return points as positions in grid units that exact tests of segments can use."""
-    rounded: FloatArray = np.round(grid.frame.positions_of(points) * _FRACTION) / _FRACTION
+    rounded: FloatArray = np.round(grid.frame.positions_of(points) * GRAIN) / GRAIN
     return rounded

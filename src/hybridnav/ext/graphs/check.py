@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.ext.graphs.attach import PlacedGraph
 from hybridnav.ext.graphs.findings import MOST_EXAMPLES, Findings
 from hybridnav.ext.graphs.gather import shown
@@ -233,7 +234,7 @@ def _blocked_at(placed: PlacedGraph, space: FreeSpace, which: LongArray) -> list
     ends = np.clip(heads, 0.0, space.free.shape)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        to = np.round((tails + middle[:, None] * (ends - tails)) * 2.0**24) / 2.0**24
+        to = np.round((tails + middle[:, None] * (ends - tails)) * GRAIN) / GRAIN
         seen = np.zeros(len(which), dtype=np.bool_)
         seen[begins] = _sees(space, tails[begins], to[begins])
         low, high = np.where(seen, middle, low), np.where(seen, high, middle)

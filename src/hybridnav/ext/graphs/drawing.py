@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import heapq
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.ext.graphs.segments import length_between
 from hybridnav.ext.graphs.sketch import DOOR, NOTHING, ROOM, Sketch
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.ext.graphs.segments import Passage
     from hybridnav.ext.graphs.strands import Strand
@@ -109,19 +111,13 @@ class ChainGraph:
     def _detour(self, skip: int, limit: float) -> float:
         """Return the length of the way between the ends of a line without it, up to a limit."""
         line = self._lines[skip]
-        costs = {line.tail: 0.0}
-        heap = [(0.0, line.tail)]
-        while heap:
-            cost, here = heapq.heappop(heap)
-            if here == line.head:
-                return cost
-            for key in sorted(self._at[here] - {skip}) if cost <= costs[here] else ():
+
+        def ways(here: int) -> Iterator[tuple[int, float]]:
+            for key in sorted(self._at[here] - {skip}):
                 other = self._lines[key]
-                there, through = other.tail + other.head - here, cost + other.length
-                if through <= limit and through < costs.get(there, math.inf):
-                    costs[there] = through
-                    heapq.heappush(heap, (through, there))
-        return math.inf
+                yield other.tail + other.head - here, other.length
+
+        return length_between(ways, line.tail, line.head, limit)
 
     def _join(self) -> None:
         """Drop lines that end at nothing, and nodes in the middle of lines."""

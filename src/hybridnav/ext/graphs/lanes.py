@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace
@@ -115,7 +116,6 @@ class DoorsPassed:
 _SHORTEST = 4.0
 """Least length of an edge with lanes, in distances of a lane from the edge: one to enter, one to
 leave, and two side by side."""
-_FRACTION = 2.0**24
 _LEAST_CELLS = 2.0**-10
 """Least distance of nodes of lanes from the sides of their cell."""
 
@@ -204,7 +204,7 @@ def _lane(positions: FloatArray, edges: LongArray, off: float) -> tuple[FloatArr
     # Rows run upwards: the right of (down, across) is (-across, down).
     right = np.stack([-along[:, 1], along[:, 0]], axis=1)
     first, second = tails + off * (right + along), heads + off * (right - along)
-    return np.round(first * _FRACTION) / _FRACTION, np.round(second * _FRACTION) / _FRACTION
+    return np.round(first * GRAIN) / GRAIN, np.round(second * GRAIN) / GRAIN
 
 
 def _fits(

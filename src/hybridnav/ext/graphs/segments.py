@@ -13,6 +13,8 @@ from hybridnav._base.trig import cos, sin
 from hybridnav.ext.graphs.kernels.edges import least_along
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.graphs.judge import FreeSpace
 
@@ -47,15 +49,18 @@ class Passage:
         return found
 
 
-def length_between(beside: list[dict[int, float]], start: int, goal: int, limit: float) -> float:
-    """Return the length of the way between two nodes, infinite above a limit."""
+def length_between(
+    ways: Callable[[int], Iterable[tuple[int, float]]], start: int, goal: int, limit: float
+) -> float:
+    """Return the length of the way between two nodes, infinite above a limit; `ways` returns the
+    neighbours of a node, and how far they are."""
     costs = {start: 0.0}
     heap = [(0.0, start)]
     while heap:
         cost, here = heapq.heappop(heap)
         if here == goal:
             return cost
-        for there, length in beside[here].items() if cost <= costs[here] else ():
+        for there, length in ways(here) if cost <= costs[here] else ():
             through = cost + length
             if through <= limit and through < costs.get(there, math.inf):
                 costs[there] = through

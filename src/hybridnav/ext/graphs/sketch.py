@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.segments import crosses, crossing, is_beside, length_between, turn_of
+from hybridnav.ext.graphs.segments import (
+    crosses,
+    crossing,
+    is_beside,
+    length_between,
+    turn_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -229,6 +235,7 @@ class Sketch:
         steps = at[pairs[:, 1]] - at[pairs[:, 0]]
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         beside: list[dict[int, float]] = [{} for _ in at]
+        ways = [each.items() for each in beside]
         for one, other in self.edges.tolist():
             beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
         edges = self.edges.tolist()
@@ -236,7 +243,7 @@ class Sketch:
             (one, other), length = pairs[k].tolist(), float(lengths[k])
             if length <= 0 or max(len(beside[one]), len(beside[other])) >= _MOST_BESIDE:
                 continue
-            if length_between(beside, one, other, detour * length) < math.inf:
+            if length_between(ways.__getitem__, one, other, detour * length) < math.inf:
                 continue
             both = ((one, other), (other, one))
             if any(is_beside(at, a, b, list(beside[a]), least_rad) for a, b in both):
@@ -300,13 +307,14 @@ class Sketch:
         """Return the new edges without which some ways are twice as long, and that cross none."""
         at = self.positions
         beside: list[dict[int, float]] = [{} for _ in at]
+        ways = [each.items() for each in beside]
         known = edges.tolist()
         for one, other in known:
             beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
         added: list[list[int]] = []
         for one, other in new.tolist():
             length = math.dist(at[one], at[other])
-            if length_between(beside, one, other, 2 * length) < math.inf:
+            if length_between(ways.__getitem__, one, other, 2 * length) < math.inf:
                 continue
             ends = np.array([*known, *added], dtype=np.int64).reshape(-1, 2)
             if not crosses(at[one], at[other], at[ends[:, 0]], at[ends[:, 1]]).any():
@@ -370,10 +378,11 @@ class Sketch:
         for k in np.argsort(-np.hypot(*lengths.T), kind="stable").tolist():
             edges = np.delete(self.edges, which[k], axis=0).tolist()
             beside: list[dict[int, float]] = [{} for _ in self.positions]
+            ways = [each.items() for each in beside]
             for one, other in edges:
                 beside[one][other] = beside[other][one] = 1.0
             tail, head = self.edges[which[k]].tolist()
-            if length_between(beside, tail, head, math.inf) < math.inf:
+            if length_between(ways.__getitem__, tail, head, math.inf) < math.inf:
                 self.set_edges(edges)
                 return
         # Both are needed, and no straight edges lead there: paths do.

@@ -23,7 +23,6 @@ from hybridnav.search.lattice import LatticeSearch, build_lattice
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.planner.settings import CheapestSettings
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query
@@ -74,11 +73,6 @@ class OverLattice(Method):
         self._layer = CostLayer(np.ones(self._grid.shape, np.float32)) if costs is None else costs
         allowed = self._settings.allow_unexplored
         self._line = CostLine(self._grid, self._layer, allow_unexplored=allowed)
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        """The map."""
-        return self._grid
 
     def may_enter(self, query: Query) -> bool:
         """Return whether the cells of start and goal may be entered."""

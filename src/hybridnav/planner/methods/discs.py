@@ -73,17 +73,23 @@ class Discs:
     @cached_property
     def inscribed(self) -> Disc | None:
         """Finds paths of the inscribed disc; None if the map is that of the disc already."""
+        grid = self._inscribed_grid
+        return None if grid is self._grid else self._method(grid)
+
+    @cached_property
+    def _inscribed_grid(self) -> OccupancyGrid:
+        """The map of the inscribed disc, the given one if no more cells are blocked."""
         radius = self._footprint.inscribed_radius_m / self._grid.resolution_m - _ROUNDING_CELLS
         if radius < 0:
-            return None
+            return self._grid
         blocked = within_radius(self._obstacles, radius_cells=radius)
         blocked &= self._grid.classes != CellClass.OCCUPIED
-        return self._method(blocked) if blocked.any() else None
+        return self._blocking(blocked) if blocked.any() else self._grid
 
     @cached_property
     def circumscribed(self) -> Disc:
         """Finds paths of the circumscribed disc."""
-        return self._method(self._near(self._obstacles))
+        return self._method(self._blocking(self._near(self._obstacles)))
 
     def below(self, query: Query) -> Found | None:
         """Return a best path of the inscribed disc, or that it has none; None if its map is the one
@@ -126,16 +132,20 @@ class Discs:
             found = self._grown[closed] = ClosedCells(flat)
         return found
 
-    def _method(self, blocked: BoolArray) -> Disc:
-        """Return the method of the map with more blocked cells, prepared."""
+    def _blocking(self, blocked: BoolArray) -> OccupancyGrid:
+        """Return the map with more blocked cells."""
         values = {one.name: getattr(self._grid, one.name) for one in fields(self._grid)}
         values["classes"] = np.where(blocked, np.uint8(CellClass.OCCUPIED), self._grid.classes)
-        known, allowed = KnownMap(OccupancyGrid.restored(**values), None), self._allow_unexplored
+        return OccupancyGrid.restored(**values)
+
+    def _method(self, grid: OccupancyGrid) -> Disc:
+        """Return the method of a map, prepared."""
+        known, allowed = KnownMap(grid, None, self._costs), self._allow_unexplored
         if self._costs is None:
             method: Disc = OverMesh(known, ShortestSettings(allow_unexplored=allowed))
         else:
             settings = CheapestSettings(allow_unexplored=allowed)
-            method = OverLattice(known._replace(costs=self._costs), settings)
+            method = OverLattice(known, settings)
         method.prepare()
         return method
 
@@ -146,10 +156,12 @@ class Discs:
         return max(cost_along(self._grid, self._costs, path.points), path.length_m)
 
     def bound_m(self, query: Query, cost_m: float) -> float:
-        """Return a lower bound on the cost of all paths of the inscribed disc, at most the cost of
-        a path that is known."""
+        """Return a lower bound on the cost of all paths of the inscribed disc, at most `cost_m`."""
+        return self._finish.bound(query, cost_m)
+
+    @cached_property
+    def _finish(self) -> CostFinish:
+        """Finds bounds on the costs of paths of the inscribed disc."""
         assert self._costs is not None  # noqa: S101 - the plan is by costs
-        method = self.inscribed
-        grid = self._grid if method is None else method.grid
         settings = CheapestSettings(allow_unexplored=self._allow_unexplored)
-        return CostFinish(grid, self._costs, settings).bound(query, cost_m)
+        return CostFinish(self._inscribed_grid, self._costs, settings)

@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 NEAR_BOUND = 1.05
 """A path of the circumscribed disc that is at most this times the bound is the answer at once;
 OMPL, which may find a way through a narrow door, tries to beat a longer one in its time."""
-
-
 _DRIVEN = ("cheapest path of the inscribed disc: driven",)
 
 

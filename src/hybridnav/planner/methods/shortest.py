@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.planner.settings import ShortestSettings
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
@@ -84,11 +83,6 @@ class OverMesh(Method):
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
         self._building = threading.RLock()  # a progress callback may plan
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        """The map."""
-        return self._grid
 
     @property
     def prepared(self) -> MeshSearch | None:
