@@ -112,12 +112,12 @@ class ChainGraph:
         """Return the length of the way between the ends of a line without it, up to a limit."""
         line = self._lines[skip]
 
-        def ways(here: int) -> Iterator[tuple[int, float]]:
+        def edges_from(here: int) -> Iterator[tuple[int, float]]:
             for key in sorted(self._at[here] - {skip}):
                 other = self._lines[key]
                 yield other.tail + other.head - here, other.length
 
-        return length_between(ways, line.tail, line.head, limit)
+        return length_between(edges_from, line.tail, line.head, limit)
 
     def _join(self) -> None:
         """Drop lines that end at nothing, and nodes in the middle of lines."""

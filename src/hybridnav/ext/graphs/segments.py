@@ -50,17 +50,17 @@ class Passage:
 
 
 def length_between(
-    ways: Callable[[int], Iterable[tuple[int, float]]], start: int, goal: int, limit: float
+    neighbours: Callable[[int], Iterable[tuple[int, float]]], start: int, goal: int, limit: float
 ) -> float:
-    """Return the length of the way between two nodes, infinite above a limit; `ways` returns the
-    neighbours of a node, and how far they are."""
+    """Return the length of the way between two nodes, infinite above a limit; `neighbours`
+    returns the nodes next to a node, and how far they are."""
     costs = {start: 0.0}
     heap = [(0.0, start)]
     while heap:
         cost, here = heapq.heappop(heap)
         if here == goal:
             return cost
-        for there, length in ways(here) if cost <= costs[here] else ():
+        for there, length in neighbours(here) if cost <= costs[here] else ():
             through = cost + length
             if through <= limit and through < costs.get(there, math.inf):
                 costs[there] = through
