@@ -207,7 +207,8 @@ _AB = ["--start", "1.0,13.2", "--goal", "40.6,19.4"]
 _FAR = ["--start", "1:1.0,13.2", "--goal", "2:6,17.2"]
 FILES = {
     "nav2.geojson": ["export", *_OFFICE],
-    "nav2-nodes.geojson": ["export", *_OFFICE, "--nodes", "200"],
+    "nav2-roadmap.geojson": ["export", *_OFFICE, "--style", "roadmap"],
+    "nav2-nodes.geojson": ["export", *_OFFICE, "--style", "roadmap", "--nodes", "200"],
     "nav2-lanes.geojson": ["export", *_OFFICE, "--lanes", "0.6"],
     "nav2-polylines.geojson": ["export", *_OFFICE, "--polylines"],
     "rmf.building.yaml": ["export", *_OFFICE, "--format", "rmf"],
