@@ -231,9 +231,13 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
     assume(enterable.any())
     topology = map_of(grid, merge_distance_m=scene.merge_distance_m, seed=scene.seed)
     override = [f"planner.allow_unexplored={allow_unexplored}"]
-    near = [*override, "planner.corridor=neighbours"]
-    planner = hn.HybridPlanner(topology, preset=hn.load_preset("paper", overrides=override))
-    wider = hn.HybridPlanner(topology, preset=hn.load_preset("paper", overrides=near))
+    kinds = ("route", "joined", "neighbours")
+    planner, joined, wider = (
+        hn.HybridPlanner(
+            topology, preset=hn.load_preset("paper", overrides=[*override, f"planner.corridor={k}"])
+        )
+        for k in kinds
+    )
     component, graph = components(enterable), move_graph(enterable)
     rng = np.random.default_rng(seed)
     for _ in range(4):
@@ -246,21 +250,40 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
             assert not wider.plan(*endpoints).solved
             continue
         optimum = distances(graph, grid.shape, start)[goal] * grid.resolution_m
-        wide = wider.plan(*endpoints)
+        middle, wide = joined.plan(*endpoints), wider.plan(*endpoints)
         assert result.path is not None
+        assert middle.path is not None
         assert wide.path is not None
         assert result.route is not None
-        assert result.route == wide.route
+        assert result.route == middle.route == wide.route
         check_route(result.route, topology, enterable)
         on_route = np.isin(np.arange(topology.n_places), result.route.places)
         nearby = on_route.copy()
         nearby[topology.arcs[on_route[topology.arcs].any(axis=1)]] = True
         fields = topology.level.field_of
+        twice = on_route | joined_twice(topology, result.route, on_route)
         check_path(result.path, grid, enterable, on_route[fields] & (fields >= 0))
+        check_path(middle.path, grid, enterable, twice[fields] & (fields >= 0))
         check_path(wide.path, grid, enterable, nearby[fields] & (fields >= 0))
         assert result.stats.corridor_cells == (on_route[fields] & (fields >= 0)).sum()
         assert result.lower_bound - 1e-9 <= optimum <= wide.cost + 1e-9
-        assert wide.cost <= result.cost + 1e-9
+        assert wide.cost <= middle.cost + 1e-9
+        assert middle.cost <= result.cost + 1e-9
+
+
+def joined_twice(topology: hn.TopologicalMap, route: hn.Route, on_route: Any) -> Any:
+    """The places with two arcs to a route, or one to its first or last place."""
+    ends = {route.places[0], route.places[-1]}
+    found = np.zeros(topology.n_places, dtype=bool)
+    for place in range(topology.n_places):
+        ways = [
+            int(other)
+            for arc in topology.arcs.tolist()
+            for here, other in (arc, arc[::-1])
+            if here == place and on_route[other]
+        ]
+        found[place] = len(ways) > 1 or bool(ends & set(ways))
+    return found
 
 
 def check_route(route: hn.Route, topology: hn.TopologicalMap, enterable: Any) -> None:

@@ -54,7 +54,7 @@ def test_every_file_in_planners_is_a_preset_and_valid():
 def test_paper_is_the_papers_rule_and_the_default():
     paper = hn.load_preset("paper")
     assert paper.planner.method == "paper"
-    assert paper.planner.corridor == "route"
+    assert paper.planner.corridor == "joined"
     assert paper.planner.refine == "grid-astar"
     assert not paper.planner.allow_unexplored
     assert paper.pyramid.linkage == "throats"

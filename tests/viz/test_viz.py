@@ -292,7 +292,8 @@ def test_unexplored_places_are_drawn_where_they_are_asked_for():
 
 
 def test_places_of_the_corridor_stand_out(rooms):
-    result = _plan(rooms, START, (2.0, 1.0))
+    preset = hn.load_preset("paper", overrides=["planner.corridor=route"])
+    result = _plan(rooms, START, (2.0, 1.0), preset)
     ax = plot_plan(rooms, result)
     inside = set(result.route.places)
     assert 0 < len(inside) < rooms.n_places

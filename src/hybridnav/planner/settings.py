@@ -279,8 +279,7 @@ class GridSettings(_Refined):
 
 
 class PaperSettings(_Refined):
-    """Method `paper`: the places, by the max-distance attribute of their arcs, choose the route;
-    a search of cells refines inside it.
+    """Method `paper`: a route of places by max-distances, and a search of cells along it.
 
     Examples
     --------
@@ -290,8 +289,8 @@ class PaperSettings(_Refined):
     """
 
     method: Literal["paper"] = "paper"
-    corridor: Literal["route", "neighbours"] = "route"
-    """Fields in which the refiner searches: those of the route, or also their neighbours."""
+    corridor: Literal["route", "joined", "neighbours"] = "joined"
+    """Fields in which the refiner searches: see `hybridnav.route.corridor_of`."""
 
     needs_places: ClassVar[bool] = True
 
@@ -324,7 +323,8 @@ class OmplPlannerSettings(PlannerSettings):
         """The section of the method along whose paths OMPL goes."""
         allowed = self.allow_unexplored
         if self.along == "paper":
-            return PaperSettings(allow_unexplored=allowed, corridor=self.corridor)
+            wide = self.corridor if self.corridor == "neighbours" else "joined"
+            return PaperSettings(allow_unexplored=allowed, corridor=wide)
         return SECTIONS[self.along](allow_unexplored=allowed)
 
     def refusal_of_costs(self) -> str | None:

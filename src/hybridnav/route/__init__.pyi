@@ -1,9 +1,12 @@
-from .coarse import CoarseRoute as CoarseRoute, MaxDistanceSearch as MaxDistanceSearch
+from .coarse import (
+    CoarseRoute as CoarseRoute,
+    MaxDistanceSearch as MaxDistanceSearch,
+    corridor_of as corridor_of,
+)
 from .route import (
     Corridor as Corridor,
     Route as Route,
     RouteFinder as RouteFinder,
-    corridor_of as corridor_of,
 )
 from .door_graph import DoorGraph as DoorGraph, DoorRoute as DoorRoute, door_graph as door_graph
 

@@ -1,21 +1,25 @@
 """The coarse planner: Dijkstra's algorithm on the arcs of a graph, parallel arcs allowed, and the
-search of the topological map by it.
+search of the topological map by it; and the corridor along its route.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav.maps import CellClass
 from hybridnav.route.kernels import arcs as _kernels
+from hybridnav.route.route import Corridor
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.topology import TopologicalMap
+
+Beside = Literal["route", "joined", "neighbours"]
+"""Which places beside a route belong to its corridor; see `corridor_of`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +69,13 @@ class ArcSearch:
         self._arc = np.tile(used, 2)[order]
         self._arcs = arcs
         self._costs, self._ties = costs, ties
-        self._allowed = allowed
+        self.allowed: BoolArray = allowed
+        """bool (n_vertices,), the vertices that walks may pass."""
 
     @property
     def n_vertices(self) -> int:
         """Number of vertices, including those that may not be passed."""
-        return len(self._allowed)
+        return len(self.allowed)
 
     def search(self, start: int, goal: int) -> ArcWalk:
         """Find the cheapest walk between two vertices that may be passed."""
@@ -80,7 +85,7 @@ class ArcSearch:
             self._arc,
             self._costs,
             self._ties,
-            self._allowed,
+            self.allowed,
             start,
             goal,
         )
@@ -154,3 +159,57 @@ class MaxDistanceSearch:
         if found.vertices is None:
             return None
         return CoarseRoute(found.vertices, found.arcs, found.expanded)
+
+
+def corridor_of(
+    topology: TopologicalMap,
+    places: LongArray,
+    *,
+    beside: Beside = "route",
+    enterable: BoolArray | None = None,
+) -> Corridor:
+    """Return the receptive fields of the places of a route, and those of some places beside it.
+
+    Parameters
+    ----------
+    topology
+        The map of the route.
+    places
+        Dense indices of the route's places, in their order.
+    beside
+        `"route"`: none. `"joined"`: the places beside the first and the last one, and those that
+        two arcs join to the route, so that a path can leave it there and come back.
+        `"neighbours"`: all that an arc joins to it.
+    enterable
+        bool (n_places,), the places that may be entered; None for all.
+
+    Returns
+    -------
+    Corridor
+        The places, and the number of their cells.
+
+    Examples
+    --------
+    >>> from hybridnav.route import corridor_of
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> topology = hn.TopologicalMap(pyramid)
+    >>> corridor_of(topology, np.array([0, 1])).n_cells
+    10
+    >>> corridor_of(topology, np.array([0, 1]), beside="joined").n_cells
+    13
+    """
+    allowed = np.ones(topology.n_places, dtype=np.bool_) if enterable is None else enterable
+    inside = along(topology.arcs, places, beside, allowed)
+    return Corridor(topology.level.field_of, inside, int(topology.level.areas[inside].sum()))
+
+
+def along(
+    arcs: IntArray | LongArray, walk: LongArray, beside: Beside, allowed: BoolArray
+) -> BoolArray:
+    """Return the vertices of a walk and those beside it, bool (n_vertices,); see `corridor_of`."""
+    weight = np.zeros(len(allowed), dtype=np.int8)
+    weight[walk], weight[walk[[0, -1]]] = 1, 2
+    inside: BoolArray = weight > 0
+    if beside != "route":
+        inside |= allowed & _kernels.joined_to(arcs, weight, 2 if beside == "joined" else 1)
+    return inside

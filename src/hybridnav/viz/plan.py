@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.planner import COST_METRICS
-from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
@@ -153,11 +152,17 @@ def _checked_point(name: str, given: ArrayLike) -> FloatArray:
 
 def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
     """Return the mask of the places to draw in full colours."""
-    if result.route is None:
-        return np.zeros(topology.n_places, dtype=np.bool_)
-    on_route = np.flatnonzero(np.isin(topology.place_ids, result.route.places))
-    neighbours = result.settings.get("planner", {}).get("corridor") == "neighbours"
-    return corridor_of(topology, on_route, neighbours=neighbours).places
+    inside = np.zeros(topology.n_places, dtype=np.bool_)
+    passed = () if result.route is None else result.route.places
+    index = {place: at for at, place in enumerate(topology.place_ids.tolist())}
+    on_route = np.array([index[place] for place in passed], dtype=np.int64)
+    inside[on_route] = True
+    beside = result.settings.get("planner", {}).get("corridor", "route")
+    if beside != "route" and len(on_route):
+        from hybridnav.route import corridor_of  # noqa: PLC0415 - most presets search no corridor
+
+        inside = corridor_of(topology, on_route, beside=beside).places
+    return inside
 
 
 def _draw_route(

@@ -13,7 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
-from hybridnav.route.coarse import ArcSearch
+from hybridnav.route.coarse import ArcSearch, along
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
@@ -36,13 +36,21 @@ class RegionPlanner:
         The graph of the regions.
     corner_cutting
         Whether diagonals may cut corners.
+    joined
+        int (n, 2), the arcs by which regions beside a route belong to its corridor, as those of
+        the preset `paper` do; None for the regions of the route alone.
     """
 
     def __init__(
-        self, region_of: IntArray, graph: ArcSearch, *, corner_cutting: bool = False
+        self,
+        region_of: IntArray,
+        graph: ArcSearch,
+        *,
+        corner_cutting: bool = False,
+        joined: IntArray | None = None,
     ) -> None:
         self._region_of = region_of
-        self._graph = graph
+        self._graph, self._joined = graph, joined
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
         self.memory_bytes = array_bytes(self, graph) + self._grid_search.memory_bytes
 
@@ -64,6 +72,8 @@ class RegionPlanner:
         began = time.perf_counter()
         in_corridor = np.zeros(self._graph.n_vertices, dtype=np.bool_)
         in_corridor[plan.vertices] = True
+        if self._joined is not None:
+            in_corridor = along(self._joined, plan.vertices, "joined", self._graph.allowed)
         found = self._grid_search.search(
             start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
@@ -317,7 +327,8 @@ class SimpleGraphPyramid:
     `max_distance_m` of its arcs, which is the same for all of them; ties are decided by the
     `through_m` of the arc with the lowest index, since a simple graph keeps the first arc that it
     meets and ignores the others. (`Level.to_simple_graph` is kinder: it keeps the shortest.) The
-    path is the shortest inside the fields of the route. If corners may be cut, a missing route
+    path is the shortest inside the fields of the route and of the places that its edges join to
+    it, as with the preset `paper`. If corners may be cut, a missing route
     proves nothing, and the method gives up.
 
     Parameters
@@ -337,7 +348,9 @@ class SimpleGraphPyramid:
         self.n_edges = len(kept)
         graph = ArcSearch(free, level.arcs, level.max_distance_m, level.through_m, kept=kept)
         self._corner_cutting = topology.grid.corner_cutting
-        self._planner = RegionPlanner(self.region_of, graph, corner_cutting=self._corner_cutting)
+        self._planner = RegionPlanner(
+            self.region_of, graph, corner_cutting=self._corner_cutting, joined=level.arcs[kept]
+        )
         self.memory_bytes = self._planner.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> MethodResult:

@@ -74,8 +74,8 @@ class MaxDistance(Method):
             return self._over_whole_map(query, seconds)
         if route is None:
             return Found(None, stats=PlanStats(seconds=seconds))
-        beside = search.enterable if self._settings.corridor == "neighbours" else None
-        corridor = routes.corridor_of(topology, route.places, neighbours=beside)
+        beside, enterable = self._settings.corridor, search.enterable
+        corridor = routes.corridor_of(topology, route.places, beside=beside, enterable=enterable)
         seconds["coarse"] = time.perf_counter() - began
         cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]

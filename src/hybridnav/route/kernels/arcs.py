@@ -1,4 +1,4 @@
-"""Kernel of cheapest walks on the arcs of a graph."""
+"""Kernels on the arcs of a graph: cheapest walks, and what lies beside a walk."""
 
 import heapq
 
@@ -66,3 +66,25 @@ def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
         arcs[i] = by_arc[v]
         v = previous[v]
     return arcs, closed[goal], expanded
+
+
+@njit(cache=True, nogil=True)
+def joined_to(arcs, weight, least):
+    """Return the vertices that enough arcs join to those of a walk, bool (n_vertices,).
+
+    Parameters
+    ----------
+    arcs
+        int32 or int64 (n_arcs, 2).
+    weight
+        int8 (n_vertices,): 2 at the ends of the walk, 1 at its other vertices, else 0: for how many
+        arcs an arc to the vertex counts.
+    least
+        How many arcs a vertex needs.
+    """
+    joined = np.zeros(weight.size, np.int64)
+    for i in range(len(arcs)):
+        u, v = arcs[i, 0], arcs[i, 1]
+        joined[u] += weight[v]
+        joined[v] += weight[u]
+    return joined >= least
