@@ -34,7 +34,10 @@ BESIDE = ("octile", "shortest")
 """Presets whose speed-ups stand beside those of methods that solved fewer pairs."""
 
 _DIGITS = 6
-_COUNTS = ("pairs", "solved", "pairs in common", "nodes", "edges", "faults")
+_COUNTS = (
+    "pairs", "solved", "pairs in common", "nodes", "edges", "faults", "backups",
+    "backups of the grid / backups",
+)  # fmt: skip
 _OF_PAGE = ("numpy", "scipy", "numba", "python", "hybridnav", "processor", "machine")
 """What is told of the machine: not its name."""
 

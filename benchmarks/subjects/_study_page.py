@@ -145,7 +145,9 @@ _ABOUT = {
     "costs": "Cheapest paths: each cell costs more the nearer it is to an obstacle, as Nav2's "
     "inflation has it (0.70 m, 3.0). `shortest` and `octile` know nothing of costs.",
     "ompl": "Presets with OMPL, 1 s a query, on fewer pairs of the same maps. Times are those of "
-    "single queries and include what it takes to send a query to OMPL's process.",
+    "single queries and include what it takes to send a query to OMPL's process. The coarse route "
+    "by max-distances is refined by grid A* in `paper`, by RRTConnect in `paper+ompl`; "
+    "`ompl-whole` knows no places, and the reference is A* on the whole map.",
 }
 
 

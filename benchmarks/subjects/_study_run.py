@@ -75,6 +75,9 @@ SAMPLING = tuple(
 )
 """The preset `ompl` with one planner each, by their names in tables."""
 
+PLACES_FIRST = NamedMethod("preset", "ompl", "paper+ompl", {"planner.along": "paper"})
+"""RRTConnect where the coarse route of `paper` leads; `paper` has grid A* there."""
+
 _LATE_S = 120.0
 """Silence beyond the limit that loading kernels and judging may add."""
 _SPEAK_S = 15.0
@@ -167,11 +170,11 @@ def parts_of(plan: Plan) -> list[Part]:
         ),
         Part(
             "ompl",
-            (line, "shortest"),
+            (line, "shortest", "paper"),
             (),
             plan.ompl_pairs,
             0,
-            methods=(*samplers, *sampling),
+            methods=(*samplers, *sampling, *(PLACES_FIRST,) * bool(sampling)),
         ),
     ]
 

@@ -23,7 +23,10 @@ TITLES = {
 }
 """Parts of the study, and their headings."""
 
-WORK = ("expansions", "an expansion in cells", "work in cells")
+WORK = (
+    "backups", "backups of the grid / backups", "expansions", "an expansion in cells",
+    "work in cells",
+)  # fmt: skip
 TIME = (
     "query ms, median", "query ms, p95", "spread %", "speed-up", "speed-up of means",
     "preparation s", "memory MB", "break-even queries",
@@ -45,6 +48,7 @@ _LEFT_OUT = {
         "weighted loss 95 % interval",
         "by the grid %",
         "loss of the plan %",
+        "in order %",
         "cost mean m",
         "gap max %",
     )
@@ -122,10 +126,17 @@ def _table(
 
 _NOTES = {
     "consistency": "Contradictions of checks, by kind; empty where nothing was to check.",
+    "loss octile": "The loss of the plan is that of the best path of cells inside its regions; in "
+    "order, of the best that passes them as the plan does. The presets that read the plan off a "
+    "path have zeros by construction. A path may be better than its plan: `paper` and "
+    "`simple-graph` also search places beside the route.",
     "time": "Medians over the pairs in common; a speed-up is the reference's time over the "
     "method's: the median of the ratios, and the ratio of the means.",
-    "work": "An expansion is a thing taken from the queue of a search; its price is the time of "
-    "all queries over all expansions, in the unit in which the reference expands a cell.",
+    "work": "Backups are Thrun's count, nodes times mean steps of a plan (of the grid: cells times "
+    "mean steps of a path), a mean over the maps; the next column is the median of the grid's over "
+    "it. They leave out the search of cells inside the plan, which expansions hold. An expansion "
+    "is a thing taken from the queue of a search; its price is the time of all queries over all "
+    "expansions, in the unit in which the reference expands a cell.",
     "graphs": "Nodes of all maps in the mean, and each passage as one edge; routes join a graph at "
     "the nearest node in sight. The figures of each over the pairs that it and all methods of the "
     "tables of losses solved.",

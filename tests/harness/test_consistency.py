@@ -1,5 +1,6 @@
 """Consistency by its definition: no fault where there is none, and every planted one found."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.consistency import Consistency
@@ -313,3 +315,62 @@ def test_whatever_method_has_something_to_close_is_closed():
     Prepared(method, None, 0, 0).close()
     assert not method.is_held
     Prepared(GridAstar(ROOMS), None, 0, 0).close()
+
+
+@settings(max_examples=examples(60))
+@given(scene=scenes(max_side=9), seed=st.integers(0, 10**6))
+def test_the_shortest_path_in_order_is_that_of_all_walks(scene, seed) -> None:
+    grid = scene.grid
+    free = np.argwhere(grid.classes == CellClass.FREE)
+    if not len(free):
+        return
+    topology = topology_of(grid, scene.merge_distance_m)
+    region_of = np.where(grid.classes == CellClass.FREE, topology.level.field_of, -1)
+    checks = Consistency(grid, region_of.astype(np.int32))
+    rng = np.random.default_rng(seed)
+    start, goal = (tuple(cell) for cell in rng.choice(free, 2).tolist())
+    found = GridSearch(grid.classes == CellClass.FREE).search(start, goal)
+    if found.cells is None:
+        return
+    passed = region_of[tuple(found.cells.T)].tolist()
+    nodes = [one for one, before in zip(passed, [-1, *passed], strict=False) if one != before]
+    # The path itself passes them so: nothing is shorter.
+    optimum = path_length_in_cells(found.cells)
+    assert checks.shortest_in_order(start, goal, nodes) == pytest.approx(optimum)
+    # Another walk: back to where one came from, and on; by Bellman and Ford.
+    walk = [*nodes[:2], *nodes] if len(nodes) > 1 else nodes
+    assert checks.shortest_in_order(start, goal, walk) == pytest.approx(
+        bellman_ford(grid, region_of, start, goal, walk)
+    )
+
+
+def bellman_ford(grid, region_of, start, goal, walk):
+    """The least length by relaxing all steps until none gets shorter."""
+    least = {(0, start): 0.0}
+    steps = [(dr, dc) for dr in (-1, 0, 1) for dc in (-1, 0, 1) if dr or dc]
+    free = {tuple(cell) for cell in np.argwhere(grid.classes == CellClass.FREE).tolist()}
+    is_changed = True
+    while is_changed:
+        is_changed = False
+        for (stage, (row, col)), length in list(least.items()):
+            for dr, dc in steps:
+                there = (row + dr, col + dc)
+                if not {there, (row, col + dc), (row + dr, col)} <= free:
+                    continue
+                for later in (stage, stage + 1):
+                    if later == len(walk) or region_of[there] != walk[later]:
+                        continue
+                    reached = length + math.hypot(dr, dc)
+                    if reached < least.get((later, there), math.inf) - 1e-12:
+                        least[later, there] = reached
+                        is_changed = True
+    return least.get((len(walk) - 1, goal), math.inf)
+
+
+def test_a_sequence_with_no_path_has_an_infinite_length() -> None:
+    topology = topology_of(ROOMS, 2.0)
+    checks = Consistency(ROOMS, np.where(ROOMS.classes == 1, topology.level.field_of, -1))
+    far = topology.level.field_of[1, 9]
+    assert (
+        checks.shortest_in_order((1, 1), (1, 9), [topology.level.field_of[1, 1], far]) == math.inf
+    )

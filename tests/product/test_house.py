@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_570,
-    "lines": 92_350,
+    "code": 55_620,
+    "lines": 92_420,
     "files": 395,
-    "code outside ext": 37_620,
+    "code outside ext": 37_670,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 44,
     "parameters of commands, shared ones once": 112,
-    "lines of tests": 58_070,
+    "lines of tests": 58_130,
 }
 
 

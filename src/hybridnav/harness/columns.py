@@ -57,6 +57,7 @@ CONSISTENCY_COLUMNS = {
 _OF_LOSS = {
     "mean %": "mean of length (or cost) over the optimum of the caption, minus 1, over the pairs "
     "that all methods solved",
+    "of means %": "sum of the lengths (or costs) of these pairs over that of their optima, minus 1",
     "95 % interval": "bootstrap interval of that mean, over pairs, not over maps",
     "median %": "median of the same losses over the same pairs",
     "p95 %": "their 95th percentile",
@@ -65,7 +66,10 @@ _OF_LOSS = {
 }
 _OF_PLAN = {
     "loss of the plan %": "Thrun's loss: mean over the same pairs of the best path of cells inside "
-    "the regions of the plan over the best of all, minus 1, whatever path the method takes there",
+    "the regions of the plan over the best of all, minus 1, whatever path the method takes there, "
+    "or beside them",
+    "in order %": "the same of the best path of cells that passes these regions in their order; of "
+    "plans that were searched for, in runs without costs",
 }
 _OF_COSTS = {
     "length mean m": "mean length over the same pairs, metres",
@@ -132,7 +136,8 @@ DEFINITION = (
     "metric path maps to a walk over regions, and both agree on whether there is a path. "
     "Connectivity is computed by scipy, not by the planners. Beside these the harness checks that "
     "paths are paths and that bounds hold. A cell reads: contradictions of checks; it is empty "
-    "where nothing was to check."
+    "where nothing was to check. A plan that is read off a path is consistent with it by "
+    "construction, and loses nothing: its zeros say that the reading is right, no more."
 )
 """What the table of consistency holds."""
 
@@ -270,6 +275,7 @@ def figures(
         if optimum != "weighted" or by_costs:
             row |= _losses(pool, optimum)
     row["loss of the plan %"] = 100 * nanmean(pool.shared("plan_losses"))
+    row["in order %"] = 100 * nanmean(pool.shared("in_order_losses"))
     if by_costs:
         row |= {
             "length mean m": nanmean(pool.shared("lengths_m")),
@@ -287,10 +293,15 @@ def _losses(pool: _Pool, optimum: Optimum) -> Row:
     that the method solved."""
     losses = methodcaller("losses_over", optimum)
     every, shared = pool.of(losses), pool.shared(losses)
+    of_optima = np.where(
+        np.isfinite(shared), pool.shared(f"{optimum.replace('-', '_')}_optima_m"), np.nan
+    )
     summary = summarise(shared[np.isfinite(shared)])
     low, high = (text_of(100 * end) for end in summary.mean_interval)
     figures: Row = {
         "mean %": 100 * summary.mean,
+        "of means %": 100
+        * _quotient(float(np.nansum(shared * of_optima)), float(np.nansum(of_optima))),
         "95 % interval": f"{low} to {high}" if np.isfinite(shared).any() else "",
         "median %": 100 * summary.median,
         "p95 %": 100 * summary.p95,

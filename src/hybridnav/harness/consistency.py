@@ -63,6 +63,10 @@ class Consistency:
         keys = self._keys(self._region[crossings])
         components = np.sort(self._component[crossings], axis=1)
         one = unique_rows(np.column_stack([keys, arcs, components])).first
+        of_regions = self._keys(region)
+        by_key = np.argsort(of_regions, kind="stable")
+        self._moves, self._of_regions = moves[by_key], of_regions[by_key]
+        self._order = np.argsort(self._region, kind="stable")
         # One crossing for each arc and pair of components, sorted by pair of regions, then arc.
         self._arc, self._crossings, crossing_keys = arcs[one], crossings[one], keys[one]
         self._key = crossing_keys
@@ -180,6 +184,48 @@ class Consistency:
             for a, b in zip(tails, heads, strict=True)
             if int(component[a]) in reached
         }
+
+    def shortest_in_order(self, start: Cell, goal: Cell, nodes: Sequence[int]) -> float:
+        """Return the length of the shortest path of cells that passes regions in their order, in
+        cells, by scipy's Dijkstra; infinite for none.
+
+        Each stay in a region is a graph of its own, and any legal move leads from one to the next.
+
+        Parameters
+        ----------
+        start, goal
+            Cells (row, col).
+        nodes
+            Regions in the order passed, no two alike in a row; one may come again.
+        """
+        tails, heads, base = [], [], 0
+        starts = np.searchsorted(self._region[self._order], np.arange(self._count + 1))
+        cells = [self._order[starts[node] : starts[node + 1]] for node in nodes]
+        for step, node in enumerate(nodes):
+            here = base + np.searchsorted(cells[step], self._between(node, node))
+            tails += [here[:, 0], here[:, 1]]
+            heads += [here[:, 1], here[:, 0]]
+            following = base + len(cells[step])
+            for other in nodes[step + 1 : step + 2]:
+                over = self._between(node, other)
+                over = np.where((self._region[over[:, 0]] == node)[:, None], over, over[:, ::-1])
+                tails.append(base + np.searchsorted(cells[step], over[:, 0]))
+                heads.append(following + np.searchsorted(cells[step + 1], over[:, 1]))
+            base = following
+        tail, head, flat = np.concatenate(tails), np.concatenate(heads), np.concatenate(cells)
+        rows, cols = np.abs(
+            np.stack(divmod(flat[tail], self._cols)) - divmod(flat[head], self._cols)
+        )
+        lengths = np.sqrt(rows + cols)
+        graph = sparse.coo_array((lengths, (tail, head)), (base, base)).tocsr()
+        first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
+        found = csgraph.dijkstra(graph, indices=np.searchsorted(cells[0], [first]))[0]
+        return float(found[base - len(cells[-1]) + np.searchsorted(cells[-1], last)])
+
+    def _between(self, one: int, other: int) -> LongArray:
+        """Return the moves between two regions, or inside one, each in one direction."""
+        key = min(one, other) * self._count + max(one, other)
+        return self._moves[slice(*np.searchsorted(self._of_regions, [key, key + 1]))]
 
     def check_walk(self, cells: LongArray) -> str | None:
         """Check that a metric path maps to a walk in the topological layer.

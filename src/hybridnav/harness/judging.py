@@ -166,6 +166,16 @@ class Judge:
         known, faults = self._oracles.ask(answer, pair, length_m)
         return optima | known, faults
 
+    def in_order_m(self, pair: Pair, answer: MethodResult) -> float | None:
+        """Return the length of the shortest path of cells through the regions of the plan in their
+        order; None without path, by costs, and for a plan that no search made."""
+        checks = None if self._costs is not None else self._consistency
+        if checks is None or not answer.nodes or not answer.is_path or not answer.expanded_nodes:
+            return None
+        return (
+            checks.shortest_in_order(pair.start, pair.goal, answer.nodes) * self._grid.resolution_m
+        )
+
     def plan_optimum_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length, or the cost, of the best path inside the regions of the plan; None
         without plan or path."""

@@ -161,6 +161,7 @@ class Outcome:
             "fallback_losses": loss_of(of["fallback_m"], of["best_m"]),
             # Thrun's: the best path of cells inside the regions of the plan, over the best of all.
             "plan_losses": loss_of(figure("plan_optimum_m"), of_all),
+            "in_order_losses": loss_of(figure("in_order_m"), of_all),
             "gaps": _gaps(costs, figure("cost_lower_bound_m")),
             # Below 0 for any-angle paths that cost less than the bound on paths of cells.
             "grid_gaps": loss_of(costs, figure("cost_grid_bound_m")),

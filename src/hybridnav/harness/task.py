@@ -315,6 +315,7 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         "bound": float(answer.bound) if math.isfinite(answer.bound) else None,
         "plan_steps": _plan_steps(answer),
         "plan_optimum_m": None if faults else judge.plan_optimum_m(pair, answer),
+        "in_order_m": None if faults else judge.in_order_m(pair, answer),
         "path": None if answer.cells is None else encode_path(answer.cells),
         **({} if answer.any_angle is None else _of_line(answer.any_angle)),
         "expanded": int(answer.expanded),
