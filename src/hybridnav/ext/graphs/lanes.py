@@ -10,7 +10,7 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace
-from hybridnav.ext.graphs.kernels.edges import least_along, least_widths
+from hybridnav.ext.graphs.kernels import least_along, least_widths
 from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.mapping.kernels.beams import (
+from hybridnav.ext.live.mapping.kernels import (
     add_cone,
     add_hits,
     add_passes,

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.mapping.kernels.beams import ray_lengths
+from hybridnav.ext.live.mapping.kernels import ray_lengths
 from hybridnav.ext.live.mapping.models import MOST_RANGE_CELLS
 from hybridnav.ext.live.mapping.scans import (
     MOST_READINGS,
