@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanResult
-    from hybridnav.planner.guide.legs import Leg
+    from hybridnav.planner.guide.bends import Leg
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
     from hybridnav.route import DoorGraph, DoorRoute
