@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 import hybridnav as hn
-from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav._base.files import printable
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     UsageError,
@@ -27,78 +24,20 @@ from hybridnav.cli.options import closing_lines, parsed_closing
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import check_model, load_numba, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
-from hybridnav.errors import MapError
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
-    from hybridnav._base.typing import PathLike
     from hybridnav.cli.reading import MapOptions
     from hybridnav.ext.fleet import BuildingAlternatives
 
 
-_FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
-_LOOKED_AT = 2**16
-"""Bytes of a file that are searched for its floors."""
-
-
-def is_building(path: PathLike) -> bool:
-    """Return whether a file describes a building, by what it contains.
-
-    Parameters
-    ----------
-    path
-        A YAML file or a model.
-
-    Returns
-    -------
-    bool
-        False if there is no such file, or it cannot be read.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.fleet.files import is_building
-    >>> is_building("maps/office/office.yaml")
-    False
-    """
-    file = Path(path)
-    suffix = file.suffix.lower()
-    try:
-        if not file.is_file():
-            return False
-    except OSError:  # a name that is too long
-        return False
-    if suffix == MODEL_SUFFIX:
-        return _is_building_model(file)
-    if suffix not in {".yaml", ".yml"}:
-        return False
-    try:
-        with file.open("rb") as stream:
-            text = stream.read(_LOOKED_AT).decode("utf-8-sig", errors="replace")
-    except OSError:
-        return False
-    return _FLOORS.search(text) is not None
-
-
-def _is_building_model(path: Path) -> bool:
-    """Return whether a file is the model of a building; False for one that cannot be read."""
-    from hybridnav.planner.saved.container import read_parts  # noqa: PLC0415 - on demand
-    from hybridnav.planner.saved.structures import BUILDING  # noqa: PLC0415
-
-    with suppress(MapError):
-        filed = read_parts(path)
-        return bool(filed) and filed[0].kind == BUILDING.kind
-    return False
-
-
-# `hybridnav plan` and `hybridnav build` for a building of several floors.
-
-
 def is_building_file(path: Path) -> bool:
     """Return whether a file describes a building; most maps do not need the modules for it."""
-    from hybridnav.ext.fleet.command import is_building  # noqa: PLC0415 - on demand
+    from hybridnav.ext.fleet.files.kind import is_building  # noqa: PLC0415 - on demand
 
     return is_building(path)
 
