@@ -1,4 +1,4 @@
-"""The table of alternatives: time for three of them between random points, by doors or homotopy.
+"""The table of alternatives: time for three of them between random points.
 
 The office of `maps/office`, and from FOLDER the maps of Willow Garage and of GDC floors 2, 3 and
 3ne; robot radius 0.25 m, preset `shortest`, rooms found. Points are cells drawn from the largest
@@ -12,9 +12,6 @@ connected part, and times are those of one processor. The columns:
     stopped     pairs for which the search stopped early
     overlap     the greatest share of an alternative in common with a shorter one
     stretch     the greatest length of one over that of the first
-    same doors  pairs whose second alternative passes the doors of the first
-
-With `--homotopy` there is a second row for homotopy classes.
 """
 
 from __future__ import annotations
@@ -40,8 +37,6 @@ from benchmarks.common import (
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from hybridnav.planner.alternatives import By
-
 MAPS = {
     "Willow Garage": "willow/willow-2010-02-18-0.10.yaml",
     "GDC floor 2": "bwi_gdc/2/2.yaml",
@@ -58,25 +53,24 @@ def pairs_of(planner: hn.HybridPlanner, count: int, seed: int) -> list[np.ndarra
     return [grid.frame.points_of(pair) for pair in drawn]
 
 
-def row_of(planner: hn.HybridPlanner, pairs: list[np.ndarray], by: By) -> list[str]:
+def row_of(planner: hn.HybridPlanner, pairs: list[np.ndarray]) -> list[str]:
     """The figures of one map."""
     began = time.process_time()
-    hn.plan_alternatives(planner, pairs[0][0], pairs[0][1], WANTED, by=by)
+    hn.plan_alternatives(planner, pairs[0][0], pairs[0][1], WANTED)
     prepare_s = time.process_time() - began
-    spent_s, plain_s, counts, overlaps, stretches, same = [], [], [0] * WANTED, [0.0], [1.0], 0
+    spent_s, plain_s, counts, overlaps, stretches = [], [], [0] * WANTED, [0.0], [1.0]
     stopped = 0
     for pair in pairs:
         began = time.process_time()
         planner.plan(*pair)
         plain_s.append(time.process_time() - began)
         began = time.process_time()
-        found = hn.plan_alternatives(planner, pair[0], pair[1], WANTED, by=by)
+        found = hn.plan_alternatives(planner, pair[0], pair[1], WANTED)
         spent_s.append(time.process_time() - began)
         counts[len(found) - 1] += 1
         stopped += not found.complete
         overlaps += [other.overlap for other in found]
         stretches += [other.path.length_m / found[0].path.length_m for other in found]
-        same += len(found) > 1 and found[1].doors == found[0].doors
     return [
         f"{prepare_s:.2f} s",
         f"{np.median(spent_s) * 1000:.0f} ms",
@@ -86,7 +80,6 @@ def row_of(planner: hn.HybridPlanner, pairs: list[np.ndarray], by: By) -> list[s
         str(stopped),
         f"{max(overlaps):.0%}",
         f"{max(stretches):.2f}",
-        str(same),
     ]
 
 
@@ -94,7 +87,6 @@ OPTIONS = [
     DATA,
     option("--pairs", type=int, default=30),
     SEED,
-    option("--homotopy", action="store_true"),
 ]
 
 
@@ -103,11 +95,9 @@ def main(given: Namespace) -> None:
     files = {"office": OFFICE}
     if given.data is not None:
         files |= {name: given.data / file for name, file in MAPS.items()}
-    columns = "map", "by", "prepare", "median", "longest", "plain", "1 / 2 / 3", "stopped"
-    print_head(*columns, "overlap", "stretch", "same doors")
+    columns = "map", "prepare", "median", "longest", "plain", "1 / 2 / 3", "stopped"
+    print_head(*columns, "overlap", "stretch")
     for name, file in files.items():
         planner = prepared(read(file), rooms=True)
         pairs = pairs_of(planner, given.pairs, given.seed)
-        asked: tuple[By, ...] = ("doors", "homotopy") if given.homotopy else ("doors",)
-        for by in asked:
-            print_row(name, by, *row_of(planner, pairs, by))
+        print_row(name, *row_of(planner, pairs))

@@ -33,7 +33,7 @@ from hybridnav.ext.graphs.attach import (
     shortest_routes,
 )
 from hybridnav.ext.graphs.judge import FreeSpace, excess_of
-from hybridnav.ext.graphs.kernels.edges import least_along
+from hybridnav.ext.graphs.kernels import least_along
 from hybridnav.harness.tables import to_markdown
 from hybridnav.topology.rooms.doors import measured_clearance_m
 

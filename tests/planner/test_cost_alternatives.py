@@ -124,17 +124,6 @@ def test_costs_change_which_sequence_of_doors_comes_first() -> None:
     assert [other.doors for other in only] == [cheap[1].doors]
 
 
-@pytest.mark.parametrize("options", [{"by": "homotopy"}, {"inside_rooms": True}])
-def test_classes_of_paths_by_costs_are_refused_in_one_line(options: Any) -> None:
-    topology, layer = dear_door_map()
-    planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
-    with pytest.raises(
-        hn.errors.InvalidValueError, match="this planner plans by costs: take by"
-    ) as told:
-        hn.plan_alternatives(planner, (8.5, 4.5), (22.5, 4.5), 2, **options)
-    assert "\n" not in str(told.value)
-
-
 def test_the_command_prints_alternatives_by_costs(cli: Any, tmp_path: Any) -> None:
     topology, _ = dear_door_map()
     pixels = np.where(topology.grid.classes[::-1] == hn.CellClass.FREE, 254, 0).astype(np.uint8)
@@ -156,7 +145,6 @@ def test_the_command_prints_alternatives_by_costs(cli: Any, tmp_path: Any) -> No
     )
     options = (*query, "--to", "22.5,4.5", "--costs", "clearance:inflation_radius_m=2,multiplier=5")
     options = (*options, "--alternatives", "3")
-    by_homotopy = (*options, "--by", "homotopy")
     options = (*options, "--max-stretch", "4")
     found = json.loads(cli(*options, "--json").out)["alternatives"]
     costs = [other["cost"] for other in found]
@@ -167,4 +155,3 @@ def test_the_command_prints_alternatives_by_costs(cli: Any, tmp_path: Any) -> No
     told = cli(*options).out
     assert "is at most 4 times as dear as the first" in told
     assert all(f"cost {cost:.2f} m (weighted)" in told for cost in costs)
-    assert cli(*by_homotopy).refuses(2, "this planner plans by costs")

@@ -1,6 +1,5 @@
 """Alternatives by doors: other sequences of doors, the plain plan first, within their limits."""
 
-import itertools
 import math
 from typing import Any
 
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.ext.classes.search import AlternativeSearch
 from tests.door_alternatives import Planned, check_alternatives, doors_by_cells, line_of, two_points
 from tests.floors import random_floor
 from tests.strategies import examples, occupancy_grid
@@ -137,103 +135,10 @@ def ring(request):
     return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=request.param)
 
 
-def test_both_sides_of_a_block_inside_a_room_count_only_when_asked_for(ring):
-    ends = (1.5, 4.5), (19.5, 4.5)
-    found = hn.plan_alternatives(ring, ends[0], ends[1], 3)
-    assert len(found) == 1
-    assert found.complete
-    assert found.note.startswith("1 of 3: no other candidate sequence of doors shares at most 80%")
-    both = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True)
-    assert len(both) == 2
-    assert both[0].doors == both[1].doors
-    assert np.array_equal(both[0].path.points, found[0].path.points)
-    middles = [np.interp(10.0, *other.path.points.T) for other in both]
-    assert min(middles) < 2.5
-    assert max(middles) > 6.5
-    assert both[1].result.metric == both[0].result.metric
-    assert both[1].path.length_m == pytest.approx(both[0].path.length_m)
-    few = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True, max_overlap=0.1)
-    assert len(few) == 1
-
-
-def test_all_searches_inside_rooms_share_one_time_limit(monkeypatch):
-    """Two sequences of doors, and a clock that moves 4 s with each look."""
-    classes = np.ones((9, 21), dtype=np.uint8)
-    classes[:, 10] = 2
-    classes[[1, 7], 10] = 1
-    classes[3:6, 4:6] = 2
-    labels = np.zeros(classes.shape, dtype=np.int32)
-    labels[:, 10:] = 1
-    rooms = hn.RoomLabels(("west", "east"), labels)
-    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes), rooms=rooms))
-    left_s = []
-    paths = AlternativeSearch.paths
-
-    def noted(self, *ends, time_limit_s, **limits):
-        left_s.append(time_limit_s)
-        return paths(self, *ends, time_limit_s=time_limit_s, **limits)
-
-    looks = itertools.count(0.0, 4.0)
-    monkeypatch.setattr("hybridnav.ext.classes.alternatives.perf_counter", lambda: next(looks))
-    monkeypatch.setattr(AlternativeSearch, "paths", noted)
-    planner = hn.HybridPlanner(topology)
-    found = hn.plan_alternatives(
-        planner, (0.5, 4.5), (20.5, 4.5), 9, inside_rooms=True, max_overlap=1.0, time_limit_s=10.0
-    )
-    assert len({other.doors for other in found}) == 2
-    assert left_s == [6.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"by": "homotopy", "max_overlap": 0.5}, "by='doors': leave it out"),
-        ({"by": "homotopy", "max_stretch": 3}, "max_stretch=3 was given with by='homotopy'"),
-        ({"by": "homotopy", "inside_rooms": True}, "inside_rooms=True was given"),
-        ({"least_hole_m2": 1.0}, "by='homotopy' or inside_rooms=True: leave it out"),
-        ({"most_states": 10}, "most_states=10 was given with by='doors'"),
-        ({"time_limit_s": 0.0}, "time_limit_s=0.0 was given with by='doors'"),
-    ],
-)
-def test_options_that_change_nothing_are_refused_in_one_line(ring, options, message):
-    with pytest.raises(hn.errors.InvalidValueError) as told:
-        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **options)
-    assert message in str(told.value)
-    assert str(told.value).isprintable()
-
-
-@pytest.mark.parametrize(
-    "options", [{"most_states": 0}, {"time_limit_s": math.nan}, {"least_hole_m2": -1.0}]
-)
-@pytest.mark.parametrize("where", [{"by": "homotopy"}, {"inside_rooms": True}])
-def test_limits_of_searches_for_classes_out_of_range_are_refused(ring, options, where):
-    with pytest.raises(hn.errors.InvalidValueError, match=r"most_states|time_limit_s|hole"):
-        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **where, **options)
-
-
-@pytest.mark.parametrize("preset", ["shortest", "octile"])
-def test_a_pillar_beside_the_straight_line_has_another_side(preset):
-    """Shortened by line of sight, the way round it would be the first path again."""
-    classes = np.ones((12, 12), dtype=np.uint8)
-    classes[3:5, 5:7] = 2
-    grid = occupancy_grid(classes)
-    rooms = hn.RoomLabels(("hall",), np.zeros(classes.shape, dtype=np.int32))
-    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
-    planner = hn.HybridPlanner(topology, preset=preset)
-    found = hn.plan_alternatives(
-        planner, (2.5, 2.5), (9.5, 2.5), 4, inside_rooms=True, max_overlap=1.0
-    )
-    assert len(found) == 2
-    assert found[0].tour.length_m == pytest.approx(7.0)
-    assert found[1].path.points[:, 1].max() > 5
-
-
 def test_start_and_goal_in_one_room_have_the_plain_plan_alone(ring):
     found = hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 3)
     assert len(found) == 1
-    assert found.note == (
-        "1 of 3: no door lies between start and goal; by homotopy, sides of obstacles count"
-    )
+    assert found.note == ("1 of 3: no door lies between start and goal")
     assert hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 1).note == ""
 
 
@@ -244,9 +149,7 @@ def test_a_map_without_rooms_has_the_plain_plan_alone():
     plain: Any = planner.plan((1.5, 4.5), (19.5, 4.5)).path
     assert np.array_equal(found[0].path.points, plain.points)
     assert found.complete
-    assert found.note == (
-        "1 of 2: the map has no rooms, so no doors; by homotopy, sides of obstacles count"
-    )
+    assert found.note == ("1 of 2: the map has no rooms, so no doors")
 
 
 def test_without_a_path_the_note_has_the_status(ring):
@@ -258,7 +161,6 @@ def test_without_a_path_the_note_has_the_status(ring):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"by": "words"}, "by must be 'doors' or 'homotopy', got 'words'"),
         ({"max_overlap": 1.5}, "max_overlap must be a number from 0 to 1, got 1.5"),
         ({"max_overlap": math.nan}, "max_overlap must be a number from 0 to 1, got nan"),
         ({"max_stretch": 0.5}, "max_stretch must be a number from 1 or more, got 0.5"),
@@ -282,5 +184,3 @@ def test_ompl_plans_by_other_doors_too():
     assert found
     assert found[0].result.start == plain.start
     assert found[0].path.length_m == pytest.approx(plain.path.length_m)
-    with pytest.raises(hn.errors.InvalidValueError, match="without OMPL"):
-        hn.plan_alternatives(planner, ends[0], ends[1], 2, inside_rooms=True)

@@ -161,21 +161,8 @@ def test_a_name_is_a_room_s_or_a_point_s_never_both(text):
     [
         (("--at", "nowhere"), "--at must be anywhere or point, got 'nowhere'"),
         (("--at", ""), "--at must be anywhere or point, got ''"),
-        (("--least-hole", "inf"), "--least-hole must be a finite number of m²"),
-        (("--least-hole", "nan", "--alternatives", "2"), "--least-hole"),
-        (("--by", "homotopy"), "--by is for alternatives: add --alternatives N"),
         (("--max-overlap", "0.8"), "--max-overlap is for alternatives: add --alternatives N"),
         (("--max-stretch", "2"), "--max-stretch is for alternatives: add --alternatives N"),
-        (("--inside-rooms",), "--inside-rooms is for alternatives: add --alternatives N"),
-        (("--least-hole", "1"), "--least-hole is for alternatives: add --alternatives N"),
-        (
-            ("--alternatives", "2", "--by", "homotopy", "--max-stretch", "3"),
-            "--max-stretch is for alternatives by doors: leave it out",
-        ),
-        (
-            ("--alternatives", "2", "--least-hole", "3"),
-            "--least-hole is for alternatives by homotopy, or with --inside-rooms: leave it out",
-        ),
     ],
 )
 def test_an_option_is_checked_whether_it_is_needed_or_not(capsys, options, words):

@@ -339,9 +339,16 @@ def test_every_length_and_cost_names_its_metric(cli, map_file):
     assert len(lines) > 1
     assert " m (any-angle)" in lines[0]
     assert all(" m (any-angle)" in line for line in lines[1:])
-    classes = cli(*query, "--alternatives", "2", "--by", "homotopy")
-    assert "\nroute 1    " in classes.out
-    assert " m (octile), by " in classes.out
+    cells = cli(*query, "--alternatives", "2", "--preset", "octile")
+    assert "\nroute 1    " in cells.out
+    assert " m (octile), by " in cells.out
+    answer = cli(*query, "--alternatives", "2", "--json").answer
+    assert [len(route["points"]) > 1 for route in answer["alternatives"]] == [True] * (
+        len(lines) - 1
+    )
+    assert answer["alternatives_complete"] is True
+    assert cli(*query, "--alternatives", "0").code == 2
+    assert cli(*query, "--alternatives", "2", "--via", "hall").refuses(2, "--via")
     pytest.importorskip("ompl")
     weigh = ("--set", "planner.ompl.objective=clearance", "--set", "planner.ompl.clearance_m=3")
     done = cli(*query, "--at", "point", "--preset", "ompl", *weigh)

@@ -168,19 +168,3 @@ def test_costs_equal_those_of_the_whole_grid_on_a_real_map(data: Path, name: str
 @pytest.mark.parametrize("name", MAPS)
 def test_costs_equal_those_of_the_whole_grid_on_real_maps(data: Path, name: str) -> None:
     assert_equal_on(data / name, 1000)
-
-
-def test_a_preset_file_that_names_portals_plans_the_shortest_path_of_cells(
-    cli: Any, tmp_path: Path
-) -> None:
-    old = tmp_path / "old.yaml"
-    old.write_text("planner: {coarse: portals, refine: none, epsilon: 0.05}\n")
-    query = ("plan", "maps/figure1/figure1.yaml", "--start", "0.5,0.5", "--goal", "2.0,2.5")
-    expected = cli(*query, "--preset", "grid-astar", "--json").answer
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        done = cli(*query, "--preset", old, "--json")
-    assert done.answer["length_m"] == pytest.approx(expected["length_m"])
-    assert done.answer["gap"] == 0
-    told = "portals are gone, method: octile plans instead: write that"
-    assert done.err == f"hybridnav: warning: {told}\n"

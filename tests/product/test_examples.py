@@ -24,8 +24,6 @@ RETURNED = {
     "harness.baselines.Solver",
     "pyramid.CombinatorialMap",
     "harness.Study",
-    "ext.classes.ClassPath",
-    "ext.classes.ClassPaths",
     "maps.files.Scenario",
     "search.octile.JumpGraph",
     "search.octile.JumpPath",

@@ -159,21 +159,29 @@ def test_signals_inside_the_kernels_of_a_build_raise_what_their_handler_raises()
     assert strike_builds(40) > 0
 
 
+def of_kernels(path: Path) -> bool:
+    return "kernels" in {path.stem, path.parent.name}
+
+
+def is_of_kernels(node: ast.ImportFrom) -> bool:
+    return ".kernels" in f"{node.module}.{node.names[0].name}"
+
+
 def test_kernels_that_return_several_values_to_python_are_guarded() -> None:
     package = Path(hn.__file__).parent
     trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in package.rglob("*.py")}
     called = set()
     for path, tree in trees.items():
         modules = set()
-        for node in ast.walk(tree) if path.parent.name != "kernels" else ():
-            if isinstance(node, ast.ImportFrom) and ".kernels" in str(node.module):
+        for node in ast.walk(tree) if not of_kernels(path) else ():
+            if isinstance(node, ast.ImportFrom) and is_of_kernels(node):
                 called |= {alias.name for alias in node.names}
                 modules |= {alias.asname or alias.name for alias in node.names}
             if isinstance(node, ast.Attribute) and ast.unparse(node.value) in modules:
                 called.add(node.attr)
     found = {}
     for path, tree in trees.items():
-        for node in tree.body if path.parent.name == "kernels" else ():
+        for node in tree.body if of_kernels(path) else ():
             if not isinstance(node, ast.FunctionDef) or node.name not in called:
                 continue
             returns = [part for part in ast.walk(node) if isinstance(part, ast.Return)]

@@ -45,7 +45,7 @@ KERNELS = """
 import importlib, pathlib, hybridnav
 root = pathlib.Path(hybridnav.__file__).parent
 assert root.is_relative_to({folder!r})
-for path in sorted(root.rglob("kernels/[!_]*.py")):
+for path in sorted([*root.rglob("kernels/[!_]*.py"), *root.rglob("kernels.py")]):
     importlib.import_module(".".join(("hybridnav", *path.relative_to(root).with_suffix("").parts)))
 from hybridnav.refine.kernels.curves import _wrapped
 print(round(float(_wrapped(7.0)), 6))

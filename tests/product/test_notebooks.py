@@ -20,7 +20,7 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
     "01_map_to_route": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "ROBOT_RADIUS_M": 0.2},
     "02_inside_the_pyramid": {"MERGE_DISTANCE_M": 6.0, "LARGE_M": 20.0},
     "03_rooms_and_alternatives": {"NAMES": {}, "FROM": (12.0, 2.0), "TO": (24.0, 23.0)}
-    | {"STOPS": [(24.0, 23.0), (12.0, 2.0)], "ACROSS": ((12.0, 2.0), (24.0, 23.0))},
+    | {"STOPS": [(24.0, 23.0), (12.0, 2.0)]},
     "04_thruns_criteria": {"PAIRS": 20, "MERGE_DISTANCES_M": (3.0, 6.0), "ROBOT_RADIUS_M": 0.2},
     "05_ompl_in_the_corridor": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "LENGTH_M": 1.2},
     "06_certificates": {"NEAR": ((12.0, 2.0), (12.0, 7.5)), "FAR": ((12.0, 2.0), (24.0, 23.0))}

@@ -98,8 +98,8 @@ def test_a_command_loads_nothing_that_it_does_not_use(arguments, code, unused):
 @pytest.mark.parametrize(
     ("preset", "others"),
     [
-        ("shortest", {"hybridnav.search.octile.search", "hybridnav.search.lattice.search"}),
-        ("octile", {"hybridnav.search.lattice.search", "hybridnav.refine.motions"}),
+        ("shortest", {"hybridnav.search.octile.jumps", "hybridnav.search.lattice.lattice"}),
+        ("octile", {"hybridnav.search.lattice.lattice", "hybridnav.refine.motions"}),
     ],
 )
 def test_a_plan_loads_nothing_of_other_presets(preset, others):

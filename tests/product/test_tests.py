@@ -20,7 +20,7 @@ def is_private(name: str) -> bool:
 def in_private(module: str) -> bool:
     """Tell whether a module is private, or one of kernels."""
     *packages, name = module.split(".")
-    return is_private(name) or packages[-1:] == ["kernels"]
+    return is_private(name) or "kernels" in {name, *packages[-1:]}
 
 
 def home_of(private: str) -> Path:

@@ -17,7 +17,7 @@ from hybridnav.maps.costs.integral import legal_cost, segment_cost
 from hybridnav.maps.files import load_map
 from hybridnav.refine.grid import LineOfSight
 from hybridnav.refine.kernels.arcs import round_bends
-from hybridnav.refine.kernels.segments import clear_segments
+from hybridnav.refine.kernels.line_of_sight import clear_segments
 from hybridnav.refine.kernels.taut import FREE
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points

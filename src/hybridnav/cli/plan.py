@@ -15,13 +15,9 @@ from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_o
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import (
     AlternativesOption,
-    ByOption,
-    InsideOption,
-    LeastHoleOption,
     OverlapOption,
     Request,
     StretchOption,
-    check_refiner,
     wanted_of,
 )
 from hybridnav.errors import brief
@@ -140,11 +136,8 @@ def plan(
     at: AtOption = "anywhere",
     rooms_file: options.RoomsOption = None,
     alternatives: AlternativesOption = 1,
-    by: ByOption = None,
     max_overlap: OverlapOption = None,
     max_stretch: StretchOption = None,
-    inside_rooms: InsideOption = False,
-    least_hole_m2: LeastHoleOption = None,
     blocked: options.BlockedOption = None,
     no_stairs: options.NoStairsOption = False,
     costs: options.CostsOption = None,
@@ -181,10 +174,7 @@ def plan(
     first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
-    wanted = wanted_of(
-        alternatives, by, max_overlap, max_stretch, least_hole_m2, inside_rooms=inside_rooms
-    )
-    check_refiner(wanted, settings)
+    wanted = wanted_of(alternatives, max_overlap, max_stretch)
     request = Request(
         source=Source(map_file, settings, reading, keep, keep_in),
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],

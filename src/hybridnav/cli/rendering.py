@@ -175,9 +175,7 @@ def _tour_lines(figures: dict[str, Any]) -> list[str]:
         lines.append(f"{'' if number else 'words':<10} {line}")
     for number, other in enumerate(figures.get("alternatives", ()), start=1):
         rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
-        shared = (
-            f", {other['overlap']:.0%} in common" if number > 1 and other["word"] is None else ""
-        )
+        shared = f", {other['overlap']:.0%} in common" if number > 1 else ""
         cost = f", cost {other['cost']:.2f} m" if other["metric"] in _BY_COSTS else ""
         length = f"{other['length_m']:.2f} m{cost} ({other['metric']})"
         lines.append(f"route {number:<4} {length}{shared}{rooms}")

@@ -118,7 +118,7 @@ def _is_cold(job: str) -> bool:
 
     if _is_kept(decimation.KERNEL):
         return False
-    home = {"mesh": "search.mesh.search", "jumps": "search.octile.search"}.get(
+    home = {"mesh": "search.mesh.search", "jumps": "search.octile.jumps"}.get(
         job, "search.grid_search"
     )
     return not _is_kept(import_module(f"hybridnav.{home}").KERNEL)

@@ -1,5 +1,4 @@
 from . import (
-    classes as classes,
     fleet as fleet,
     graphs as graphs,
     live as live,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.maps.kernels.geometry import (
+from hybridnav.maps.kernels import (
     centres,
     least_along,
     passed_cells,

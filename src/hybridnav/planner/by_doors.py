@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanResult
-    from hybridnav.planner.guide.legs import Leg
+    from hybridnav.planner.guide.bends import Leg
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
     from hybridnav.route import DoorGraph, DoorRoute
@@ -60,8 +60,6 @@ class Track:
         A solved tour of one plan.
     near_m
         Distance up to which two paths count as one, in metres.
-    by_legs
-        Whether legs between the same two doors of one room are common, wherever they pass.
     costs
         The map and the costs of its cells, by which the tour was planned: then shares are of its
         cost. None for lengths.
@@ -72,10 +70,9 @@ class Track:
         tour: Tour,
         near_m: float,
         *,
-        by_legs: bool = True,
         costs: tuple[OccupancyGrid, CostLayer] | None = None,
     ) -> None:
-        self._by_legs, self._costs = by_legs, costs
+        self._costs = costs
         path = tour.results[0].path
         assert path is not None  # noqa: S101 - the tour is solved
         points = path.points if len(path.points) > 1 else path.points.repeat(2, axis=0)
@@ -90,12 +87,12 @@ class Track:
         """Return the share of this path that it has in common with another one, from 0 to 1: of its
         length, or of its cost.
 
-        That is what lies near the other path, and, unless rooms are looked into, the whole of each
-        leg between the same two doors of one room.
+        That is what lies near the other path, and the whole of each leg between the same two doors
+        of one room.
         """
         if self.cost_m <= 0:
             return 1.0
-        known = set(other._keys) if self._by_legs else set()
+        known = set(other._keys)
         begin, common_m, apart = 0.0, 0.0, []
         for key, length_m in zip(self._keys, self._lengths_m, strict=True):
             end = begin + length_m
@@ -221,16 +218,6 @@ class DoorTours:
         layer = self._planner.costs
         costs = None if layer is None else (self._planner.grid, layer)
         return Track(tour, self.near_m, costs=costs)
-
-    def closed_round(self, tour: Tour) -> LongArray | None:
-        """Return the cells that are closed so that only the doors of a tour lead on.
-
-        Those closed for the query are among them. The result is None if an endpoint would be.
-        """
-        path = tour.results[0].path
-        assert path is not None  # noqa: S101 - the tour is solved
-        vertices, arcs, _ = self._route_finder.crossings(path.cells)
-        return self._closed_round(vertices, arcs)
 
     def _closed_round(self, vertices: Sequence[int], arcs: Sequence[int]) -> LongArray | None:
         """Return the cells that leave some arcs as the only ones between some rooms.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, get_args
@@ -34,16 +33,6 @@ if TYPE_CHECKING:
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
 """Folders of presets: inside an installed package, or beside `src` in a checkout."""
-
-
-_OLD_NAMES = {
-    "ompl-rrtconnect": "RRTConnect",
-    "ompl-rrtstar": "RRTstar",
-    "ompl-informed-rrtstar": "InformedRRTstar",
-    "ompl-bitstar": "BITstar",
-    "ompl-prmstar": "PRMstar",
-}
-"""Presets of earlier versions, which were `ompl` with one of OMPL's planners each."""
 
 
 _Limit = Annotated[float, BeforeValidator(no_boolean), Field(gt=0, allow_inf_nan=False)]
@@ -163,8 +152,7 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     ----------
     source
         Name of a preset that comes with the package, or a path to a YAML file: anything with a
-        suffix or a separator is a path. A `Preset` stays as it is. Names of earlier versions, as
-        `ompl-bitstar`, still work, with a warning that states what to write instead.
+        suffix or a separator is a path. A `Preset` stays as it is.
     overrides
         Settings that win over the file, each `section.key=value`, the value in YAML; checked
         together.
@@ -187,12 +175,8 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     >>> preset.planner.turning_radius_m
     0.5
     """
-    is_gone = not isinstance(source, Preset) and os.fspath(source) == "portals"
-    found = "octile" if is_gone else source
-    preset = found if isinstance(found, Preset) else _renamed(found) or _read(_find(found))
+    preset = source if isinstance(source, Preset) else _read(_find(source))
     tree, given = preset.model_dump(), list(overrides)
-    if is_gone:  # the section takes another one for it, by all of its settings
-        tree["planner"]["coarse"] = "portals"
     for override in given:
         _apply(tree, override)
     method = method_of(tree["planner"])
@@ -202,22 +186,7 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
         keys = {*stated, *SECTIONS[method].model_fields}
         tree["planner"] = {key: one for key, one in tree["planner"].items() if key in keys}
     # All at once, for some keys go only together.
-    return _checked(tree, where="setting ") if given or is_gone else preset
-
-
-def _renamed(source: PathLike) -> Preset | None:
-    """Return what a name of earlier versions stands for, under that name; None for others."""
-    name = os.fspath(source)
-    if name not in _OLD_NAMES:
-        return None
-    setting = f"planner.ompl.planner={_OLD_NAMES[name]}"
-    warnings.warn(
-        f"preset {name} is now ompl with one setting: write --preset ompl --set {setting}, or "
-        f'load_preset("ompl", overrides=["{setting}"])',
-        FutureWarning,
-        stacklevel=3,
-    )
-    return load_preset("ompl", overrides=[setting]).model_copy(update={"name": name})
+    return _checked(tree, where="setting ") if given else preset
 
 
 def _read(path: Path) -> Preset:

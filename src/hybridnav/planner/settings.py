@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -245,14 +244,6 @@ class CheapestSettings(_ByCosts):
     keep_within: Annotated[_Float, Field(ge=0, le=1e3)] = 0.02
     """Most that a kept path may cost more than a new one, a share; see `HybridPlanner.plan`."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _without_epsilon(cls, given: Any) -> Any:
-        if isinstance(given, dict) and given.get("epsilon") is not None:
-            gone = "planner.epsilon is gone from method cheapest: result.gap says what is proved"
-            warnings.warn(gone, FutureWarning, stacklevel=2)
-        return {key: given[key] for key in given if key != "epsilon"}
-
 
 class _Refined(_ByCosts):
     refine: Annotated[str, AfterValidator(_class_name)] = "grid-astar"
@@ -367,24 +358,6 @@ SECTIONS: dict[str, type[PlannerSettings]] = {
 """The class of each method's section, by its tag."""
 METHODS = tuple(name for name in SECTIONS if name != "own")
 """Names of the methods of the package."""
-_OLD_METHODS = {
-    "max-distance": "paper",
-    "mesh": "shortest",
-    "jumps": "octile",
-    "overlay": "cheapest",
-    "none": "grid-astar",
-}
-"""Values of `coarse` in files of earlier versions, and the methods that they are now."""
-_OLD_DEFAULTS = {
-    "corridor": "route",
-    "ompl": None,
-    "epsilon": None,
-    "budget_s": None,
-    "smooth": "none",
-    "turning_radius_m": 0.3,
-    "costs": None,
-}
-"""What keys of such files may say where the method has no such key."""
 
 
 def method_of(given: Any) -> str:
@@ -398,43 +371,13 @@ def method_of(given: Any) -> str:
     return "own" if ":" in method else method
 
 
-def _translated(given: Any) -> Any:
-    """Return the section of an earlier version, with keys `coarse` and `refine`, as one of today;
-    others as they are."""
-    if not isinstance(given, dict):
-        return given
-    section, now = dict(given), given.get("method", "paper")
-    refine = "ompl" if now == "ompl" else given.get("refine")
-    if "coarse" not in given and (now == "ompl" or refine not in ("none", "ompl")):
-        return given
-    unstated = next((old for old, new in _OLD_METHODS.items() if new == now), "max-distance")
-    coarse = section.pop("coarse", unstated)
-    if coarse == "portals":  # which are gone: what plans the same or better paths
-        by_costs = given.get("costs") or given.get("smooth") == "arcs"
-        coarse = "mesh" if refine == "ompl" else "overlay" if by_costs else "jumps"
-        if coarse == "jumps":  # which need no epsilon: their paths are the shortest
-            section.pop("epsilon", None)
-    if not isinstance(coarse, str) or coarse not in _OLD_METHODS:
-        known = ", ".join(METHODS)
-        raise PydanticCustomError(
-            "gone", "coarse is gone: write method, one of {of}", {"of": known}
-        )
-    method = _OLD_METHODS[coarse]
-    if refine == "ompl":
-        section["along"] = method if method in {"shortest", "paper"} else "grid-astar"
-        method = "ompl"
-    section["method"], keys = method, SECTIONS[method].model_fields
-    if "refine" in section and ("refine" not in keys or refine == "none"):
-        del section["refine"]
-    if section.get("ompl", section) is None:
-        del section["ompl"]
-    idle = [key for key, one in _OLD_DEFAULTS.items() if section.get(key, _OLD_DEFAULTS) == one]
-    section = {key: one for key, one in section.items() if key in keys or key not in idle}
-    text = f"planner.coarse and planner.refine are gone: write planner.method: {method}"
-    if given.get("coarse") == "portals":
-        text = f"portals are gone, method: {method} plans instead: write that"
-    warnings.warn(text, FutureWarning, stacklevel=2)
-    return section
+def _without_coarse(given: Any) -> Any:
+    """Refuse the key by which files once chose the method: its place in the message is a method's,
+    so that of an unknown key says too little."""
+    if isinstance(given, dict) and "coarse" in given:
+        known = {"of": ", ".join(METHODS)}
+        raise PydanticCustomError("gone", "coarse is gone: write method, one of {of}", known)
+    return given
 
 
 AnyMethod = Annotated[
@@ -446,5 +389,5 @@ AnyMethod = Annotated[
     | Annotated[OmplPlannerSettings, Tag("ompl")]
     | Annotated[OwnSettings, Tag("own")],
     Discriminator(method_of),
-    BeforeValidator(_translated),
+    BeforeValidator(_without_coarse),
 ]

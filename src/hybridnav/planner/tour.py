@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.planner import Metric, PlanResult
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.guide import Instruction
-    from hybridnav.planner.guide.legs import Leg
+    from hybridnav.planner.guide.bends import Leg
     from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.planning import Smooth

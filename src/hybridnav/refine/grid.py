@@ -14,7 +14,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.kernels import line_of_sight as kernels
-from hybridnav.refine.kernels.segments import apart, clear_segments, reaches, shared
+from hybridnav.refine.kernels.line_of_sight import apart, clear_segments, reaches, shared
 from hybridnav.refine.kernels.taut import marks_of
 from hybridnav.search.grid_search import Cell, GridSearch
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav.planner import Tour
     from hybridnav.planner.alternatives import Alternatives
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.guide.legs import Leg
+    from hybridnav.planner.guide.bends import Leg
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry

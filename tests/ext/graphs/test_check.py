@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.graphs import BUILDING_KINDS, KINDS, SEVERITIES, Finding
-from hybridnav.ext.graphs.findings import Findings
+from hybridnav.ext.graphs.gather import Findings
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.ext.graphs import build_lane_graph
-from hybridnav.ext.graphs.kernels.thinning import spread, thinned
+from hybridnav.ext.graphs.kernels import spread, thinned
 from hybridnav.ext.graphs.waypoint_graph import components_of
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of

@@ -82,22 +82,13 @@ def test_a_model_with_portals_is_to_be_built_anew(tmp_path: Path) -> None:
     assert "no planner uses portals any more: build the model anew" in refusal(path)
 
 
-def test_a_model_of_an_earlier_version_has_the_settings_of_now(
+def test_a_model_with_settings_that_are_gone_is_to_be_built_anew(
     content: bytes, tmp_path: Path
 ) -> None:
-    """No warning: nobody can write these settings anew."""
-    old: dict[str, Any] = {
-        "coarse": "jumps",
-        "corridor": "route",
-        "refine": "none",
-        "ompl": None,
-        "epsilon": None,
-    }
-    old |= {"smooth": "line-of-sight", "turning_radius_m": 0.3, "costs": None, "budget_s": None}
     path = tmp_path / "m.hnm"
+    old = {"coarse": "jumps", "refine": "none"}
     path.write_bytes(altered(content, put("preset", "values", "planner", to=old)))
-    first = hn.load(path).presets[0].planner
-    assert (first.method, first.smooth) == ("octile", "line-of-sight")
+    assert "coarse is gone" in refusal(path)
 
 
 def test_the_files_of_these_tests_are_sound(content: bytes, tmp_path: Path) -> None:

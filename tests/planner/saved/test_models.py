@@ -17,7 +17,7 @@ from benchmarks.worlds import figure1_world
 from hybridnav.planner.saved import structures
 from hybridnav.pyramid.record import Record
 from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.search.octile.build import JumpGraph
+from hybridnav.search.octile.jumps import JumpGraph
 from tests.product.test_copies import assert_alike, kernels
 from tests.strategies import Scene, examples, scenes
 

@@ -11,8 +11,7 @@ from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
-from hybridnav.ext.graphs.findings import Findings
-from hybridnav.ext.graphs.gather import shown
+from hybridnav.ext.graphs.gather import Findings, shown
 from hybridnav.ext.graphs.waypoint_graph import (
     add_one_way,
     components_of,
@@ -23,7 +22,7 @@ from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import LongArray
-    from hybridnav.ext.graphs.findings import Finding
+    from hybridnav.ext.graphs.gather import Finding
 
 
 @dataclass(frozen=True, eq=False)

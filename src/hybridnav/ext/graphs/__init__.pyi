@@ -1,6 +1,6 @@
 from .build import build_route_graph as build_route_graph
 from .check import GraphCheck as GraphCheck, check_graph as check_graph
-from .findings import (
+from .gather import (
     BUILDING_KINDS as BUILDING_KINDS,
     Example as Example,
     Finding as Finding,
@@ -15,7 +15,7 @@ from .judge import (
 from .lane_graph import build_lane_graph as build_lane_graph
 from .lanes import keep_right as keep_right
 from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
-from .polylines import merge_bends as merge_bends
+from .lanes import merge_bends as merge_bends
 from .route_messages import route_messages as route_messages
 from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
 from .files import (

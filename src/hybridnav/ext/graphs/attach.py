@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
-from hybridnav.ext.graphs.kernels.edges import routes
+from hybridnav.ext.graphs.kernels import routes
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree

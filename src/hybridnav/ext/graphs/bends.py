@@ -10,7 +10,7 @@ import numpy as np
 from hybridnav._base.trig import sines_and_cosines
 from hybridnav.ext.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.ext.graphs.judge import RIM_CELLS, checked_position
-from hybridnav.ext.graphs.kernels.edges import log_uniform
+from hybridnav.ext.graphs.kernels import log_uniform
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
 

@@ -18,7 +18,7 @@ from hybridnav.ext.graphs.bends import (
     bends_of,
 )
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, RIM_CELLS, FreeSpace
-from hybridnav.ext.graphs.kernels.edges import spanner
+from hybridnav.ext.graphs.kernels import spanner
 from hybridnav.ext.graphs.lanes import described
 from hybridnav.ext.graphs.waypoint_graph import components_of
 from hybridnav.maps.checks import checked_between, checked_type

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
-from hybridnav.ext.graphs.kernels.edges import least_along
+from hybridnav.ext.graphs.kernels import least_along
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

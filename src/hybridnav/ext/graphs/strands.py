@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from hybridnav.ext.graphs.kernels.thinning import spread, thinned
+from hybridnav.ext.graphs.kernels import spread, thinned
 from hybridnav.ext.graphs.segments import turn_of
 from hybridnav.maps.clearance import clearance_cells
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.findings import Finding, Findings
+    from hybridnav.ext.graphs.gather import Finding, Findings
     from hybridnav.maps import OccupancyGrid
 
 Name = int | str

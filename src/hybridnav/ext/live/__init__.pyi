@@ -4,7 +4,7 @@ from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
 from .regions import OnlineRegions as OnlineRegions, RegionsUpdate as RegionsUpdate
 from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay
 from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdate
-from .rooms_doors import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
+from .rooms_window import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
 from .identities import CarriedCosts as CarriedCosts, Flips as Flips, carry_costs as carry_costs
 from .tiles import NO_PLACE as NO_PLACE
 from .files import (

@@ -13,8 +13,15 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.identities import placed, shift_of
-from hybridnav.ext.live.rooms_doors import DoorEvents, OnlineDoor, doors_of, follow_doors
-from hybridnav.ext.live.rooms_window import RoomCells, beside_rooms, renew
+from hybridnav.ext.live.rooms_window import (
+    DoorEvents,
+    OnlineDoor,
+    RoomCells,
+    beside_rooms,
+    doors_of,
+    follow_doors,
+    renew,
+)
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names

@@ -278,16 +278,10 @@ class PagePlanning:
         return []
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
-        """Return some routes that differ for people."""
+        """Return some routes by other doors."""
         start, goal = self._points(query)
-        found = plan_alternatives(
-            self.planner(query.preset),
-            start,
-            goal,
-            query.count,
-            by=query.by,
-            blocked=self._closed(query),
-        )
+        planner, closed = self.planner(query.preset), self._closed(query)
+        found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
             | self._itinerary(each.tour)

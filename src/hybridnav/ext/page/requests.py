@@ -79,10 +79,9 @@ class PlanQuery(PathQuery):
 
 
 class AlternativesQuery(PathQuery):
-    """Some routes between two points; `by` counts on one map, over floors they differ by links."""
+    """Some routes between two points: by other doors, over floors by other links."""
 
     count: Annotated[int, Field(ge=2, le=5)] = 3
-    by: Literal["doors", "homotopy"] = "doors"
 
 
 class PartQuery(PathQuery):

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.costs.kernels.integral import legal_cost, line_cost, segment_cost
+from hybridnav.maps.costs.kernels import legal_cost, line_cost, segment_cost
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -1,16 +1,17 @@
-"""The line that a person walks, and its bends."""
+"""The line that a person walks: its legs, one inside each room, and its bends."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.poses import wrapped
 from hybridnav._base.trig import atan2, directions
+from hybridnav.planner.guide import Space
 from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
 
 if TYPE_CHECKING:
@@ -18,6 +19,47 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.planner import Path
+    from hybridnav.planner.guide.instruction import Shape
+    from hybridnav.topology.rooms import Door
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The part of a path inside one room."""
+
+    room: str | None
+    """Name of the room, None outside rooms."""
+    length_m: float
+    door: Door | None = None
+    """The door at the end of the leg; None on the last leg, and at a boundary that is no door (to
+    or from unexplored cells)."""
+    waypoint: str | None = None
+    """Waypoint at the end of the leg: its name or its coordinates."""
+    endpoint: tuple[float, float] = (0.0, 0.0)
+    """Point where it ends, `(x, y)` in metres, map frame."""
+    shape: Shape = "room"
+    """Shape of the space outside rooms."""
+
+    @property
+    def space(self) -> Space:
+        """The room, or the space outside rooms by its shape."""
+        return Space(self.room, "room" if self.room is not None else self.shape)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plain values for JSON."""
+        return {
+            "room": self.room,
+            "length_m": self.length_m,
+            "door": None if self.door is None else self.door.number,
+            "door_kind": None if self.door is None else self.door.kind,
+            "door_width_m": None if self.door is None else self.door.width_m,
+            "door_m": None if self.door is None else list(self.door.position),
+            "waypoint": self.waypoint,
+        }
+
+
+# The line that a person walks, and its bends.
+
 
 LEAST_SLIGHT_RAD = math.radians(35.0)
 """Turn from which a slight bend counts: several that nobody tells lead elsewhere."""

@@ -16,10 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav.planner.guide import Space
-    from hybridnav.planner.guide.bends import Bend, Line
+    from hybridnav.planner.guide.bends import Bend, Leg, Line
     from hybridnav.planner.guide.instruction import Kind
     from hybridnav.planner.guide.landmarks import Landmarks
-    from hybridnav.planner.guide.legs import Leg
     from hybridnav.topology.rooms import Door
 
 _SLIVER_M = 1.0

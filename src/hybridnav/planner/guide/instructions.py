@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 
     from hybridnav.planner import Path
     from hybridnav.planner.guide import Landmark, Passed
-    from hybridnav.planner.guide.bends import Bend
+    from hybridnav.planner.guide.bends import Bend, Leg
     from hybridnav.planner.guide.events import Event, Stretch
     from hybridnav.planner.guide.instruction import Hand
     from hybridnav.planner.guide.landmarks import Landmarks
-    from hybridnav.planner.guide.legs import Leg
 
 _NEAR_EXIT_M = 4.0
 """Distance of the first door up to which a start needs no landmark."""

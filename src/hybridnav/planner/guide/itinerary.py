@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
-from hybridnav.planner.guide.legs import Leg
 from hybridnav.route import RouteFinder
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -277,7 +276,4 @@ def preset_of(filed: FiledPart) -> Preset:
         When it is not valid.
     """
     PRESET.check_version(filed)
-    with warnings.catch_warnings():
-        # Nobody can write the settings of an older model anew.
-        warnings.simplefilter("ignore", FutureWarning)
-        return values_of(Preset, filed)
+    return values_of(Preset, filed)

@@ -1,9 +1,9 @@
 from .bound import cost_bound as cost_bound
-from .build import (
+from .lattice import (
     Lattice as Lattice,
     build_lattice as build_lattice,
 )
-from .search import (
+from .lattice import (
     LatticeLine as LatticeLine,
     LatticeSearch as LatticeSearch,
 )

@@ -11,6 +11,6 @@ from .cut import (
     shortest_paths as shortest_paths,
 )
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
-from .trace import SearchTrace as SearchTrace, trace_search as trace_search
+from .search import SearchTrace as SearchTrace, trace_search as trace_search
 
 __all__: list[str]

@@ -1,9 +1,9 @@
-from .build import (
+from .jumps import (
     JumpGraph as JumpGraph,
     build_jump_graph as build_jump_graph,
     contract_graph as contract_graph,
 )
-from .search import (
+from .jumps import (
     JumpPath as JumpPath,
     JumpPaths as JumpPaths,
     JumpSearch as JumpSearch,

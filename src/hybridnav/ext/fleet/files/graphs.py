@@ -1,13 +1,22 @@
-"""Files of graphs with several floors, whoever has made them."""
+"""Graphs of several floors: their files, whoever has made them, and those of our maps."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from hybridnav._base.copies import frozen
 from hybridnav._base.files import printable
+from hybridnav._base.progress import no_progress
 from hybridnav._base.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
+from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph
+from hybridnav.ext.fleet.link_nodes import Stub, node_at, with_stubs
+from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_lane_graph
+from hybridnav.ext.graphs.attach import Network, placed_points
 from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
 from hybridnav.ext.graphs.files import json_graphs as graph_json
 from hybridnav.ext.graphs.files.lif import is_lif, read_lif
@@ -15,12 +24,20 @@ from hybridnav.ext.graphs.files.osm_read import read_osm
 from hybridnav.ext.graphs.files.osm_xml import is_osm
 from hybridnav.ext.graphs.files.rmf_editor import is_drawn, read_drawn
 from hybridnav.ext.graphs.files.rmf_read import is_rmf, read_rmf
+from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
+from hybridnav.maps.checks import checked_type
+from hybridnav.refine import Sight
+from hybridnav.topology import TopologicalMap
+from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet import BuildingGraph
-    from hybridnav.ext.graphs import WaypointGraph
+    from hybridnav.ext.fleet import Link
     from hybridnav.ext.graphs.files.osm_xml import Anchor
+    from hybridnav.topology.rooms import Door, Rooms
 
 
 _MOST_XML = 2**26
@@ -130,3 +147,233 @@ def floors_of_text(text: str, suffix: str, where: str, name: str) -> BuildingGra
     if suffix in JSON and is_lif(text):
         return read_lif(text, where, name)
     return None
+
+
+# The graph of a floor as its map has it: nodes, doors, rooms, and the ends of links.
+
+
+def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
+    topology: TopologicalMap,
+    graph: RouteGraph,
+    *,
+    name: str,
+    elevation_m: float | None = None,
+    links: Sequence[Link] = (),
+    tolerance_m: float = 0.05,
+) -> FloorGraph:
+    """Return the graph of a floor with all that its map knows, for `BuildingGraph`.
+
+    Parameters
+    ----------
+    topology
+        The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
+        have it as `door_name`, and the floor has areas, and the listed doors and openings that an
+        edge passes: none that are closed to the robot, or lead nowhere. They are called
+        "FLOOR_doorNUMBER" and "FLOOR_openingNUMBER".
+    graph
+        Its route graph, as `build_lane_graph`, `build_route_graph` and `keep_right` make it.
+    name
+        Name of the floor.
+    elevation_m
+        Its height in metres; None if it is not known.
+    links
+        Links of the building. Their ends on this floor become nodes, joined to the nearest node in
+        sight.
+    tolerance_m
+        How far outlines of rooms may lie from the steps of the cells, in metres, as in
+        `save_rooms`.
+
+    Returns
+    -------
+    FloorGraph
+        The outline of a room is that of its largest part, without holes.
+
+    Raises
+    ------
+    InvalidValueError
+        When the graph is of another map, the tolerance is not positive and finite, or an end of a
+        link is not free or sees no node.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> from hybridnav.ext.fleet import floor_graph
+    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
+    >>> floor = floor_graph(topology, build_route_graph(topology), name="1")
+    >>> floor.graph.n_nodes > 2, floor.doors
+    (True, ())
+    """
+    checked_type("topology", topology, TopologicalMap)
+    checked_type("graph", graph, RouteGraph)
+    if graph.grid is not topology.grid:
+        raise InvalidValueError(
+            f"the graph is of map {graph.grid.name!r:.60}, expected one of the topological map's"
+        )
+    if not 0 < tolerance_m < math.inf:
+        raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
+    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    passed = {number for numbers in graph.edge_doors for number in numbers}
+    listed = () if rooms is None else rooms.listed_doors
+    doors = [door for door in listed if door.number in passed]
+    plain = _plain(graph, {d.number: _named(d, name) for d in doors if not d.is_opening})
+    stubs = _stubs(graph, plain, name, links)
+    return FloorGraph(
+        name=name,
+        graph=with_stubs(plain, stubs) if stubs else plain,
+        elevation_m=elevation_m,
+        doors=() if rooms is None else tuple(_lines(rooms, doors, name)),
+        areas=() if rooms is None else tuple(_areas(rooms, tolerance_m)),
+    )
+
+
+def building_graph(
+    building: Building,
+    *,
+    name: str = "building",
+    build: Callable[[TopologicalMap], RouteGraph] = build_lane_graph,
+    progress: Progress = no_progress,
+) -> BuildingGraph:
+    """Return the graph of a building: a route graph of each floor, and the links between them.
+
+    Parameters
+    ----------
+    building
+        The building. Links that its robot does not fit in are left out.
+    name
+        Name of the building in files.
+    build
+        Makes the route graph of a floor, as `build_lane_graph` and `build_route_graph` do.
+    progress
+        Called after each floor with the number of floors done and of all floors.
+
+    Returns
+    -------
+    BuildingGraph
+        Each floor in the frame of its own map; `align_floors` brings them into one.
+
+    Raises
+    ------
+    InvalidValueError
+        As `build` and `floor_graph` do.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, building_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
+    >>> graph = building_graph(house)
+    >>> [floor.name for floor in graph.floors], [link.name for link in graph.links]
+    (['1', '2'], ['lift'])
+    """
+    checked_type("building", building, Building)
+    radius_m = building.robot_radius_m
+    links = tuple(link for link in building.links if link.admits(radius_m, stairs=True))
+    floors = []
+    for number, floor in enumerate(building.floors, start=1):
+        topology = floor.planner.topology
+        graph = build(topology)
+        height = floor.elevation_m
+        floors.append(
+            floor_graph(topology, graph, name=floor.name, elevation_m=height, links=links)
+        )
+        progress(number, len(building.floors))
+    return BuildingGraph(name=name, floors=tuple(floors), links=links)
+
+
+def _named(door: Door, floor: str) -> str:
+    return f"{floor}_{door.kind}{door.number}"
+
+
+def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
+    """Return a route graph with its facts; a room has its name at its first node."""
+    nodes: dict[int, dict[str, Any]] = {}
+    named: set[str] = set()
+    for node in range(graph.n_nodes):
+        nodes[node] = {"metadata": node_metadata(graph, node)}
+        room = graph.rooms[node]
+        if graph.kinds[node] == "room" and room is not None and room not in named:
+            named.add(room)
+            nodes[node]["name"] = room
+    edges: dict[int, dict[str, Any]] = {}
+    for edge, passed in enumerate(graph.edge_doors):
+        edges[edge] = {"metadata": edge_metadata(graph, [edge])}
+        known = [door_names[number] for number in passed if number in door_names]
+        if known:
+            edges[edge]["door_name"] = known[0]
+    return WaypointGraph(
+        name=graph.grid.name,
+        format="hybridnav",
+        frame="",
+        names=tuple(range(graph.n_nodes)),
+        points=graph.points,
+        edge_names=(None,) * graph.n_edges,
+        edges=graph.edges,
+        costs=graph.lengths_m,
+        node_facts=nodes,
+        edge_facts=edges,
+    )
+
+
+def _stubs(
+    graph: RouteGraph, plain: WaypointGraph, floor: str, links: Sequence[Link]
+) -> list[Stub]:
+    """Return the ends of links that are no nodes, with the nearest nodes that they see."""
+    ends = [(link.name, end.position_m) for link in links if (end := link.end_on(floor))]
+    ends = [(name, end) for name, end in ends if node_at(plain, end) is None]
+    if not ends:
+        return []
+    grid = graph.grid
+    free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
+    points = np.array([end for _, end in ends], dtype=np.float64)
+    positions, _, is_free = placed_points(points, grid, free)
+    for (name, (x, y)), can_stand in zip(ends, is_free.tolist(), strict=True):
+        if not can_stand:
+            raise InvalidValueError(
+                f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} is not free for "
+                f"a robot radius of {grid.robot_radius_m:g} m: move it"
+            )
+    network = Network.of(Sight(free), graph.positions, graph.edges)
+    offsets, nodes, _ = network.in_sight(positions)
+    stubs = []
+    for at, (name, (x, y)) in enumerate(ends):
+        if offsets[at] == offsets[at + 1]:
+            if outside_of(grid)[grid.frame.cell_of(x, y)]:
+                raise InvalidValueError(
+                    f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} lies on "
+                    "free ground outside the building, which no door joins with it: move it"
+                )
+            raise InvalidValueError(
+                f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} sees no node of "
+                "the graph: move it, or build the graph with more nodes"
+            )
+        stubs.append((name, (x, y), int(nodes[offsets[at]])))
+    return stubs
+
+
+def _lines(rooms: Rooms, doors: list[Door], floor: str) -> list[DoorLine]:
+    return [
+        DoorLine(_named(door, floor), rooms.door_ends(door.number), door.rooms, door.is_opening)
+        for door in doors
+    ]
+
+
+def _areas(rooms: Rooms, tolerance_m: float) -> list[FloorArea]:
+    """Return the outline of the largest part of each room."""
+    import shapely  # noqa: PLC0415 - rooms alone need it
+
+    from hybridnav.topology.rooms.files.entries import Read  # noqa: PLC0415
+    from hybridnav.topology.rooms.files.outlines import Outlines  # noqa: PLC0415 - loads scipy
+    from hybridnav.topology.rooms.files.read import check_rooms  # noqa: PLC0415
+
+    check_rooms(
+        Read(f"map {rooms.grid.name}", list(rooms.names)), rooms.labels.label_of, rooms.grid
+    )
+    outlines = Outlines(rooms.labels.label_of, len(rooms.names), rooms.grid).within(tolerance_m)
+    areas = []
+    for name, rings in zip(rooms.names, outlines, strict=True):
+        largest = max(rings, key=lambda ring: shapely.Polygon(ring).area)
+        areas.append(FloorArea(name, "room", frozen(np.ascontiguousarray(largest))))
+    return areas

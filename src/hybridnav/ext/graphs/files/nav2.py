@@ -12,7 +12,7 @@ from hybridnav._base.files import NewFile
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs import RouteGraph, WaypointGraph
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
-from hybridnav.ext.graphs.polylines import edge_metadata, node_metadata
+from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:

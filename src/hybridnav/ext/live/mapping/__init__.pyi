@@ -1,5 +1,5 @@
 from .mapper import Mapper as Mapper
-from .models import LaserModel as LaserModel, SonarModel as SonarModel
+from .sensors import LaserModel as LaserModel, SonarModel as SonarModel
 from .scans import LaserScan as LaserScan, SonarScan as SonarScan, sonar_ring as sonar_ring
 from .sensors import SimulatedLaser as SimulatedLaser, SimulatedSonars as SimulatedSonars
 from .scans import ScanSequence as ScanSequence

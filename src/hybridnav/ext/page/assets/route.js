@@ -188,7 +188,7 @@ export class Routes {
       return;
     }
     this.page.say("Looking for routes…");
-    const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value), by: this.byId("by").value }));
+    const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value) }));
     if (!found) return;
     if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
     this.show();

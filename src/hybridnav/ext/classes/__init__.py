@@ -1,5 +1,0 @@
-"""Homotopy classes of routes and of paths, and shortest paths of different classes."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
