@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
-_AROUND = 0.12
-"""Height of titles and legends of two maps, as a share of the width of both."""
+_AROUND, _PANEL = 0.1, 0.46
+"""Height of titles and legends of two maps, and width of each, as shares of the whole width."""
 DOOR_POINTS = 1.2
 """Half the side of a door's dot."""
 
@@ -151,9 +151,9 @@ def plot_rooms_beside(
     """
     sizes = [known_view(each.grid).size for each in (old, new)]
     height = max(float(high / wide) for wide, high in sizes)
-    figure = new_figure(width_in, min(MAX_HEIGHT, height) / 2 + _AROUND)
+    figure = new_figure(width_in, _AROUND + _PANEL * min(MAX_HEIGHT, height))
     axes = figure.subplots(1, 2)
-    figure.subplots_adjust(left=0.04, right=0.99, bottom=0.22, top=0.9, wspace=0.1)
+    figure.subplots_adjust(left=0.04, right=0.99, bottom=0.17, top=0.94, wspace=0.1)
     for ax, each in zip(axes, (old, new), strict=True):
         plot_rooms(each, ax=ax)
     right: Axes = axes[1]

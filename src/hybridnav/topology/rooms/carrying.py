@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 NUMBERED = re.compile(r"room-([1-9][0-9]{0,8})")
 """Names of rooms that nobody has named."""
-Overlap = tuple[int, int, int]
+Overlap = tuple[int, int, float]
 """An old room or place, a new one or -1 for none, and the cells that they have in common."""
 _VISIBLE = 0.25
 """Least share of an old room's cells that the new map has to know: else the room is lost."""
@@ -48,7 +48,7 @@ _FEWEST_POINTS = 20
 """Fewest points by which it is measured; other rooms move as all do."""
 _NEAR_ROOMS = 5
 """Rooms around one, and the room itself, whose median drift is a second start for its own."""
-_HALF = 0.5
+_TINY_M2 = 1e-9
 _SURE_DOOR_M = 0.5
 """How far a door may lie from an old one whose room on one side alone is carried."""
 _MOST_CELLS = 400_000
@@ -64,7 +64,7 @@ class Heirs(NamedTuple):
     """The old place whose number each heir takes."""
 
 
-def heirs_of(found: Iterable[Overlap], areas: Mapping[int, int]) -> Heirs:
+def heirs_of(found: Iterable[Overlap], areas: Mapping[int, float]) -> Heirs:
     """Return the heirs of old places, of which the cells that they had are given.
 
     The heir of an old place is the new one that holds more than half of its cells. An heir of
@@ -101,8 +101,9 @@ class CarriedNames:
     """What became of the rooms and doors of a map on a later map of the same building."""
 
     labels: RoomLabels = field(repr=False)
-    """The rooms of the new map with the names, points and numbers that were carried; other rooms
-    are called `room-` and a number that neither map has, other doors have new numbers."""
+    """The rooms of the new map with the names, points and numbers that were carried. Other rooms
+    keep theirs, or become `room-` and a number that neither map has if an old room is called so;
+    other doors have new numbers."""
     transform: Transform | None
     """From the frame of the old map to that of the new one; None if none was found."""
     reason: str
@@ -182,9 +183,11 @@ def carry_names(
     if found.best is None:
         return _nothing(old, old_grid, new, found.reason)
     moving = _Moving.of(old, found.best, one, other)
-    rooms, heir_of = _rooms(old, new, _Overlap.of(old, new, moving, one, other))
-    doors, numbered, new_doors = _doors((old, old_grid), (new, new_grid), moving, heir_of)
+    overlap = _Overlap.of(old, new, moving, one, other)
+    heir_of = _heirs(overlap)
     names, new_rooms = _names(old, new, {heir: room for room, heir in heir_of.items()})
+    rooms = _rooms(old, new, overlap, heir_of, names)
+    doors, door_points, new_doors = _doors((old, old_grid), (new, new_grid), moving, heir_of)
     points = {name: moving.moved(at, old, old_grid) for name, at in old.points.items()}
     kept = {}
     for name, at in points.items():
@@ -193,7 +196,7 @@ def carry_names(
         if is_free.all() and is_free.size and (name not in old.names or room == name):
             kept[name] = at
     return CarriedNames(
-        RoomLabels(names, new.label_of, kept, numbered),
+        RoomLabels(names, new.label_of, kept, door_points),
         transform_of(found.best, one, other),
         "",
         MappingProxyType(rooms),
@@ -305,7 +308,8 @@ class _Overlap(NamedTuple):
         known = one.grid.measured[at] != CellClass.UNEXPLORED
         seen_new = np.bincount(rooms[inside][known], minlength=n_new) * cell_m2
         # Back without drift, a few cells more are known: a share is one at most.
-        return cls(both, area, seen, np.maximum(seen_new, both.sum(axis=0)))
+        most = np.maximum(seen_new, both.sum(axis=0))
+        return cls(*(each.astype(np.float64) for each in (both, area, seen, most)))
 
 
 def _cells(labels: RoomLabels, grid: OccupancyGrid) -> tuple[IntArray, FloatArray, float]:
@@ -326,36 +330,49 @@ def _inside(
     return (row[inside], col[inside]), inside
 
 
+def _heirs(overlap: _Overlap) -> dict[int, int]:
+    """Return the new room of each old one whose name is carried."""
+    is_shown = overlap.seen_old >= _VISIBLE * overlap.area_old
+    met = np.argwhere((overlap.both > 0) & is_shown[:, None]).tolist()
+    pairs = [(old, new, float(overlap.both[old, new])) for old, new in met]
+    heirs = heirs_of(pairs, dict(enumerate(overlap.seen_old.tolist())))
+    return {
+        old: new
+        for new, old in heirs.name.items()
+        if 2 * overlap.both[old, new] > overlap.seen_new[new]
+    }
+
+
 def _rooms(
-    old: RoomLabels, new: RoomLabels, overlap: _Overlap
-) -> tuple[dict[str, Carried], dict[int, int]]:
-    """Return what became of each old room, and the new one of those that are carried."""
+    old: RoomLabels,
+    new: RoomLabels,
+    overlap: _Overlap,
+    heir_of: Mapping[int, int],
+    names: tuple[str, ...],
+) -> dict[str, Carried]:
+    """Return what became of each old room; reasons call the new ones as the person will."""
     both, area, seen_old, seen_new = overlap
-    tiny = 1e-9
-    of_old = both / np.maximum(seen_old, tiny)[:, None]
-    of_new = both / np.maximum(seen_new, tiny)
+    of_old = both / np.maximum(seen_old, _TINY_M2)[:, None]
+    of_new = both / np.maximum(seen_new, _TINY_M2)
+    visible = seen_old / np.maximum(area, _TINY_M2)
     found: dict[str, Carried] = {}
-    heir_of: dict[int, int] = {}
     for room, name in enumerate(old.names):
-        best = int(both[room].argmax()) if both.shape[1] else NO_ROOM
-        visible = float(seen_old[room] / max(area[room], tiny))
-        if visible < _VISIBLE or best == NO_ROOM or of_old[room, best] < _REMAINS:
-            why = "not on the new map" if visible < _VISIBLE else "no new room has its cells"
+        most = int(both[room].argmax()) if both.shape[1] else NO_ROOM
+        if most == NO_ROOM or visible[room] < _VISIBLE or of_old[room, most] < _REMAINS:
+            unknown = visible[room] < _VISIBLE
+            why = "the new map does not show it" if unknown else "no new room lies there"
             found[name] = Carried(None, 0.0, "lost", why)
             continue
-        mine, its = float(of_old[room, best]), float(of_new[room, best])
+        mine, its = float(of_old[room, most]), float(of_new[room, most])
         confidence = round(min(mine, its), 3)
-        parts = [new.names[at] for at in np.flatnonzero(of_new[room] > _HALF).tolist()]
-        if min(mine, its) > _HALF:
-            found[name] = Carried(new.names[best], confidence, "carried")
-            heir_of[room] = best
-        elif len(parts) > 1:
-            why = f"divided into {', '.join(parts)}"
-            found[name] = Carried(None, confidence, "undecided", why)
-        else:
-            why = f"{mine:.0%} of it lie in {new.names[best]}, {its:.0%} of that in it"
-            found[name] = Carried(None, confidence, "undecided", why)
-    return found, heir_of
+        if room in heir_of:
+            found[name] = Carried(new.names[heir_of[room]], confidence, "carried")
+            continue
+        parts = [names[at] for at in np.flatnonzero(2 * both[room] > seen_new).tolist()]
+        why = f"{mine:.0%} of it lie in {names[most]}, {its:.0%} of that in it"
+        why = f"divided into {', '.join(parts)}" if len(parts) > 1 else why
+        found[name] = Carried(None, confidence, "undecided", why)
+    return found
 
 
 def _doors(
@@ -390,7 +407,7 @@ def _doors(
         off_m = float(np.hypot(*(after.sides[after.boundary_of == at] - known[number]).T).min())
         confidence = round((1 - off_m) * firm / 2, 3)
         if firm < 2 and (not firm or off_m > _SURE_DOOR_M):  # noqa: PLR2004 - both sides
-            why = f"the door {own[at]} there joins other rooms"
+            why = "the door there joins other rooms"
             found[number] = Carried(None, confidence, "undecided", why)
         else:
             found[number] = Carried(int(own[at]), confidence, "carried")
@@ -422,8 +439,8 @@ def _names(
         if at in room_of:
             names.append(old.names[room_of[at]])
             continue
-        fresh = NUMBERED.fullmatch(own) or own in old.names
-        names.append(f"room-{first}" if fresh else own)
-        first += bool(fresh)
+        is_taken = own in old.names
+        names.append(f"room-{first}" if is_taken else own)
+        first += is_taken
         others.append(names[-1])
     return tuple(names), tuple(others)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
@@ -14,7 +14,7 @@ from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.maps import CellClass
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
 
 _COARSE_M, _FINE_M = 0.2, 0.1
@@ -45,7 +45,6 @@ HIT_M = 0.15
 _KNOWN_M = 0.3
 """How far from known cells the walls of the other map count as seen."""
 _SAME_M, _SAME_RAD = 0.5, 0.05
-"""Candidates within both are one."""
 _USUAL_CHANCE = 0.4
 """Share of walls on walls at a wrong place of a large overlap: of other buildings, 0.3 to 0.5."""
 _LEAST_WALLS = 100
@@ -141,7 +140,7 @@ class Surface:
         key = (row / per).astype(np.int64) * cells.shape[1] + (col / per).astype(np.int64)
         _, of, n = np.unique(key, return_inverse=True, return_counts=True)
         sums = [np.bincount(of, each + 0.5, len(n)) / n for each in (row, col)]
-        return self.grid.frame.points_of_grid(np.stack(sums, axis=1)) - self.centre, n
+        return self.grid.frame.points_of_grid(np.stack(sums, axis=1)) - self.centre, n.astype(float)
 
     def pictures_of(self, side_m: float) -> Pictures:
         """Return the pixels of walls and free space; see `Pictures`."""
@@ -193,7 +192,7 @@ class Pictures(NamedTuple):
 
     def drawn(
         self, angle_rad: float, low: FloatArray, shape: tuple[int, int]
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[AnyArray, AnyArray]:
         """Return float32 images of the map turned about its centre: its walls, and what a wall of
         another map gains at each pixel."""
         walls, free = np.zeros((2, *shape), np.float32)
@@ -244,11 +243,11 @@ class Candidate(NamedTuple):
         return self.hits_m / self.seen_m if self.seen_m else 0.0
 
     def excess_m(self, chance: float) -> float:
-        """Return the length of walls on walls above that of chance."""
+        """Return the hits above those of chance."""
         return self.hits_m - chance * self.seen_m
 
     def is_like(self, other: Candidate) -> bool:
-        """Whether two candidates are one."""
+        """Whether two candidates are one: within half a metre and 0.05 rad."""
         turn = math.remainder(self.angle_rad - other.angle_rad, math.tau)
         away = float(np.abs(self.shift_m - other.shift_m).max())
         return abs(turn) < _SAME_RAD and away < _SAME_M
@@ -265,8 +264,7 @@ def register(one: Surface, other: Surface) -> Registration:
     Parameters
     ----------
     one, other
-        The maps, the older one first. Frames, sizes and resolutions may differ; no scale is
-        estimated.
+        The maps, the older one first. No scale is estimated.
 
     Returns
     -------
@@ -325,9 +323,9 @@ def _rotations(old: FloatArray, new: FloatArray, side_m: float) -> list[float]:
     return [math.pi * (at / _ANGLES + half) for at in best.tolist() for half in (0, 1)]
 
 
-def _blurred(array: FloatArray, axis: int, mode: str) -> FloatArray:
+def _blurred(array: AnyArray, axis: int, mode: Literal["constant", "wrap"]) -> AnyArray:
     """Return an array blurred over a pixel or so, by binomial weights along one axis."""
-    found: FloatArray = ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
+    found: AnyArray = ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
     return found
 
 
@@ -403,16 +401,12 @@ def refine(
 
     Parameters
     ----------
-    start
-        The candidate.
-    points
-        float64 (n, 2), walls of the old map.
-    field
-        Distances to those of the new one.
+    start, points, field
+        The candidate, walls of the old map, and distances to those of the new one.
     reaches_m
         Distances beyond which a wall has no partner, one after the other.
     turns
-        Whether the rotation changes too.
+        Whether to turn, too.
     """
     angle, shift = start.angle_rad, start.shift_m
     for reach in reaches_m:
