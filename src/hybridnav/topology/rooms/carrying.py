@@ -83,7 +83,14 @@ def heirs_of(found: Iterable[Overlap], areas: Mapping[int, float]) -> Heirs:
 
 @dataclass(frozen=True)
 class Carried:
-    """One room or door of the old map, and what became of it."""
+    """One room or door of the old map, and what became of it.
+
+    Examples
+    --------
+    >>> from hybridnav.topology.rooms import Carried
+    >>> Carried("room-7", 0.93, "carried").new
+    'room-7'
+    """
 
     new: str | int | None
     """The new room, by its name before names were carried, or the new door, by its number before;
@@ -98,7 +105,16 @@ class Carried:
 
 @dataclass(frozen=True, eq=False)
 class CarriedNames:
-    """What became of the rooms and doors of a map on a later map of the same building."""
+    """What became of the rooms and doors of a map on a later map of the same building.
+
+    Examples
+    --------
+    >>> from hybridnav.topology.rooms import carry_names
+    >>> grid = hn.OccupancyGrid(np.zeros((4, 8)), robot_radius_m=0)
+    >>> rooms = hn.RoomLabels(("hall",), np.zeros((4, 8), dtype=int))
+    >>> carry_names(rooms, grid, rooms, grid).reason
+    'the old map has too few walls to recognize it by'
+    """
 
     labels: RoomLabels = field(repr=False)
     """The rooms of the new map with the names, points and numbers that were carried. Other rooms
