@@ -219,11 +219,11 @@ def doors_to_carry(
 
     A new door is an old one if its middle lies within half a metre of it, on the old map, and one
     of its rooms has a name that a person carries there. It is not wrong to carry the number to one
-    whose boundary passes within a metre.
+    whose boundary passes within a metre, be it a gap: the door is shut.
     """
     found: dict[int, set[int]] = {}
     allowed: set[tuple[int, int]] = set()
-    others = [door for door in new.doors if not door.is_gap]
+    others = new.doors
     middles = pair.to_old(np.array([door.position for door in others]).reshape(-1, 2))
     ends = np.array([new.door_ends(door.number) for door in others]).reshape(-1, 2)
     lines = pair.to_old(ends).reshape(-1, 2, 2)
@@ -236,6 +236,7 @@ def doors_to_carry(
             along = np.clip(((at - one) @ (two - one)) / max((two - one) @ (two - one), 1e-9), 0, 1)
             if min(np.hypot(*(one + along * (two - one) - at)), np.hypot(*(middle - at))) < 1:
                 allowed.add((door.number, other.number))
-            if heirs & set(other.rooms) and np.hypot(*(middle - at)) < NEAR_M:
+            same = not other.is_gap and heirs & set(other.rooms)
+            if same and np.hypot(*(middle - at)) < NEAR_M:
                 found.setdefault(door.number, set()).add(other.number)
     return found, allowed

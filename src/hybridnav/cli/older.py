@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import UsageError, stage
+from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,16 +20,15 @@ _MOST_HEAD = 4096
 """Bytes of a file in which the image of a map is named."""
 
 
-def map_of(names_from: Path | None, names_map: Path | None) -> Path | None:
-    """Return the map of a file of rooms: the given one, or the only one in its folder."""
+def older_files(names_from: Path | None, names_map: Path | None) -> tuple[Path, Path] | None:
+    """Return a file of rooms and its map: the given one, or the only one in the folder; None
+    without a file."""
     if names_from is None:
         if names_map is not None:
             raise UsageError("--names-map is the map of --names-from: give both")
         return None
     if names_map is not None:
-        return names_map
-    if not names_from.is_file():
-        raise hn.errors.RoomsNotFoundError(f"rooms {printable(names_from)}: no such file")
+        return names_from, names_map
     found = []
     for path in sorted(names_from.absolute().parent.glob("*.yaml")):
         with path.open("rb") as file:
@@ -40,7 +39,7 @@ def map_of(names_from: Path | None, names_map: Path | None) -> Path | None:
             f"--names-from needs the map of these rooms, and their folder has {len(found)}: "
             "name it with --names-map OLD"
         )
-    return found[0]
+    return names_from, found[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,41 +53,25 @@ class Older:
     @classmethod
     def of(
         cls,
-        files: tuple[Path | None, Path | None],
-        reading: MapOptions,
-        labels: hn.RoomLabels,
-        grid: hn.OccupancyGrid,
-        seconds: dict[str, float],
-    ) -> Older | None:
-        """Read a file of rooms and its map, and carry the names; refuse a map that does not fit."""
-        rooms_file, map_file = files
-        if rooms_file is None or map_file is None:
-            return None
-        with stage("carrying names", seconds, "names"):
-            return cls._carried(rooms_file, map_file, reading, (labels, grid))
-
-    @classmethod
-    def _carried(
-        cls,
-        rooms_file: Path,
-        map_file: Path,
+        files: tuple[Path, Path],
         reading: MapOptions,
         new: tuple[hn.RoomLabels, hn.OccupancyGrid],
     ) -> Older:
+        """Read a file of rooms and its map, and carry the names; refuse a map that does not fit."""
         from hybridnav.topology.rooms import carry_names  # noqa: PLC0415 - loads numba
 
         before = hn.load_map(
-            map_file,
+            files[1],
             robot_radius_m=new[1].robot_radius_m,
             free_threshold=reading.free_threshold,
             occupied_threshold=reading.occupied_threshold,
             max_cells=reading.max_cells,
         )
-        rooms = hn.load_rooms(rooms_file, before)
+        rooms = hn.load_rooms(files[0], before)
         carried = carry_names(rooms, before, *new)
         if carried.transform is None:
             raise hn.errors.RoomsError(
-                f"rooms {printable(rooms_file)}: no name is carried from "
+                f"rooms {printable(files[0])}: no name is carried from "
                 f"{printable(before.name)} to {printable(new[1].name)}: {carried.reason}"
             )
         return cls(rooms, before, carried)
@@ -126,11 +109,10 @@ class Older:
         to = self.carried
         assert to.transform is not None  # noqa: S101 - `of` refuses it
         return {
-            "rotation_rad": to.transform.rotation_rad,
-            "translation_m": list(to.transform.translation_m),
+            **asdict(to.transform),
             "rooms": {name: asdict(one) for name, one in to.rooms.items()},
             "doors": {str(number): asdict(one) for number, one in to.doors.items()},
-            "new_rooms": list(to.new_rooms),
-            "new_doors": list(to.new_doors),
-            "lost_points": list(to.lost_points),
+            "new_rooms": to.new_rooms,
+            "new_doors": to.new_doors,
+            "lost_points": to.lost_points,
         }

@@ -22,7 +22,7 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.older import Older, map_of
+from hybridnav.cli.older import Older, older_files
 from hybridnav.cli.options import JsonOption, MapArgument, OutOption, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
@@ -124,7 +124,7 @@ def rooms(
         raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
     checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
-    older = map_of(names_from, names_map)
+    older = older_files(names_from, names_map)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -136,8 +136,11 @@ def rooms(
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:
             labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
-    old = Older.of((names_from, older), reading, labels, grid, seconds)
-    labels = labels if old is None else old.carried.labels
+    old = None
+    if older is not None:
+        with stage("carrying names", seconds, "names"):
+            old = Older.of(older, reading, (labels, grid))
+        labels = old.carried.labels
     if asked is not None:
         found = _found_at(asked, labels, grid)
         answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))

@@ -46,11 +46,9 @@ _ROOM_SAMPLE = 600
 """Most points of a room's walls by which its drift is measured."""
 _FEWEST_POINTS = 20
 """Fewest points by which it is measured; other rooms move as all do."""
-_NEAR_ROOMS = 5
-"""Rooms around one, and the room itself, whose median drift is a second start for its own."""
 _TINY_M2 = 1e-9
 _SURE_DOOR_M = 0.5
-"""How far a door may lie from an old one whose room on one side alone is carried."""
+"""How far a door may lie from an old one if it is a gap now, or only one of its rooms is carried."""
 _MOST_CELLS = 400_000
 """Cells by which overlaps are measured, of larger maps every second, third, ... one."""
 
@@ -248,33 +246,23 @@ class _Moving(NamedTuple):
     def of(cls, old: RoomLabels, best: Candidate, one: Surface, other: Surface) -> _Moving:
         """Measure the drift of each room by its own walls, against the walls of the new map.
 
-        A room begins where all do, then where the rooms around it have come to lie; a start stays
-        if more of its walls meet walls.
+        It stays with the others if no more of its walls meet walls where they are drawn to.
         """
         label_of = old.label_of[one.is_wall]
         order = np.argsort(label_of, kind="stable")
         ends = np.searchsorted(label_of[order], np.arange(len(old.names) + 1))
-        walls = [one.walls[part] for part in np.split(order, ends)[1:-1]]
-        walls = [points[:: max(1, -(-len(points) // _ROOM_SAMPLE))] for points in walls]
-        shifts = np.tile(best.shift_m, (len(walls) + 1, 1))
-        able = [room for room, points in enumerate(walls) if len(points) >= _FEWEST_POINTS]
-        hits = np.zeros(len(walls))
-        middles = np.array([walls[room].mean(axis=0) for room in able]).reshape(-1, 2)
-        for turn in range(2):
-            before = shifts.copy()
-            for middle, room in zip(middles, able, strict=True):
-                away = np.abs(middles - middle).max(axis=1)
-                near = np.argsort(away, kind="stable")[:_NEAR_ROOMS]
-                start = np.median(before[np.array(able)[near]], axis=0) if turn else best.shift_m
-                begun = Candidate(best.angle_rad, start)
-                ended = refine(begun, walls[room], other.field, turns=False)
-                for each in (begun, ended):
-                    known, off, _ = other.field.at(
-                        turned(walls[room], best.angle_rad) + each.shift_m
-                    )
-                    met = float((known & (off < other.hit_m)).mean())
-                    if met > hits[room]:
-                        hits[room], shifts[room] = met, each.shift_m
+        shifts = np.tile(best.shift_m, (len(old.names) + 1, 1))
+        for room, part in enumerate(np.split(order, ends)[1:-1]):
+            if len(part) < _FEWEST_POINTS:
+                continue
+            walls = one.walls[part[:: max(1, -(-len(part) // _ROOM_SAMPLE))]]
+            drawn = refine(best, walls, other.field, turns=False)
+            met = []
+            for each in (best, drawn):
+                known, off, _ = other.field.at(turned(walls, best.angle_rad) + each.shift_m)
+                met.append(np.count_nonzero(known & (off < other.hit_m)))
+            if met[1] > met[0]:
+                shifts[room] = drawn.shift_m
         return cls(best.angle_rad, one.centre, shifts + other.centre)
 
     def points(self, points: FloatArray, rooms: IntArray) -> FloatArray:
@@ -422,7 +410,8 @@ def _doors(
         firm = sum(heir is not None and heir in there for heir in heirs)
         off_m = float(np.hypot(*(after.sides[after.boundary_of == at] - known[number]).T).min())
         confidence = round((1 - off_m) * firm / 2, 3)
-        if firm < 2 and (not firm or off_m > _SURE_DOOR_M):  # noqa: PLR2004 - both sides
+        is_sure = firm == len(side) and after.passages_m[at] >= LEAST_DOOR_M
+        if not firm or (off_m > _SURE_DOOR_M and not is_sure):
             why = "the door there joins other rooms"
             found[number] = Carried(None, confidence, "undecided", why)
         else:

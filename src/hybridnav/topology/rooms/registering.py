@@ -114,16 +114,13 @@ class Surface:
         free = grid.measured == CellClass.FREE
         beside = ndimage.binary_dilation(free, np.ones((3, 3), np.bool_))
         self.is_wall: BoolArray = (grid.measured == CellClass.OCCUPIED) & beside
-        """bool (rows, cols), occupied cells beside free ones."""
         self._per = grid.frame.resolution_m
         walls = grid.frame.points_of(np.argwhere(self.is_wall))
         self.centre: FloatArray = (
             (walls.min(axis=0) + walls.max(axis=0)) / 2 if len(walls) else np.zeros(2)
         )
         self.walls: FloatArray = walls - self.centre
-        """float64 (n, 2), the centres of these cells."""
         self.sample = self.thinned(_SAMPLE)
-        """Some of them."""
         self.length_m = len(walls) * self._per
         self.extent_m = 2 * float(np.abs(self.walls).max(initial=0.0)) + self._per
         self.hit_m = max(HIT_M, 1.5 * self._per)
