@@ -253,6 +253,8 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "number": number,
                 "name": name,
                 "area_m2": round(area_m2, 6),
+                "kind": None if kind is None else kind.name,
+                "kind_confidence": None if kind is None else round(kind.confidence, 3),
                 "point_m": _at(rooms, name),
                 "centre_m": _rounded(facts.centre_m),
                 "extent_m": [_rounded(facts.low_m), _rounded(facts.high_m)],
@@ -263,9 +265,10 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                     for door, other in beside
                 ],
             }
-            for number, (name, area_m2, fits, is_listed, facts, beside) in enumerate(
+            for number, (name, kind, area_m2, fits, is_listed, facts, beside) in enumerate(
                 zip(
                     rooms.names,
+                    rooms.kinds,
                     areas_m2.tolist(),
                     rooms.fits.tolist(),
                     rooms.is_listed.tolist(),
@@ -321,25 +324,27 @@ def _listing(rooms: Rooms, areas_m2: FloatArray, *, everything: bool) -> str:
     left_out = f"; not listed without --all: {rest}" if rest else ""
     lines = [
         f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
-        "columns    room, number, area, extent in x and y, its point, doors to (number: width)",
+        "columns    room, number, area, extent in x and y, point, kind, doors to (number: width)",
     ]
     if not rooms.is_building:
         lines.insert(1, "building   no door between walls: these rooms are parts of open space")
     measures = _measures_of(rooms.labels, rooms.grid)
     each = zip(
         rooms.names,
+        rooms.kinds,
         areas_m2.tolist(),
         rooms.fits.tolist(),
         measures,
         _neighbours(rooms, rooms.doors if everything else rooms.listed_doors),
         strict=True,
     )
-    for number, (name, area_m2, fits, facts, beside) in enumerate(each, start=1):
+    for number, (name, kind, area_m2, fits, facts, beside) in enumerate(each, start=1):
         if not is_shown[number - 1]:
             continue
         point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
         size = "{:.1f} x {:.1f} m".format(*facts.size_m)
-        stated = [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
+        stated = [] if kind is None else [kind.name]
+        stated += [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
         stated += [_door(door, other) for door, other in beside]
         lines.append(
             f"{name:<{width}} {number:>{digits}} {area_m2:>9.2f} m²  {size:<15} {point:<16} "

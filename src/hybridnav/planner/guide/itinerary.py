@@ -142,10 +142,12 @@ class Guide:
         return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
 
     def _shape(self, vertex: int, cells: LongArray) -> Shape:
-        """Return the shape of a vertex of the room level that has no name, for a path in it."""
+        """Return the shape of a vertex of the room level, for a path in it."""
         rooms, level = self._rooms, self._rooms.level
-        if rooms.label_of_vertex[vertex] >= 0:
-            return "room"
+        label = int(rooms.label_of_vertex[vertex])
+        if label >= 0:
+            kind = rooms.kinds[label]
+            return "room" if kind is None else kind.name
         area_m2 = float(level.areas[vertex]) * rooms.grid.cell_area_m2
         if area_m2 < _LEAST_ROOM_M2:
             return "passage"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.guide.language import ENGLISH, GERMAN
+from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -315,6 +316,10 @@ class _Writer:
         if space.name is None:
             found: SpaceWords = getattr(self.words, space.shape)
             return found
+        if space.shape in ("corridor", "hall") and FOUND_NAME.fullmatch(space.name):
+            shape: SpaceWords = getattr(self.words, space.shape)
+            texts = {part: f"{text} {space.name}" for part, text in vars(shape).items()}
+            return type(shape)(**texts)
         named = self.words.common if _is_common(space.name) else self.words.named
         return type(named)(
             inside=named.inside.format(name=space.name),

@@ -48,7 +48,7 @@ _FEWEST_POINTS = 20
 """Fewest points by which it is measured; other rooms move as all do."""
 _TINY_M2 = 1e-9
 _SURE_DOOR_M = 0.5
-"""How far a door may lie from an old one if it is a gap now, or only one of its rooms is carried."""
+"""How far a door may lie from an old one if it is a gap now, or one of its rooms is not carried."""
 _MOST_CELLS = 400_000
 """Cells by which overlaps are measured, of larger maps every second, third, ... one."""
 
@@ -438,8 +438,7 @@ def _names(
     """Return the names of the new rooms, of which some are old ones, and those of the others."""
     numbers = [int(m[1]) for name in (*old.names, *new.names) if (m := NUMBERED.fullmatch(name))]
     first = max(numbers, default=0) + 1
-    names: list[str] = []
-    others: list[str] = []
+    names, others = list[str](), list[str]()
     for at, own in enumerate(new.names):
         if at in room_of:
             names.append(old.names[room_of[at]])
