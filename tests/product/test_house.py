@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_530,
-    "lines": 92_280,
-    "files": 395,
-    "code outside ext": 37_590,
+    "code": 56_240,
+    "lines": 93_370,
+    "files": 398,
+    "code outside ext": 38_310,
     "lines of a file, median": 300,
     "lines of a file, most": 450,
     "packages": 12,
@@ -20,8 +20,8 @@ LIMITS = {
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
-    "parameters of commands, shared ones once": 112,
-    "lines of tests": 58_030,
+    "parameters of commands, shared ones once": 114,
+    "lines of tests": 58_300,
 }
 
 
