@@ -223,9 +223,11 @@ def different(given: Namespace) -> None:
     rng = np.random.default_rng(0)
     count = carried = 0
     for at in rng.permutation(len(pairs)).tolist():
+        if count == given.others:
+            break
         grids = [read(str(given.data / name)) for name in pairs[at]]
         sizes = [int((grid.measured == hn.CellClass.FREE).sum()) for grid in grids]
-        if count == given.others or max(g.size for g in (x.measured for x in grids)) > MOST_CELLS:
+        if max(grid.measured.size for grid in grids) > MOST_CELLS:
             continue
         if min(sizes) < LEAST_FREE:
             continue

@@ -27,6 +27,8 @@ def older_files(names_from: Path | None, names_map: Path | None) -> tuple[Path, 
         if names_map is not None:
             raise UsageError("--names-map is the map of --names-from: give both")
         return None
+    if not names_from.is_file():
+        raise hn.errors.RoomsNotFoundError(f"rooms {printable(names_from)}: no such file")
     if names_map is not None:
         return names_from, names_map
     found = []

@@ -89,7 +89,7 @@ class Registration(NamedTuple):
     best: Candidate | None
     """From the older map to the newer one, about their centres."""
     share: float
-    """Of the walls that both maps could show, those that both do."""
+    """Share of the walls that both maps show, among those that both could."""
     reason: str
     """Why there is no transform; empty if there is one."""
 
@@ -102,13 +102,7 @@ def turned(points: FloatArray, angle_rad: float) -> FloatArray:
 
 
 class Surface:
-    """What the registration of a map looks at: points relative to the centre of its walls.
-
-    Parameters
-    ----------
-    grid
-        The map; cells count as they were measured.
-    """
+    """What the registration of a map looks at: points relative to the centre of its walls."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         free = grid.measured == CellClass.FREE
@@ -151,7 +145,7 @@ class Surface:
         )
 
     @cached_property
-    def field(self) -> Field:
+    def field(self) -> WallDistances:
         """Distances to the walls."""
         side_m = max(_FINE_M, self._per, self.extent_m / _FINE_PIXELS)
         # Cells lie inside pixels, not on their borders: points would be drawn to one side.
@@ -177,15 +171,18 @@ class Surface:
         first = points[nearest[0] * shape[1] + nearest[1]]
         last = points[known.size - 1 - (turned_round[0] * shape[1] + turned_round[1])]
         partner = (first + last) / 2
-        return Field(low, side_m, known, away, partner)
+        return WallDistances(low, side_m, known, away, partner)
 
 
 class Pictures(NamedTuple):
     """Pixels of a map as points with weights up to 1, to be drawn turned."""
 
     side_m: float
+    """Side of a pixel."""
     walls: tuple[FloatArray, FloatArray]
+    """Points of walls, float64 (n, 2), and their weights."""
     free: tuple[FloatArray, FloatArray]
+    """The same of free space."""
 
     def drawn(
         self, angle_rad: float, low: FloatArray, shape: tuple[int, int]
@@ -203,14 +200,17 @@ class Pictures(NamedTuple):
         return walls, gain - np.float32(_FREE_WEIGHT) * free
 
 
-class Field(NamedTuple):
+class WallDistances(NamedTuple):
     """Distances to the walls of a map, on pixels."""
 
     low: FloatArray
+    """Lower corner of the pixels."""
     side_m: float
+    """Side of a pixel."""
     known: BoolArray
     """Pixels within 0.3 m of free cells or walls."""
     away_m: FloatArray
+    """float64 (rows, cols), the distance from each to the nearest wall."""
     partner: FloatArray
     """float64 (rows, cols, 2), the nearest point of a wall; the middle of two equally near."""
 
@@ -228,7 +228,9 @@ class Candidate(NamedTuple):
     """A rotation and a shift of points relative to the centres, and how well they fit."""
 
     angle_rad: float
+    """The rotation, counter-clockwise."""
     shift_m: FloatArray
+    """float64 (2,), where the centre of the old walls comes to lie."""
     hits_m: float = 0.0
     """Length of walls that lie on walls, both maps together."""
     seen_m: float = 0.0
@@ -244,14 +246,14 @@ class Candidate(NamedTuple):
         return self.hits_m - chance * self.seen_m
 
     def is_like(self, other: Candidate) -> bool:
-        """Whether two candidates are one: within half a metre and 0.05 rad."""
+        """Return whether two candidates are one: within half a metre and 0.05 rad."""
         turn = math.remainder(self.angle_rad - other.angle_rad, math.tau)
         away = float(np.abs(self.shift_m - other.shift_m).max())
         return abs(turn) < _SAME_RAD and away < _SAME_M
 
 
 def register(one: Surface, other: Surface) -> Registration:
-    """Find the rigid transform between two maps of one building.
+    """Find the rigid transform between two maps of one building, if one alone fits.
 
     Rotations are the peaks of the circular correlation of Hough spectra. For each, the walls and
     the free space of both maps are correlated over all translations. The best candidates are
@@ -262,11 +264,6 @@ def register(one: Surface, other: Surface) -> Registration:
     ----------
     one, other
         The maps, the older one first. No scale is estimated.
-
-    Returns
-    -------
-    Registration
-        The best candidate. There is none if none fits better than chance, or two do that differ.
 
     References
     ----------
@@ -389,7 +386,7 @@ def _box(pictures: Pictures, *, turn: bool) -> tuple[FloatArray, tuple[int, int]
 def refine(
     start: Candidate,
     points: FloatArray,
-    field: Field,
+    field: WallDistances,
     *,
     reaches_m: tuple[float, ...] = _REACHES_M,
     turns: bool = True,
