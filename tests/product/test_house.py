@@ -5,18 +5,18 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_020,
-    "lines": 91_490,
+    "code": 55_050,
+    "lines": 91_520,
     "files": 376,
-    "code outside ext": 38_140,
+    "code outside ext": 38_160,
     "lines of a file, median": 268,
-    "lines of a file, most": 451,
+    "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
     "arrows, with single modules": 75,
     "files visited by paper": 51,
     "lines visited by paper": 12_942,
-    "modules of a plan and a picture": 131,
+    "modules of a plan and a picture": 132,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
