@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.guide.language import ENGLISH, GERMAN
-from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -316,7 +315,7 @@ class _Writer:
         if space.name is None:
             found: SpaceWords = getattr(self.words, space.shape)
             return found
-        if space.shape in ("corridor", "hall") and FOUND_NAME.fullmatch(space.name):
+        if space.shape != "room":
             shape: SpaceWords = getattr(self.words, space.shape)
             texts = {part: f"{text} {space.name}" for part, text in vars(shape).items()}
             return type(shape)(**texts)
