@@ -93,8 +93,7 @@ def find_rooms(
         )
     check_least_area(least_area_m2)
     found = _judged if method == "judged" else _convex
-    least = least_cells(least_area_m2, grid.cell_area_m2)
-    labels = _in_reading_order(found(grid, method, least_area_m2), least)
+    labels = found(grid, method, least_area_m2)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
         raise InvalidValueError(
@@ -153,7 +152,7 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     Returns
     -------
     IntArray
-        int32 (rows, cols), a room for each free cell of the building, -1 elsewhere.
+        int32 (rows, cols), rooms in reading order, -1 elsewhere.
     """
     outside = outside_of(grid)
     ground = Ground.of(grid, outside)
@@ -162,7 +161,7 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     least = least_cells(least_area_m2, grid.cell_area_m2)
     contract(segments, [Small(specks), Likely(forest.judge, LEAST_LIKELY), Small(least)])
     free = (grid.measured == CellClass.FREE) & ~outside
-    return np.where(free, segments.label_of, np.int32(NO_ROOM))
+    return _in_reading_order(np.where(free, segments.label_of, np.int32(NO_ROOM)), least)
 
 
 def _judged(grid: OccupancyGrid, _method: Segmentation, least_area_m2: float) -> IntArray:
@@ -178,7 +177,7 @@ def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> 
     segments.merge_small(min(least_area_m2, _SPLINTER_M2))
     segments.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT)
     segments.merge_small(least_area_m2)
-    return segments.label_of
+    return _in_reading_order(segments.label_of, least_cells(least_area_m2, grid.cell_area_m2))
 
 
 def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
