@@ -25,11 +25,22 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
+from hybridnav.ext.graphs.changes import change_lines
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     AnchorOption,
+    Bundle,
+    BundleOption,
     Fleet,
+    KeepOption,
+    LanesOption,
+    NodesOption,
     NoDoorsOption,
+    OperationsOption,
+    PolylinesOption,
+    ReportOption,
+    StretchOption,
+    StyleOption,
     VehiclesOption,
 )
 
@@ -52,36 +63,9 @@ _STRETCH = 1.05
 _APART_M, _NEAR_M, _FAR_M = 4.0, 1.0, 2.0
 """Spacing of lanes; of roadmaps for Nav2, which joins them at the nearest node; and of all other
 roadmaps: one-way lanes need long edges."""
-_MOST_PAIRS = 1_000_000
 
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
-]
-StyleOption = Annotated[
-    str,
-    typer.Option(
-        "--style",
-        metavar="NAME",
-        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
-        "nodes, for routes nearly as short as paths.",
-    ),
-]
-KeepOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--keep",
-        metavar="FILE",
-        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
-    ),
-]
-NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        min=1,
-        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
-    ),
 ]
 SpacingOption = Annotated[
     float | None,
@@ -93,40 +77,6 @@ SpacingOption = Annotated[
         f"formats other than nav2 {_FAR_M:g}.",
     ),
 ]
-StretchOption = Annotated[
-    float,
-    typer.Option(
-        "--stretch",
-        metavar="S",
-        help="Most by which routes between nodes in sight are longer, as a factor.",
-    ),
-]
-LanesOption = Annotated[
-    float | None,
-    typer.Option(
-        "--lanes",
-        metavar="APART",
-        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
-        "the distance in metres between the robots.",
-    ),
-]
-PolylinesOption = Annotated[
-    bool,
-    typer.Option(
-        "--polylines",
-        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
-    ),
-]
-ReportOption = Annotated[
-    int | None,
-    typer.Option(
-        "--report",
-        metavar="N",
-        min=1,
-        max=_MOST_PAIRS,
-        help="Compare the routes of N random pairs with shortest paths.",
-    ),
-]
 
 
 @with_map(
@@ -136,7 +86,10 @@ ReportOption = Annotated[
 )
 def export(
     map_file: options.MapOrBuildingArgument,
-    out: options.OutOption[Path],
+    out: options.OutOption[Path | None] = None,
+    bundle: BundleOption = None,
+    costs: options.CostsOption = None,
+    operations: OperationsOption = False,
     kind: FormatOption = "nav2",
     style: StyleOption = "lanes",
     keep: KeepOption = None,
@@ -165,16 +118,13 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    _check_out(kind, out)
-    if polylines and (report is not None or plot is not None or lanes_m is not None):
-        raise UsageError(
-            "--polylines does not go with --report, --plot and --lanes, which are for straight "
-            "edges: leave them out"
-        )
+    robot = Bundle.read(bundle, costs, operations=operations)
+    others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
+    out = _checked_out(kind, out) if robot is None else robot.checked(others)
+    straight = report is not None or plot is not None or lanes_m is not None
+    _check_polylines(kind, given=polylines, straight=straight)
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
-    if fleet is not None and polylines:
-        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:
         given = {
             "--style": style != _STYLES[0],
@@ -201,10 +151,59 @@ def export(
             _write_parts(topology, kind, out, frame)
         _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
         return
+    before = None if keep is None else hn.ext.graphs.load_graph(keep)
     began = time.perf_counter()
+    graph = _built(
+        topology,
+        style=style,
+        before=before,
+        nodes=nodes,
+        spacing_m=spacing_m,
+        is_near=kind == "nav2" and lanes_m is None,
+        stretch=stretch,
+        seed=settings.pyramid.seed,
+        lanes_m=lanes_m,
+    )
+    seconds["graph"] = round(time.perf_counter() - began, 6)
+    with stage(f"writing {out}", seconds, "write"):
+        written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
+        if robot is None:
+            left_out = _write_graph(topology, (graph, written), fleet, out, frame)
+        else:
+            left_out = robot.write(topology, graph, frame)
+    judged = None
+    if report is not None:
+        with stage("comparing routes", seconds, "report"):
+            judged = hn.ext.graphs.judge_route_graph(graph, pairs=report)
+    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
+    lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
+    lines += _ids_line(written) if fleet is None else []
+    changes = {} if before is None else hn.ext.graphs.graph_changes(before, graph)
+    figures |= {"changes": changes} if changes else {}
+    _respond(figures, [*lines, *change_lines(changes)], seconds, as_json=as_json)
+    if plot is not None:
+        from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
+        from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
+
+        save_figure(plot_route_graph(graph), plot)
+
+
+def _built(
+    topology: hn.TopologicalMap,
+    *,
+    style: str,
+    before: WaypointGraph | None,
+    nodes: int | None,
+    spacing_m: float | None,
+    is_near: bool,
+    stretch: float,
+    seed: int,
+    lanes_m: float | None,
+) -> RouteGraph:
+    """Return the graph of a map in a style; see `export`."""
     with progress_bar("building the graph") as advance:
         if style == "lanes":
-            before = None if keep is None else hn.ext.graphs.load_graph(keep)
             apart_m = _APART_M if spacing_m is None else spacing_m
             graph = hn.ext.graphs.build_lane_graph(
                 topology, spacing_m=apart_m, keep=before, progress=advance
@@ -213,37 +212,20 @@ def export(
             graph = hn.ext.graphs.build_route_graph(
                 topology,
                 nodes=nodes,
-                spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
+                spacing_m=_spacing(spacing_m, is_near=is_near),
                 stretch=stretch,
-                seed=settings.pyramid.seed,
+                seed=seed,
                 progress=advance,
             )
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
-    seconds["graph"] = round(time.perf_counter() - began, 6)
-    with stage(f"writing {out}", seconds, "write"):
-        written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
-        left_out = _write_graph(topology, (graph, written), fleet, out, frame)
-    judged = None
-    if report is not None:
-        with stage("comparing routes", seconds, "report"):
-            judged = hn.ext.graphs.judge_route_graph(graph, pairs=report)
-    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
-    figures |= {} if fleet is None else {"left_out": list(left_out)}
-    lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
-    lines += _ids_line(written) if fleet is None else []
-    _respond(figures, lines, seconds, as_json=as_json)
-    if plot is not None:
-        from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
-        from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
-
-        save_figure(plot_route_graph(graph), plot)
+    return graph
 
 
 def _export_over_floors(
     *,
     map_file: Path,
-    out: Path,
+    out: Path | None,
     kind: str,
     style: str,
     nodes: int | None,
@@ -256,7 +238,7 @@ def _export_over_floors(
     reading: MapOptions,
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    _check_out(kind, out)
+    out = _checked_out(kind, out)
     _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
@@ -315,11 +297,25 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _check_out(kind: str, out: Path) -> None:
+def _checked_out(kind: str, out: Path | None) -> Path:
     """Refuse formats that are none, and files of other ones."""
+    if out is None:
+        raise UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
+    return out
+
+
+def _check_polylines(kind: str, *, given: bool, straight: bool) -> None:
+    """Refuse the option with others that are for straight edges, and for other formats."""
+    if given and straight:
+        raise UsageError(
+            "--polylines does not go with --report, --plot and --lanes, which are for straight "
+            "edges: leave them out"
+        )
+    if given and kind in ENDINGS:
+        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
 
 
 def _check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:

@@ -1,10 +1,11 @@
-"""Options of formats that fleets speak, and what `hybridnav export` writes in them."""
+"""Options of `hybridnav export`, and what it writes for fleets and as a bundle for Nav2."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,8 +13,6 @@ import hybridnav as hn
 from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import RouteGraph
 
@@ -22,6 +21,68 @@ ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", "
 _FEWEST, _MOST = 2, 3
 """Numbers of an anchor: latitude, longitude, and the heading if there is one."""
 
+_MOST_PAIRS = 1_000_000
+
+StyleOption = Annotated[
+    str,
+    typer.Option(
+        "--style",
+        metavar="NAME",
+        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
+        "nodes, for routes nearly as short as paths.",
+    ),
+]
+KeepOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--keep",
+        metavar="FILE",
+        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
+    ),
+]
+NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes",
+        metavar="N",
+        min=1,
+        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
+    ),
+]
+StretchOption = Annotated[
+    float,
+    typer.Option(
+        "--stretch",
+        metavar="S",
+        help="Most by which routes between nodes in sight are longer, as a factor.",
+    ),
+]
+LanesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lanes",
+        metavar="APART",
+        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
+        "the distance in metres between the robots.",
+    ),
+]
+PolylinesOption = Annotated[
+    bool,
+    typer.Option(
+        "--polylines",
+        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
+    ),
+]
+ReportOption = Annotated[
+    int | None,
+    typer.Option(
+        "--report",
+        metavar="N",
+        min=1,
+        max=_MOST_PAIRS,
+        help="Compare the routes of N random pairs with shortest paths.",
+    ),
+]
 AnchorOption = Annotated[
     str | None,
     typer.Option(
@@ -45,6 +106,78 @@ NoDoorsOption = Annotated[
         "--no-doors", help="For rmf: name no doors, which robots would ask to open and wait for."
     ),
 ]
+BundleOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--bundle",
+        metavar="DIR",
+        help="Write all that Nav2 needs into a folder, in place of --out: graph, masks for costmap "
+        "filters of rooms and of --costs, poses, parameters.",
+    ),
+]
+OperationsOption = Annotated[
+    bool,
+    typer.Option(
+        "--operations", help="With --bundle: edges through doors call a service to open them."
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The options of a bundle."""
+
+    folder: Path
+    costs: tuple[str, ...]
+    operations: bool
+
+    @classmethod
+    def read(
+        cls, folder: Path | None, costs: list[str] | None, *, operations: bool
+    ) -> Bundle | None:
+        """Return the options, None for no bundle.
+
+        Raises
+        ------
+        UsageError
+            When options of a bundle are given without one.
+        """
+        if folder is None and (costs or operations):
+            option = "--costs" if costs else "--operations"
+            raise UsageError(f"{option} goes with --bundle DIR: give it, or leave {option} out")
+        return None if folder is None else cls(folder, tuple(costs or ()), operations)
+
+    def checked(self, others: dict[str, Any]) -> Path:
+        """Return the folder, or refuse it for other files, costs that are no masks, or options that
+        do not go with a bundle.
+
+        Raises
+        ------
+        UsageError
+            When one of them is given.
+        """
+        from hybridnav.ext.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
+
+        for option, given in others.items():
+            if given:
+                raise UsageError(f"--bundle does not go with {option}: leave one of them out")
+        try:
+            checked_masks(self.costs)
+            check_bundle(self.folder)
+        except hn.errors.InvalidValueError as error:
+            raise UsageError(f"--{error}") from None
+        return self.folder
+
+    def write(self, topology: hn.TopologicalMap, graph: RouteGraph, frame: str) -> tuple[str, ...]:
+        """Write the bundle; return what it does not hold."""
+        return hn.ext.graphs.export_bundle(
+            topology,
+            graph,
+            self.folder,
+            costs=self.costs,
+            operations=self.operations,
+            frame=frame,
+        )
 
 
 @dataclass(frozen=True)
