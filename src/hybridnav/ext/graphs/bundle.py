@@ -9,7 +9,6 @@ import shutil
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs.files.nav2 import nav2_bytes, nav2_features
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
-from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.costs.factors import mask_on_map
 from hybridnav.maps.costs.files import parse_costs
@@ -40,9 +39,9 @@ if TYPE_CHECKING:
 MOST_ROOMS = 100
 """Largest value that map_server's mode `raw` keeps; a larger one becomes unknown."""
 _CLASSES = ("corridor", "door", "free", "hall", "room")
-_DOORS, _CORRIDOR_M, _HALL_M2 = 3, 3.0, 60.0
-"""A corridor has so many passages, and lanes of this free width in metres or less in the median; a
-hall is another room of this area in square metres or more."""
+_DOORS, _SLENDER, _HALL_M2 = 3, 0.25, 60.0
+"""A corridor has so many passages, and this share or less of the area of the square on its longest
+extent: a strip 1 : 4. A hall is another room of this area in square metres or more."""
 _MARGIN_M = 0.25
 """Clearance beyond the robot's radius below which an edge is narrow, in metres: what lanes keep."""
 _GRAPH, _NAMES, _PARAMS = "graph.geojson", "room_names.yaml", "nav2_params.yaml"
@@ -294,13 +293,14 @@ def _edge_facts(
         spec = specs["speed"]
         percent = _least(graph, 100.0 / spec.layer(graph.grid).factors.astype(np.float64))
         full_mps = spec.settings.get("full_speed_mps", math.nan)
-    classes = _room_classes(rooms, graph)
+    classes = _room_classes(rooms)
+    has_jambs = {door.number for door in rooms.doors if not door.is_opening}
     spare = (graph.clearances_m - graph.grid.robot_radius_m) / _MARGIN_M
     penalties = graph.lengths_m * (1 - np.clip(spare, 0, 1))
     found: list[dict[str, Any]] = []
     for edge, room in enumerate(graph.edge_rooms):
         kind = "free" if room is None else classes[room]
-        facts = {"class": "door" if graph.edge_doors[edge] else kind}
+        facts = {"class": "door" if has_jambs.intersection(graph.edge_doors[edge]) else kind}
         # On every edge: without it the distance scorer takes 1 for 100 per cent.
         known: dict[str, float] = {"speed_limit": round(float(percent[edge]), 1)}
         if known["speed_limit"] < 100 and not math.isnan(full_mps):  # noqa: PLR2004 - per cent
@@ -311,20 +311,22 @@ def _edge_facts(
     return found
 
 
-def _room_classes(rooms: Rooms, graph: RouteGraph) -> dict[str, str]:
+def _room_classes(rooms: Rooms) -> dict[str, str]:
     """Return the class of each room: corridor, hall or room."""
-    widths: dict[str, list[float]] = {name: [] for name in rooms.names}
-    for name, width_m in zip(graph.edge_rooms, graph.widths_m.tolist(), strict=True):
-        if name is not None:
-            widths[name].append(width_m)
+    count = len(rooms.names)
+    cells = np.argwhere((rooms.labels.label_of >= 0) & (rooms.grid.measured == CellClass.FREE))
+    label = rooms.labels.label_of[tuple(cells.T)]
+    sizes = np.maximum(np.bincount(label, minlength=count), 1)
+    middle = [np.bincount(label, each, minlength=count) / sizes for each in cells.T]
+    reach = np.zeros(count)  # the square of the greatest distance from the middle, in cells
+    np.maximum.at(reach, label, ((cells - np.stack(middle, axis=1)[label]) ** 2).sum(axis=1))
+    is_slender = sizes <= _SLENDER * 4 * reach
     passages = [name for door in rooms.listed_doors if door.passable for name in door.rooms]
     found = {}
-    for name, area_m2 in zip(rooms.names, rooms.areas_m2.tolist(), strict=True):
-        is_way = passages.count(name) >= _DOORS and bool(widths[name])
-        if is_way and median(widths[name]) <= _CORRIDOR_M:
-            found[name] = "corridor"
-        else:
-            found[name] = "hall" if area_m2 >= _HALL_M2 else "room"
+    for at, name in enumerate(rooms.names):
+        is_way = is_slender[at] and passages.count(name) >= _DOORS
+        found[name] = "hall" if rooms.areas_m2[at] >= _HALL_M2 else "room"
+        found |= {name: "corridor"} if is_way else {}
     return found
 
 
