@@ -115,18 +115,35 @@ def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
     done = cli(*given, "--operations", "--keep", folder / "graph.geojson")
     assert (done.code, "changed    nothing" in done.out.splitlines()) == (0, True)
     assert read_nav2(folder / "graph.geojson").edges == graph.edges
-    assert cli(*given, "-o", tmp_path / "g.geojson").refuses(2, "--bundle does not go with --out")
-    assert cli(*given, "--polylines").refuses(2, "--bundle does not go with --polylines")
-    assert cli(*given, "--format", "rooms").refuses(2, "--bundle does not go with --format rooms")
-    assert cli(*given, "--costs", "clearance").refuses(2, "--costs of a bundle are")
+    # Edges in a keepout zone are gone, and at the next time nothing has changed.
+    (x, y), (u, v) = next(iter(graph.lines.values()))
+    corner = [(x + u) / 2 - 0.05, (y + v) / 2 - 0.05, 0]
+    (tmp_path / "zone.pgm").write_bytes(b"P5 1 1 255 " + bytes([100]))
+    (tmp_path / "zone.yaml").write_text(
+        f"{{image: zone.pgm, resolution: 0.1, origin: {corner}, negate: 0, mode: raw, "
+        "free_thresh: 0.196, occupied_thresh: 0.65}"
+    )
+    zone = (*given, "--costs", f"keepout:{tmp_path / 'zone.yaml'}")
+    done = cli(*zone, "--keep", folder / "graph.geojson", "--json")
+    gone = done.answer["changes"]["edges"]["gone"]
+    assert set(gone) == set(graph.edges) - set(read_nav2(folder / "graph.geojson").edges)
+    assert gone
+    assert done.answer["left_out"] == [f"{len(gone)} edges through keepout zones"]
+    assert "changed    nothing" in cli(*zone, "--keep", folder / "graph.geojson").out
+    assert cli(*given, "-o", tmp_path / "g.geojson").refuses(2, "--out does not go with --bundle")
+    assert cli(*given, "--polylines").refuses(2, "--polylines does not go with --bundle")
+    assert cli(*given, "--format", "rooms").refuses(2, "--format rooms does not go with --bundle")
+    assert cli(*given, "--costs", "clearance").refuses(2, "costs of a bundle are")
     assert cli(*given, "--costs", "speed:none.yaml").refuses(3, "none.yaml")
     assert cli("export", FIGURE).refuses(2, "--out is missing")
     plain = ("export", FIGURE, "-o", tmp_path / "g.geojson")
-    assert cli(*plain, "--operations").refuses(2, "--operations goes with --bundle")
-    assert cli(*plain, "--costs", "speed:x").refuses(2, "--costs goes with --bundle")
+    assert cli(*plain, "--operations").refuses(2, "--operations needs --bundle")
+    assert cli(*plain, "--costs", "speed:x").refuses(2, "--costs needs --bundle")
     (folder / "notes.txt").write_text("mine")
-    assert cli(*given).refuses(2, "--bundle", "it holds notes.txt")
+    assert cli(*given).refuses(2, "bundle", "it holds notes.txt")
     assert cli("export", FIGURE, "--bundle", tmp_path / "a" / "b").refuses(2, "there is no folder")
+    assert cli("export", FIGURE, "--bundle", folder / "notes.txt").refuses(2, "Not a directory")
+    assert cli("export", FIGURE, "--bundle", tmp_path / ("x" * 300)).refuses(2, "too long")
 
 
 def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):

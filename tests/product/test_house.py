@@ -5,9 +5,9 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 54_260,
-    "lines": 90_320,
-    "files": 371,
+    "code": 54_675,
+    "lines": 90_975,
+    "files": 373,
     "code outside ext": 37_370,
     "lines of a file, median": 268,
     "lines of a file, most": 450,
@@ -20,8 +20,8 @@ LIMITS = {
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
-    "parameters of commands, shared ones once": 109,
-    "lines of tests": 56_990,
+    "parameters of commands, shared ones once": 111,
+    "lines of tests": 57_670,
 }
 
 

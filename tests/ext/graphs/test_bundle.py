@@ -66,7 +66,7 @@ def test_the_state_of_the_zone_filter_is_the_room(tmp_path, yaw_rad):
 def test_more_rooms_than_the_mode_raw_holds_lose_the_smallest(tmp_path):
     columns = np.minimum(np.arange(29) // 3, 9)  # the last one is narrower
     label_of = columns + 10 * (np.arange(33) // 3)[:, None]
-    rooms = hn.RoomLabels(tuple(f"n{k}" for k in range(110)), label_of)
+    rooms = hn.RoomLabels(tuple(f"n{k}" for k in range(110)), label_of.astype(np.int32))
     grid = hn.OccupancyGrid(np.zeros((33, 29), np.float32), robot_radius_m=0)
     here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
     _, left_out = bundle_of(here, tmp_path / "robot")

@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from typing import Any, Literal
 
 import networkx as nx
 import numpy as np
@@ -18,7 +19,8 @@ from hybridnav.ext.graphs import (
 )
 from tests.drawn_rooms import HOUSE, topology_of
 
-NOTHING = {kind: {"added": [], "gone": [], "moved": []} for kind in ("nodes", "edges")}
+EMPTY: dict[str, list[Any]] = {"added": [], "gone": [], "moved": []}
+NOTHING = {"nodes": EMPTY, "edges": EMPTY}
 
 
 def built(lines=HOUSE, **options):
@@ -64,7 +66,7 @@ def test_ids_of_before_are_kept_moved_or_gone():
 
 def route_between(graph, start, goal):
     """Ids of the nodes and of the edges of a shortest route between nodes in two rooms."""
-    network = nx.DiGraph()
+    network: nx.DiGraph[int] = nx.DiGraph()
     for number, (tail, head) in zip(graph.ids[1].tolist(), graph.edges.tolist(), strict=True):
         network.add_edge(tail, head, number=number)
     ends = [graph.rooms.index(name) for name in (start, goal)]
@@ -76,11 +78,13 @@ def route_between(graph, start, goal):
 def test_a_route_holds_until_the_map_or_the_graph_breaks_it(tmp_path):
     graph = built()
     nodes, edges = route_between(graph, "kitchen", "lab")
-    for route, by in ((nodes, "nodes"), (edges, "edges")):
+    kinds: tuple[Literal["nodes", "edges"], ...] = ("nodes", "edges")
+    for by, route in zip(kinds, (nodes, edges), strict=True):
         assert first_broken_edge(graph, route, by=by) is None
         # The lab is closed: the first edge that is not free is the first that touches its cells.
         now = topology_of(shut(HOUSE, "l")).grid
         broken = first_broken_edge(graph, route, now, by=by)
+        assert broken is not None
         free = now.enterable(allow_unexplored=False)
         points = dict(zip(graph.ids[0].tolist(), graph.points, strict=True))
         for at, (tail, head) in enumerate(itertools.pairwise(nodes)):
@@ -95,6 +99,7 @@ def test_a_route_holds_until_the_map_or_the_graph_breaks_it(tmp_path):
         assert set(nodes) - ids
         kept = set(map(tuple, after.ids[0][after.edges].tolist()))
         found = first_broken_edge(after, nodes)
+        assert found is not None
         pairs = list(itertools.pairwise(nodes))
         assert pairs[found] not in kept
         assert set(pairs[:found]) <= kept
@@ -104,12 +109,12 @@ def test_a_route_holds_until_the_map_or_the_graph_breaks_it(tmp_path):
         assert first_broken_edge(loaded, route, now, by=by) == broken
     assert first_broken_edge(graph, [edges[0], edges[2]], by="edges") == 1  # it leaves one out
     assert first_broken_edge(graph, [nodes[0], nodes[2]]) == 0
-    assert first_broken_edge(graph, [10**6]) == 0
+    assert first_broken_edge(graph, [nodes[0], 10**6]) == 0
     assert first_broken_edge(graph, nodes[:1]) is first_broken_edge(graph, []) is None
 
 
 def test_a_graph_off_the_map_is_broken_and_one_from_a_file_needs_a_map():
-    plain = nx.DiGraph()
+    plain: nx.DiGraph[int] = nx.DiGraph()
     plain.add_node(1, pos=(1.0, 1.0))
     plain.add_node(2, pos=(900.0, 1.0))
     plain.add_edge(1, 2)
@@ -118,4 +123,4 @@ def test_a_graph_off_the_map_is_broken_and_one_from_a_file_needs_a_map():
     with pytest.raises(hn.errors.InvalidValueError, match="give grid"):
         first_broken_edge(graph, [1, 2])
     with pytest.raises(hn.errors.InvalidValueError, match="by must be"):
-        first_broken_edge(graph, [1, 2], topology_of(HOUSE).grid, by="both")
+        first_broken_edge(graph, [1, 2], topology_of(HOUSE).grid, by="both")  # type: ignore[arg-type]

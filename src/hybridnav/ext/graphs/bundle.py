@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import shutil
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, PathLike
+    from hybridnav._base.typing import AnyArray, FloatArray, PathLike
     from hybridnav.maps.costs.files import CostSpec
     from hybridnav.topology.rooms import Door, Rooms
 
@@ -48,7 +47,6 @@ _GRAPH, _NAMES, _PARAMS = "graph.geojson", "room_names.yaml", "nav2_params.yaml"
 _FILES = {_GRAPH, _NAMES, _PARAMS, "poses.yaml", "README.md"} | {
     f"{kind}_mask.{ending}" for kind in ("rooms", "keepout", "speed") for ending in ("pgm", "yaml")
 }
-_PLUGINS = {"keepout": "KeepoutFilter", "speed": "SpeedFilter", "rooms": "ZoneParameterFilter"}
 
 
 @dataclass(frozen=True)
@@ -63,21 +61,16 @@ class _Mask:
     base: float = 0.0
     multiplier: float = 1.0
 
-    @property
-    def plugin(self) -> str:
-        """The costmap filter."""
-        return _PLUGINS[self.kind]
-
     def files(self) -> dict[str, bytes]:
         """Return its image and YAML file, by name, for map_server's mode `raw`."""
         values, frame = self.values, self.frame
         if frame.yaw_rad:  # costmap filters read the origin of a mask and not its yaw
             rows, cols = values.shape
             corners = frame.points_of_grid([[0, 0], [0, cols], [rows, 0], [rows, cols]])
-            low, side = corners.min(axis=0), frame.resolution_m
-            width, height = np.ceil((corners.max(axis=0) - low) / side).astype(int).tolist()
-            frame = Frame(side, (float(low[0]), float(low[1])))
-            cells = np.zeros((height, width), dtype=np.float32)
+            (left, low), side = corners.min(axis=0).tolist(), frame.resolution_m
+            size = np.ceil((corners.max(axis=0) - [left, low]) / side).astype(np.int64)
+            cells = np.zeros(size[::-1], dtype=np.float32)
+            frame = Frame(side, (left, low))
             upright = OccupancyGrid(cells, frame, robot_radius_m=0)
             values = mask_on_map(upright, values, self.frame)
         # A value of 0 makes unknown cells of a costmap free for the keepout filter, and an unknown
@@ -85,15 +78,9 @@ class _Mask:
         unknown = 255 if self.kind == "keepout" else 0
         pixels = np.where(values < 0, unknown, values).astype(np.uint8)[::-1]
         head = f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n"
-        description = (
-            f"image: {self.kind}_mask.pgm\nmode: raw\nresolution: {frame.resolution_m!r}\n"
-            f"origin: [{frame.origin_m[0]!r}, {frame.origin_m[1]!r}, 0.0]\nnegate: 0\n"
-            "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
-        )
-        return {
-            f"{self.kind}_mask.pgm": head.encode() + pixels.tobytes(),
-            f"{self.kind}_mask.yaml": description.encode(),
-        }
+        described = _rendered("bundle_mask.yaml.j2", {"kind": self.kind, "frame": frame})
+        image = head.encode() + pixels.tobytes()
+        return {f"{self.kind}_mask.pgm": image, f"{self.kind}_mask.yaml": described}
 
 
 def export_bundle(  # noqa: PLR0913 - the last three have defaults
@@ -183,7 +170,7 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
         raise InvalidValueError("keepout zones leave the graph no edge: give another mask")
     if len(kept) < len(edges):
         left_out += [f"{len(edges) - len(kept):,} edges through keepout zones"]
-    known = {
+    facts = {
         "name": grid.name,
         "folder": str(Path(folder).resolve()),
         "frame": frame,
@@ -198,7 +185,7 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
     for mask in masks:
         files |= mask.files()
     for name in (_NAMES, _PARAMS, "poses.yaml", "README.md"):
-        files[name] = _rendered(f"bundle_{name}.j2", known)
+        files[name] = _rendered(f"bundle_{name}.j2", facts)
     _write(Path(folder).resolve(), files)
     return tuple(left_out)
 
@@ -214,10 +201,10 @@ def check_bundle(folder: PathLike) -> dict[str, int]:
     path = Path(folder)
     try:
         names = {each.name for each in path.iterdir()} if path.exists() else set()
-        is_folder = path.resolve().parent.is_dir()
-    except OSError as error:
+        is_there = path.resolve().parent.is_dir()
+    except OSError as error:  # no folder, or a name that is too long
         raise InvalidValueError(f"bundle {printable(path)}: {error.strerror}") from None
-    if not is_folder:
+    if not is_there:
         raise InvalidValueError(f"bundle {printable(path)}: there is no folder to put it into")
     strange = sorted(names - _FILES) or sorted(names)[:1] * (not names >= {_GRAPH, _PARAMS})
     if strange:
@@ -257,10 +244,10 @@ def _read(spec: CostSpec) -> _Mask:
     frame = frame.moved(spec.pose)
     if spec.kind == "keepout":
         return _Mask("keepout", values, frame, type=0)
-    settings = spec.settings
-    is_percent = settings.get("unit", "percent") == "percent"
-    speeds = settings.get("base", 100.0), settings.get("multiplier", -1.0)
-    return _Mask("speed", values, frame, 1 if is_percent else 2, *speeds)
+    get = spec.settings.get
+    base, multiplier = get("base", 100.0), get("multiplier", -1.0)
+    is_absolute = get("unit") == "m/s"
+    return _Mask("speed", values, frame, 1 + is_absolute, base, multiplier)
 
 
 def _numbered(rooms: Rooms, before: Mapping[str, int]) -> tuple[dict[str, int], list[str]]:
@@ -269,7 +256,7 @@ def _numbered(rooms: Rooms, before: Mapping[str, int]) -> tuple[dict[str, int], 
     largest = shown[np.argsort(-rooms.areas_m2[shown], kind="stable")][:MOST_ROOMS]
     names = [rooms.names[at] for at in np.sort(largest)]
     taken = {before[name] for name in names if name in before}
-    free = iter([n for n in range(1, MOST_ROOMS + 1) if n not in taken])
+    free = iter(sorted({*range(1, MOST_ROOMS + 1)} - taken))
     numbers = {name: before[name] if name in before else next(free) for name in names}
     others = [rooms.names[at] for at in shown if rooms.names[at] not in numbers]
     return numbers, [f"room {name}: masks hold {MOST_ROOMS} rooms" for name in others]
@@ -287,12 +274,10 @@ def _edge_facts(
 ) -> list[dict[str, Any]]:
     """Return what scorers read of each edge. Nav2 takes these numbers for floats and fails on
     integers, so each is written with its point."""
-    percent = np.full(graph.n_edges, 100.0)
-    full_mps = math.nan
+    percent, full_mps = np.full(graph.n_edges, 100.0), math.nan
     if "speed" in specs:
-        spec = specs["speed"]
-        percent = _least(graph, 100.0 / spec.layer(graph.grid).factors.astype(np.float64))
-        full_mps = spec.settings.get("full_speed_mps", math.nan)
+        percent = _least(graph, 100.0 / specs["speed"].layer(graph.grid).factors.astype(np.float64))
+        full_mps = specs["speed"].settings.get("full_speed_mps", math.nan)
     classes = _room_classes(rooms)
     has_jambs = {door.number for door in rooms.doors if not door.is_opening}
     spare = (graph.clearances_m - graph.grid.robot_radius_m) / _MARGIN_M
@@ -300,14 +285,14 @@ def _edge_facts(
     found: list[dict[str, Any]] = []
     for edge, room in enumerate(graph.edge_rooms):
         kind = "free" if room is None else classes[room]
-        facts = {"class": "door" if has_jambs.intersection(graph.edge_doors[edge]) else kind}
+        kind = "door" if has_jambs.intersection(graph.edge_doors[edge]) else kind
         # On every edge: without it the distance scorer takes 1 for 100 per cent.
-        known: dict[str, float] = {"speed_limit": round(float(percent[edge]), 1)}
-        if known["speed_limit"] < 100 and not math.isnan(full_mps):  # noqa: PLR2004 - per cent
-            known["abs_speed_limit"] = round(float(percent[edge]) / 100 * full_mps, 3)
+        facts: dict[str, Any] = {"class": kind, "speed_limit": round(float(percent[edge]), 1)}
+        if percent[edge] < 100 and not math.isnan(full_mps):  # noqa: PLR2004 - per cent
+            facts["abs_speed_limit"] = round(float(percent[edge]) / 100 * full_mps, 3)
         if penalties[edge] > 0:
-            known["penalty"] = round(float(penalties[edge]), 3)
-        found.append(facts | known)
+            facts["penalty"] = round(float(penalties[edge]), 3)
+        found.append(facts)
     return found
 
 
@@ -322,12 +307,10 @@ def _room_classes(rooms: Rooms) -> dict[str, str]:
     np.maximum.at(reach, label, ((cells - np.stack(middle, axis=1)[label]) ** 2).sum(axis=1))
     is_slender = sizes <= _SLENDER * 4 * reach
     passages = [name for door in rooms.listed_doors if door.passable for name in door.rooms]
-    found = {}
-    for at, name in enumerate(rooms.names):
-        is_way = is_slender[at] and passages.count(name) >= _DOORS
-        found[name] = "hall" if rooms.areas_m2[at] >= _HALL_M2 else "room"
-        found |= {name: "corridor"} if is_way else {}
-    return found
+    ways = zip(rooms.names, is_slender.tolist(), strict=True)
+    is_way = [slender and passages.count(name) >= _DOORS for name, slender in ways]
+    sizes_of = zip(rooms.names, is_way, (rooms.areas_m2 >= _HALL_M2).tolist(), strict=True)
+    return {name: "corridor" if way else "hall" if wide else "room" for name, way, wide in sizes_of}
 
 
 def _open(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> list[bool]:
@@ -342,30 +325,20 @@ def _add_operations(
     edges: Sequence[dict[str, Any]], graph: RouteGraph, doors: Mapping[int, Door]
 ) -> None:
     """Let each edge ask for its doors, at its entry; openings have nothing to open."""
+    asks = {"type": "OpenDoor", "trigger": "ON_ENTER"}
     for edge, passed in zip(edges, graph.edge_doors, strict=True):
-        opened = [
-            {
-                "type": "OpenDoor",
-                "trigger": "ON_ENTER",
-                "metadata": {"door": number, "service_name": f"/door_{number}/open"},
-            }
-            for number in passed
-            if not doors[number].is_opening
-        ]
-        if opened:
-            edge["properties"]["operations"] = opened
+        shut = [number for number in passed if not doors[number].is_opening]
+        known = [{"door": number, "service_name": f"/door_{number}/open"} for number in shut]
+        if known:
+            edge["properties"]["operations"] = [asks | {"metadata": each} for each in known]
 
 
 def _poses(
     rooms: Rooms, graph: RouteGraph, doors: Mapping[int, Door]
 ) -> list[tuple[str, tuple[float, ...]]]:
     """Return goals by name: x and y in metres, and z and w of the heading's quaternion."""
-    usable: BoolArray = rooms.is_listed & rooms.fits
-    found = [
-        (name, (*rooms.point_of(name), 0.0, 1.0))
-        for name, is_one in zip(rooms.names, usable.tolist(), strict=True)
-        if is_one
-    ]
+    names = np.array(rooms.names)[rooms.is_listed & rooms.fits].tolist()
+    found = [(name, (*rooms.point_of(name), 0.0, 1.0)) for name in names]
     in_door = {n: node for node, n in reversed([*enumerate(graph.doors.tolist())]) if n}
     for number, node in sorted(in_door.items()):
         (x, y), (u, v) = rooms.door_ends(number)
@@ -403,21 +376,18 @@ def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
 
 def _write(target: Path, files: Mapping[str, bytes]) -> None:
     """Write a folder whole or not at all, in place of one that exists."""
-    beside, old = (target.with_name(f".hybridnav.{os.getpid()}{end}") for end in ("", ".old"))
     try:
-        beside.mkdir()
-        for name, content in files.items():
-            (beside / name).write_bytes(content)
-        if target.exists():
-            target.rename(old)
-        try:
-            beside.rename(target)
-        except BaseException:
-            if old.exists():
-                old.rename(target)
-            raise
+        with TemporaryDirectory(prefix=".hybridnav.", dir=target.parent) as held:
+            new, old = Path(held, "new"), Path(held, "old")
+            new.mkdir()
+            for name, content in files.items():
+                (new / name).write_bytes(content)
+            if target.exists():
+                target.rename(old)
+            try:
+                new.rename(target)
+            finally:
+                if old.exists() and not target.exists():
+                    old.rename(target)
     except OSError as error:
         raise MapError(f"bundle {printable(target)}: cannot write: {error.strerror}") from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)

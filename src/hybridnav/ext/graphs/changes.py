@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.graphs.attach import placed_points
 from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
 
@@ -51,7 +50,7 @@ def graph_changes(before: Graph, after: Graph) -> dict[str, dict[str, list[Any]]
     >>> graph_changes(before, WaypointGraph.from_networkx(plain))["nodes"]
     {'added': [2], 'gone': [], 'moved': []}
     """
-    old, new = _by_id(before), _by_id(after)
+    old, new = (_by_id(graph) for graph in (before, after))
     moved = {
         name: math.dist(old[0][name], new[0][name]) > _MOVED_M for name in old[0] if name in new[0]
     }
@@ -103,7 +102,7 @@ def first_broken_edge(
     int or None
         The place of the edge in the route, from 0: it leads from node `route[i]` to the next, or is
         the edge `route[i]`. None where the whole route is there and free for the robot. An edge
-        that does not begin where the one before ends is broken; so is a node alone that is gone.
+        that does not begin where the one before ends is broken.
 
     Raises
     ------
@@ -132,40 +131,33 @@ def first_broken_edge(
         if not isinstance(graph, RouteGraph):
             raise InvalidValueError("a graph from a file knows no map: give grid, the map now")
         grid = graph.grid
-    points, ends = _by_id(graph)
+    (nodes, edges), ends = _ids(graph), [*map(tuple, graph.edges.tolist())]
+    edge_of = dict(zip(edges, ends, strict=True))
     if by == "nodes":
-        joined = set(ends.values())
-        pairs = [pair if pair in joined else None for pair in itertools.pairwise(route)]
-        if len(route) == 1 and route[0] not in points:
-            return 0
-    else:
-        pairs = [ends.get(edge) for edge in route]
+        edge_of = {(nodes[tail], nodes[head]): (tail, head) for tail, head in ends}
+    pairs = [edge_of.get(each) for each in (pairwise(route) if by == "nodes" else route)]
     space = FreeSpace.of(grid)
+    positions, _, is_free = placed_points(graph.points, grid, space.free)
     last = None
     for at, pair in enumerate(pairs):
-        if pair is None or last not in {None, pair[0]}:
+        if pair is None or last not in {None, pair[0]} or not is_free[[*pair]].all():
             return at
-        if not _is_free(space, [points[node] for node in pair]):
+        if not space.joins(positions[[pair[0]]], positions[[pair[1]]])[0]:
             return at
         last = pair[1]
     return None
 
 
-def _is_free(space: FreeSpace, line: Sequence[tuple[float, float]]) -> bool:
-    """Return whether the robot can drive a straight line on the map now."""
-    tail, head = space.grid.frame.positions_of(np.array(line, dtype=np.float64))
-    cells = space.cells_at(np.array([tail, head]))
-    if not ((cells >= 0) & (cells < space.free.shape)).all():
-        return False
-    return bool(space.free[tuple(cells.T)].all() and space.joins(tail[None], head[None])[0])
+def _ids(graph: Graph) -> tuple[list[Any], list[Any]]:
+    """Return the ids of nodes and edges."""
+    if isinstance(graph, RouteGraph):
+        return graph.ids[0].tolist(), graph.ids[1].tolist()
+    return list(graph.names), list(graph.edge_names)
 
 
 def _by_id(graph: Graph) -> tuple[dict[Any, tuple[float, float]], dict[Any, tuple[Any, Any]]]:
     """Return the points of nodes and the ends of edges, by their ids."""
-    if isinstance(graph, RouteGraph):
-        nodes, edges = (each.tolist() for each in graph.ids)
-    else:
-        nodes, edges = list(graph.names), list(graph.edge_names)
+    nodes, edges = _ids(graph)
     points = dict(zip(nodes, map(tuple, graph.points.tolist()), strict=True))
     pairs = [(nodes[tail], nodes[head]) for tail, head in graph.edges.tolist()]
     return points, dict(zip(edges, pairs, strict=True))

@@ -45,7 +45,7 @@ from hybridnav.ext.graphs.fleet_options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
 
@@ -118,34 +118,36 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    robot = Bundle.read(bundle, costs, operations=operations)
     others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
-    out = _checked_out(kind, out) if robot is None else robot.checked(others)
-    straight = report is not None or plot is not None or lanes_m is not None
-    _check_polylines(kind, given=polylines, straight=straight)
+    robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
+    out = bundle or _checked_out(kind, out)
+    _check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     if kind in _PARTS:
-        given = {
-            "--style": style != _STYLES[0],
-            "--keep": keep is not None,
-            "--nodes": nodes is not None,
-            "--spacing": spacing_m is not None,
-            "--stretch": stretch != _STRETCH,
-            "--lanes": lanes_m is not None,
-            "--polylines": polylines,
-            "--report": report is not None,
-            "--plot": plot is not None,
-        }
-        _check_plain(kind, given)
-    is_stretched = stretch != _STRETCH and not polylines
-    _check_style(style, {"--nodes": nodes, "--stretch": is_stretched or None}, {"--keep": keep})
+        _check_plain(
+            kind,
+            {
+                "--style": style != _STYLES[0],
+                "--keep": keep is not None,
+                "--nodes": nodes is not None,
+                "--spacing": spacing_m is not None,
+                "--stretch": stretch != _STRETCH,
+                "--lanes": lanes_m is not None,
+                "--polylines": polylines,
+                "--report": report is not None,
+                "--plot": plot is not None,
+            },
+        )
+    of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
+    _check_style(style, of_roadmaps, {"--keep": keep})
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
-    find_rooms = kind != "places"
-    topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=find_rooms)
+    topology = grow_topology(
+        model, settings, seconds, rooms_file=rooms_file, find_rooms=kind != "places"
+    )
     if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
             _write_parts(topology, kind, out, frame)
@@ -153,24 +155,22 @@ def export(
         return
     before = None if keep is None else hn.ext.graphs.load_graph(keep)
     began = time.perf_counter()
-    graph = _built(
-        topology,
-        style=style,
-        before=before,
-        nodes=nodes,
-        spacing_m=spacing_m,
+    build = _builder(
+        style,
+        nodes,
+        spacing_m,
         is_near=kind == "nav2" and lanes_m is None,
         stretch=stretch,
         seed=settings.pyramid.seed,
-        lanes_m=lanes_m,
     )
+    with progress_bar("building the graph") as advance:
+        graph = build(topology, progress=advance, **({"keep": before} if before else {}))
+        if lanes_m is not None:
+            graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
-        if robot is None:
-            left_out = _write_graph(topology, (graph, written), fleet, out, frame)
-        else:
-            left_out = robot.write(topology, graph, frame)
+        left_out = _write_graph(topology, (graph, written), fleet or robot, out, frame)
     judged = None
     if report is not None:
         with stage("comparing routes", seconds, "report"):
@@ -179,7 +179,9 @@ def export(
     figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
     lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
     lines += _ids_line(written) if fleet is None else []
-    changes = {} if before is None else hn.ext.graphs.graph_changes(before, graph)
+    # A bundle leaves out edges in keepout zones.
+    after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
+    changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
     figures |= {"changes": changes} if changes else {}
     _respond(figures, [*lines, *change_lines(changes)], seconds, as_json=as_json)
     if plot is not None:
@@ -189,37 +191,26 @@ def export(
         save_figure(plot_route_graph(graph), plot)
 
 
-def _built(
-    topology: hn.TopologicalMap,
-    *,
+def _builder(
     style: str,
-    before: WaypointGraph | None,
     nodes: int | None,
     spacing_m: float | None,
+    *,
     is_near: bool,
     stretch: float,
     seed: int,
-    lanes_m: float | None,
-) -> RouteGraph:
-    """Return the graph of a map in a style; see `export`."""
-    with progress_bar("building the graph") as advance:
-        if style == "lanes":
-            apart_m = _APART_M if spacing_m is None else spacing_m
-            graph = hn.ext.graphs.build_lane_graph(
-                topology, spacing_m=apart_m, keep=before, progress=advance
-            )
-        else:
-            graph = hn.ext.graphs.build_route_graph(
-                topology,
-                nodes=nodes,
-                spacing_m=_spacing(spacing_m, is_near=is_near),
-                stretch=stretch,
-                seed=seed,
-                progress=advance,
-            )
-        if lanes_m is not None:
-            graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
-    return graph
+) -> Callable[..., RouteGraph]:
+    """Return what builds the graph of a map in a style; see `export`."""
+    if style == "lanes":
+        apart_m = _APART_M if spacing_m is None else spacing_m
+        return partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
+    return partial(
+        hn.ext.graphs.build_route_graph,
+        nodes=nodes,
+        spacing_m=_spacing(spacing_m, is_near=is_near),
+        stretch=stretch,
+        seed=seed,
+    )
 
 
 def _export_over_floors(
@@ -249,16 +240,8 @@ def _export_over_floors(
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    apart_m = _APART_M if spacing_m is None else spacing_m
-    build = partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
-    if style != "lanes":
-        build = partial(
-            hn.ext.graphs.build_route_graph,
-            nodes=nodes,
-            spacing_m=_spacing(spacing_m, is_near=False),
-            stretch=stretch,
-            seed=reading.seed or 0,
-        )
+    seed = reading.seed or 0
+    build = _builder(style, nodes, spacing_m, is_near=False, stretch=stretch, seed=seed)
     began = time.perf_counter()
     with progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
@@ -344,15 +327,17 @@ def _check_plain(kind: str, given: dict[str, bool]) -> None:
 def _write_graph(
     topology: hn.TopologicalMap,
     graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
-    fleet: Fleet | None,
+    aim: Fleet | Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
-    if fleet is None:
-        hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
-        return ()
-    return fleet.write(topology, graphs[0], out)
+    if isinstance(aim, Fleet):
+        return aim.write(topology, graphs[0], out)
+    if aim is not None:
+        return hn.ext.graphs.export_bundle(topology, graphs[0], out, frame=frame, **aim._asdict())
+    hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
+    return ()
 
 
 def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -123,61 +123,33 @@ OperationsOption = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class Bundle:
+class Bundle(NamedTuple):
     """The options of a bundle."""
 
-    folder: Path
     costs: tuple[str, ...]
     operations: bool
 
     @classmethod
-    def read(
-        cls, folder: Path | None, costs: list[str] | None, *, operations: bool
-    ) -> Bundle | None:
-        """Return the options, None for no bundle.
+    def checked(cls, folder: Path | None, given: Bundle, others: dict[str, Any]) -> Bundle | None:
+        """Return the options, None for no bundle. Refuse folders that hold other files, costs that
+        are no masks, and options that do not go with a bundle, or without one.
 
         Raises
         ------
-        UsageError
-            When options of a bundle are given without one.
-        """
-        if folder is None and (costs or operations):
-            option = "--costs" if costs else "--operations"
-            raise UsageError(f"{option} goes with --bundle DIR: give it, or leave {option} out")
-        return None if folder is None else cls(folder, tuple(costs or ()), operations)
-
-    def checked(self, others: dict[str, Any]) -> Path:
-        """Return the folder, or refuse it for other files, costs that are no masks, or options that
-        do not go with a bundle.
-
-        Raises
-        ------
-        UsageError
+        InvalidValueError, UsageError
             When one of them is given.
         """
         from hybridnav.ext.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
 
-        for option, given in others.items():
-            if given:
-                raise UsageError(f"--bundle does not go with {option}: leave one of them out")
-        try:
-            checked_masks(self.costs)
-            check_bundle(self.folder)
-        except hn.errors.InvalidValueError as error:
-            raise UsageError(f"--{error}") from None
-        return self.folder
-
-    def write(self, topology: hn.TopologicalMap, graph: RouteGraph, frame: str) -> tuple[str, ...]:
-        """Write the bundle; return what it does not hold."""
-        return hn.ext.graphs.export_bundle(
-            topology,
-            graph,
-            self.folder,
-            costs=self.costs,
-            operations=self.operations,
-            frame=frame,
-        )
+        for option, value in others.items() if folder else given._asdict().items():
+            if value:
+                wrong = f"{option} does not go with" if folder else f"--{option} needs"
+                raise UsageError(f"{wrong} --bundle: leave it out")
+        if folder is None:
+            return None
+        checked_masks(given.costs)
+        check_bundle(folder)
+        return given
 
 
 @dataclass(frozen=True)
