@@ -124,7 +124,7 @@ OperationsOption = Annotated[
 
 
 class Bundle(NamedTuple):
-    """The options of a bundle."""
+    """The options of a bundle: masks as `costs`, and whether edges have `operations`."""
 
     costs: tuple[str, ...]
     operations: bool
