@@ -1,7 +1,7 @@
 """The table of graphs that people have drawn: what is wrong with them, and how long routes are.
 
 Seven graphs of Nav2 and STRANDS on their maps, and beside each two that hybridnav builds from the
-map: with 300 nodes to aim at, and with as many as the routes need. Pairs are random free cells
+map: lanes, and a roadmap. Pairs are random free cells
 with a path between them. `at a wall` are routes over an edge that the robot cannot follow, in the
 graph as it is; `solved` and the losses, over the shortest any-angle path, are those without such
 edges, and the losses are those of the pairs that all three graphs solve (`common`). Every route is
@@ -25,8 +25,10 @@ from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Callable
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.ext.graphs import RouteGraph
     from hybridnav.harness.scenes import Pair
     from hybridnav.harness.tables import Row
 
@@ -39,7 +41,11 @@ GRAPHS = {
     "strands/tsc_y3/tsc_y3_final.tplg": "strands/tsc_y3/tsc20160523.yaml",
     "strands/tsc_y4/tsc_y4_final.tplg.tpl": "strands/tsc_y4/tsc_1701.yaml",
 }
-_AIMS: dict[str, int | None] = {"built, 300": 300, "built": None}
+BUILDERS: dict[str, Callable[[hn.TopologicalMap], RouteGraph]] = {
+    "lanes": hn.ext.graphs.build_lane_graph,
+    "roadmap": hn.ext.graphs.build_route_graph,
+}
+"""What hybridnav builds, by the names of the styles of `hybridnav export`."""
 
 
 def rows_of(
@@ -47,8 +53,8 @@ def rows_of(
 ) -> list[Row]:
     """Return the rows of a drawn graph, and of those that are built."""
     graphs = {graph.format: graph}
-    for name, nodes in _AIMS.items():
-        built = hn.ext.graphs.build_route_graph(topology, nodes=nodes)
+    for name, build in BUILDERS.items():
+        built = build(topology)
         graphs[name] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name=name)
     grid = topology.grid
     losses = [

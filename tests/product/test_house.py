@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 54_675,
-    "lines": 90_975,
-    "files": 373,
-    "code outside ext": 37_370,
+    "code": 55_440,
+    "lines": 92_160,
+    "files": 378,
+    "code outside ext": 38_160,
     "lines of a file, median": 268,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
     "arrows, with single modules": 75,
     "files visited by paper": 51,
-    "lines visited by paper": 13_231,
-    "modules of a plan and a picture": 131,
+    "lines visited by paper": 12_942,
+    "modules of a plan and a picture": 132,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
-    "parameters of commands, shared ones once": 111,
-    "lines of tests": 57_670,
+    "parameters of commands, shared ones once": 113,
+    "lines of tests": 58_010,
 }
 
 

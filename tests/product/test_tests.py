@@ -28,7 +28,7 @@ def home_of(private: str) -> Path:
 
     That is the folder of its package, and for a module beside the packages a file of its name.
     """
-    _, *packages, module = private.removesuffix(".kernels").replace(".kernels.", ".").split(".")
+    _, *packages, module = private.replace(".kernels.", ".").split(".")
     return Path(*packages) if packages else Path(f"test_{module.lstrip('_')}.py")
 
 

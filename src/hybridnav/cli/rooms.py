@@ -22,6 +22,7 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
+from hybridnav.cli.older import Older, older_files
 from hybridnav.cli.options import JsonOption, MapArgument, OutOption, PlotOption, RoomsOption
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
@@ -73,6 +74,23 @@ AllOption = Annotated[
         "--all", help="List and draw rooms that cannot be entered, gaps, and doors to them too."
     ),
 ]
+NamesFromOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--names-from",
+        metavar="FILE",
+        help="Carry names and numbers of doors from the rooms of an older map, in any frame.",
+    ),
+]
+NamesMapOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--names-map",
+        metavar="OLD",
+        help="The map of --names-from.",
+        show_default="the only map in the folder of that file",
+    ),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
@@ -83,6 +101,8 @@ def rooms(
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
+    names_from: NamesFromOption = None,
+    names_map: NamesMapOption = None,
     at: AtOption = None,
     force: ForceOption = False,
     tolerance_m: ToleranceOption = None,
@@ -96,20 +116,15 @@ def rooms(
 
     --out writes them as YAML, to be edited.
     """
-    check_picture(plot)
     asked = _asked_point(at, out, plot)
-    if out is not None and out.exists() and not force:
-        raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
-    check_output(out, "--out", (".yaml", ".yml"))
-    if tolerance_m is not None and (out is None or not 0 < tolerance_m < math.inf):
-        needed = "needs --out" if out is None else "must be positive and finite"
-        raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")
+    _check_files(out, plot, tolerance_m, force=force)
     finds = method is not None or least_area_m2 is not None
     if rooms_file is not None and finds:
         option = "--least-area" if method is None else "--method"
         raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
     checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
+    older = older_files(names_from, names_map)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -121,6 +136,11 @@ def rooms(
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:
             labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
+    old = None
+    if older is not None:
+        with stage("carrying names", seconds, "names"):
+            old = Older.of(older, reading, (labels, grid))
+        labels = old.carried.labels
     if asked is not None:
         found = _found_at(asked, labels, grid)
         answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))
@@ -137,24 +157,52 @@ def rooms(
     with stage("building the pyramid", seconds, "pyramid"):
         topology = model.grown(settings.pyramid, labels)
     figures = _figures(topology.rooms, areas_m2) | {"map": str(map_file), "seconds": seconds}
+    if old is not None:
+        figures |= {"names": old.figures()}
     answer(
         json.dumps(figures, allow_nan=False) + "\n"
         if as_json
         else "\n".join(
-            [_listing(topology.rooms, areas_m2, everything=everything), *islands_line(grid)]
+            [
+                _listing(topology.rooms, areas_m2, everything=everything),
+                *([] if old is None else old.lines()),
+                *islands_line(grid),
+            ]
         )
         + f"\nseconds    {timings(seconds)}\n"
     )
     if plot is not None:
-        from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
+        _draw(plot, topology, old, everything=everything)
 
+
+def _draw(plot: Path, topology: hn.TopologicalMap, old: Older | None, *, everything: bool) -> None:
+    """Write the picture of the rooms, beside those of the older map if there is one."""
+    # matplotlib on demand
+    from hybridnav.viz import plot_rooms, plot_rooms_beside, save_figure  # noqa: PLC0415
+
+    if old is None:
         save_figure(plot_rooms(topology, everything=everything), plot)
+    else:
+        save_figure(plot_rooms_beside(old.topology, topology), plot)
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
     from hybridnav.topology.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
+
+
+def _check_files(
+    out: Path | None, plot: Path | None, tolerance_m: float | None, *, force: bool
+) -> None:
+    """Refuse files that cannot be written, and a tolerance that is none or of no file."""
+    check_picture(plot)
+    if out is not None and out.exists() and not force:
+        raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
+    check_output(out, "--out", (".yaml", ".yml"))
+    if tolerance_m is not None and (out is None or not 0 < tolerance_m < math.inf):
+        needed = "needs --out" if out is None else "must be positive and finite"
+        raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")
 
 
 def _checked_method(method: str) -> Segmentation:
@@ -205,6 +253,8 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "number": number,
                 "name": name,
                 "area_m2": round(area_m2, 6),
+                "kind": None if kind is None else kind.name,
+                "kind_confidence": None if kind is None else round(kind.confidence, 3),
                 "point_m": _at(rooms, name),
                 "centre_m": _rounded(facts.centre_m),
                 "extent_m": [_rounded(facts.low_m), _rounded(facts.high_m)],
@@ -215,9 +265,10 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                     for door, other in beside
                 ],
             }
-            for number, (name, area_m2, fits, is_listed, facts, beside) in enumerate(
+            for number, (name, kind, area_m2, fits, is_listed, facts, beside) in enumerate(
                 zip(
                     rooms.names,
+                    rooms.kinds,
                     areas_m2.tolist(),
                     rooms.fits.tolist(),
                     rooms.is_listed.tolist(),
@@ -273,25 +324,27 @@ def _listing(rooms: Rooms, areas_m2: FloatArray, *, everything: bool) -> str:
     left_out = f"; not listed without --all: {rest}" if rest else ""
     lines = [
         f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
-        "columns    room, number, area, extent in x and y, its point, doors to (number: width)",
+        "columns    room, number, area, extent in x and y, point, kind, doors to (number: width)",
     ]
     if not rooms.is_building:
         lines.insert(1, "building   no door between walls: these rooms are parts of open space")
     measures = _measures_of(rooms.labels, rooms.grid)
     each = zip(
         rooms.names,
+        rooms.kinds,
         areas_m2.tolist(),
         rooms.fits.tolist(),
         measures,
         _neighbours(rooms, rooms.doors if everything else rooms.listed_doors),
         strict=True,
     )
-    for number, (name, area_m2, fits, facts, beside) in enumerate(each, start=1):
+    for number, (name, kind, area_m2, fits, facts, beside) in enumerate(each, start=1):
         if not is_shown[number - 1]:
             continue
         point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
         size = "{:.1f} x {:.1f} m".format(*facts.size_m)
-        stated = [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
+        stated = [] if kind is None else [kind.name]
+        stated += [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
         stated += [_door(door, other) for door, other in beside]
         lines.append(
             f"{name:<{width}} {number:>{digits}} {area_m2:>9.2f} m²  {size:<15} {point:<16} "

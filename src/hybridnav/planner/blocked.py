@@ -13,7 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.islands import in_runs
 from hybridnav.planner.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
-from hybridnav.planner.named import no_places
+from hybridnav.planner.endpoints import no_places
 from hybridnav.pyramid import LevelArc
 from hybridnav.topology.rooms import Door
 

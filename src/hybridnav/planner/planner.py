@@ -12,10 +12,10 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.costs import PlannerCosts
+from hybridnav.planner.endpoints import no_places, read_points
 from hybridnav.planner.follow import begun, update_of
 from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
-from hybridnav.planner.named import no_places, read_points
 from hybridnav.planner.planning import Planning
 from hybridnav.planner.settings import OmplPlannerSettings
 

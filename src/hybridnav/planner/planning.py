@@ -17,7 +17,7 @@ from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path, PlanResult, PlanStatus
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import CostFinish
-from hybridnav.planner.named import cells_of_endpoints, check_at, no_places, read_end, refusal
+from hybridnav.planner.endpoints import cells_of_endpoints, check_at, no_places, read_end, refusal
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells

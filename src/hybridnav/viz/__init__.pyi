@@ -9,7 +9,7 @@ from .levels import plot_levels as plot_levels
 from .maps import plot_level as plot_level, plot_map as plot_map, plot_places as plot_places
 from .paper import plot_dual as plot_dual, plot_figure1 as plot_figure1
 from .plan import plot_paths as plot_paths, plot_plan as plot_plan
-from .room_map import plot_rooms as plot_rooms
+from .room_map import plot_rooms as plot_rooms, plot_rooms_beside as plot_rooms_beside
 from .routes import plot_alternatives as plot_alternatives, plot_tour as plot_tour
 from .canvas import save_figure as save_figure
 from .search import plot_mesh as plot_mesh, plot_search as plot_search

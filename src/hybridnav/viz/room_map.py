@@ -12,7 +12,7 @@ from hybridnav.maps import NO_ROOM
 from hybridnav.maps.islands import unique_rows
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import MAX_HEIGHT, Canvas, draw_cells, known_view, new_figure
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.layout import finish_with_axes
 from hybridnav.viz.maps import ground_entries, swatch
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
+_AROUND, _PANEL = 0.1, 0.46
+"""Height of titles and legends of two maps, and width of each, as shares of the whole width."""
 DOOR_POINTS = 1.2
 """Half the side of a door's dot."""
 
@@ -114,6 +116,48 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     entries += [*ground_entries(grid), *key]
     finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
+
+
+def plot_rooms_beside(
+    old: TopologicalMap, new: TopologicalMap, *, width_in: float = 2 * style.FULL_WIDTH_IN
+) -> Axes:
+    """Draw the rooms of two maps beside each other, such as before and after names were carried.
+
+    Parameters
+    ----------
+    old, new
+        Topological maps with rooms; see `plot_rooms`.
+    width_in
+        Width of the figure in inches.
+
+    Returns
+    -------
+    Axes
+        Those of the new map, on the right.
+
+    Raises
+    ------
+    InvalidValueError
+        When a map has no rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_rooms_beside
+    >>> grid = hn.OccupancyGrid(np.zeros((4, 8)), robot_radius_m=0)
+    >>> rooms = hn.RoomLabels(("kitchen",), np.zeros((4, 8), dtype=int))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    >>> len(plot_rooms_beside(topology, topology).figure.axes)
+    2
+    """
+    sizes = [known_view(each.grid).size for each in (old, new)]
+    height = max(float(high / wide) for wide, high in sizes)
+    figure = new_figure(width_in, _AROUND + _PANEL * min(MAX_HEIGHT, height))
+    axes = figure.subplots(1, 2)
+    figure.subplots_adjust(left=0.04, right=0.99, bottom=0.17, top=0.94, wspace=0.1)
+    for ax, each in zip(axes, (old, new), strict=True):
+        plot_rooms(each, ax=ax)
+    right: Axes = axes[1]
+    return right
 
 
 def _key(numbered: Sequence[int], names: Sequence[str]) -> list[Entry]:

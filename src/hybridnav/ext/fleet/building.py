@@ -16,7 +16,8 @@ from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import did_you_mean, place_of_name
 from hybridnav.planner import PlanStatus
-from hybridnav.planner.named import cells_of_endpoints, check_names, read_point, refusal
+from hybridnav.planner.endpoints import cells_of_endpoints, read_point, refusal
+from hybridnav.planner.named import check_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence

@@ -18,7 +18,7 @@ from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs.files.nav2 import nav2_bytes, nav2_features
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
-from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
+from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.costs.factors import mask_on_map
 from hybridnav.maps.costs.files import parse_costs
@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 MOST_ROOMS = 100
 """Largest value that map_server's mode `raw` keeps; a larger one becomes unknown."""
 _CLASSES = ("corridor", "door", "free", "hall", "room")
-_DOORS, _SLENDER, _HALL_M2 = 3, 0.25, 60.0
-"""A corridor has so many passages, and this share or less of the area of the square on its longest
-extent: a strip 1 : 4. A hall is another room of this area in square metres or more."""
 _MARGIN_M = 0.25
 """Clearance beyond the robot's radius below which an edge is narrow, in metres: what lanes keep."""
 _GRAPH, _NAMES, _PARAMS = "graph.geojson", "room_names.yaml", "nav2_params.yaml"
@@ -278,7 +275,8 @@ def _edge_facts(
     if "speed" in specs:
         percent = _least(graph, 100.0 / specs["speed"].layer(graph.grid).factors.astype(np.float64))
         full_mps = specs["speed"].settings.get("full_speed_mps", math.nan)
-    classes = _room_classes(rooms)
+    named = zip(rooms.names, rooms.kinds, strict=True)
+    classes = {name: "room" if kind is None else kind.name for name, kind in named}
     has_jambs = {door.number for door in rooms.doors if not door.is_opening}
     spare = (graph.clearances_m - graph.grid.robot_radius_m) / _MARGIN_M
     penalties = graph.lengths_m * (1 - np.clip(spare, 0, 1))
@@ -294,23 +292,6 @@ def _edge_facts(
             facts["penalty"] = round(float(penalties[edge]), 3)
         found.append(facts)
     return found
-
-
-def _room_classes(rooms: Rooms) -> dict[str, str]:
-    """Return the class of each room: corridor, hall or room."""
-    count = len(rooms.names)
-    cells = np.argwhere((rooms.labels.label_of >= 0) & (rooms.grid.measured == CellClass.FREE))
-    label = rooms.labels.label_of[tuple(cells.T)]
-    sizes = np.maximum(np.bincount(label, minlength=count), 1)
-    middle = [np.bincount(label, each, minlength=count) / sizes for each in cells.T]
-    reach = np.zeros(count)  # the square of the greatest distance from the middle, in cells
-    np.maximum.at(reach, label, ((cells - np.stack(middle, axis=1)[label]) ** 2).sum(axis=1))
-    is_slender = sizes <= _SLENDER * 4 * reach
-    passages = [name for door in rooms.listed_doors if door.passable for name in door.rooms]
-    ways = zip(rooms.names, is_slender.tolist(), strict=True)
-    is_way = [slender and passages.count(name) >= _DOORS for name, slender in ways]
-    sizes_of = zip(rooms.names, is_way, (rooms.areas_m2 >= _HALL_M2).tolist(), strict=True)
-    return {name: "corridor" if way else "hall" if wide else "room" for name, way, wide in sizes_of}
 
 
 def _open(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> list[bool]:

@@ -14,6 +14,7 @@ from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.islands import unique_rows
+from hybridnav.topology.rooms.carrying import Heirs, Overlap, heirs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -323,9 +324,6 @@ def _clearances(source: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 # Places of a new version that are those of the old one.
 
-Overlap = tuple[int, int, int]
-"""An old place, a new one or -1 for none, and the cells that they have in common."""
-
 
 class Events(NamedTuple):
     """What became of places; see `Update`."""
@@ -342,21 +340,10 @@ class Events(NamedTuple):
     """Old ones that bear their number still."""
 
 
-class Heirs(NamedTuple):
-    """The heirs of old places."""
-
-    of: dict[int, int]
-    """The heir of each old place that has one, by the number that it has in the draft."""
-    name: dict[int, int]
-    """The final number of each heir."""
-
-
 def settle(draft: CellDraft) -> Events:
     """Give the places of a draft the numbers of old ones as far as these have heirs.
 
-    The heir of an old place is the new one that holds more than half of its cells. An heir of
-    several bears the number of the one with which it shares the most cells; the least number breaks
-    ties. Most places bear their final numbers already.
+    See `heirs_of`. Most places bear their final numbers already.
     """
     first = draft.before.next_place
     moved: list[list[int]] = draft.tiles.moved(draft.before.tiles).tolist()
@@ -382,18 +369,6 @@ def settle(draft: CellDraft) -> Events:
     now = draft.places.areas([*name.values()])
     areas_now = {place: now[final] for place, final in name.items()}
     return events_of(found, Heirs(heirs.of, name), areas_now, first)
-
-
-def heirs_of(found: list[Overlap], areas: dict[int, int]) -> Heirs:
-    """Return the heirs of old places, of which the cells that they had are given."""
-    of, shared = {}, {}
-    for old, new, cells in found:
-        if 2 * cells > areas[old] and new != NO_PLACE:
-            of[old], shared[old] = new, cells
-    name: dict[int, int] = {}
-    for old in sorted(of, key=lambda place: (-shared[place], place)):
-        name.setdefault(of[old], old)
-    return Heirs(of, name)
 
 
 def events_of(

@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.identities import Overlap, events_of, heirs_of, shift_of
+from hybridnav.ext.live.identities import events_of, shift_of
 from hybridnav.ext.live.pyramid import OnlinePyramid
 from hybridnav.ext.live.region_growth import (
     Touched,
@@ -23,6 +23,7 @@ from hybridnav.ext.live.region_growth import (
 )
 from hybridnav.ext.live.tiles import NO_PLACE
 from hybridnav.maps.checks import checked_type
+from hybridnav.topology.rooms.carrying import Overlap, heirs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

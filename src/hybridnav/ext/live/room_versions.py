@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -25,6 +24,7 @@ from hybridnav.ext.live.rooms_window import (
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names
+from hybridnav.topology.rooms.carrying import NUMBERED
 from hybridnav.topology.rooms.find import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray, IntArray
     from hybridnav.maps.room_labels import Point
-
-_NUMBERED = re.compile(r"room-([1-9][0-9]{0,8})")
-"""Names of rooms that nobody has named."""
 
 
 @copies_alike
@@ -115,7 +112,7 @@ class OnlineRooms:
         names = {
             n: name
             for n, name in zip(numbers, labels.names, strict=True)
-            if not _NUMBERED.fullmatch(name)
+            if not NUMBERED.fullmatch(name)
         }
         number_of = np.append(np.array(numbers, np.int32), np.int32(NO_ROOM))[labels.label_of]
         found = doors_of(number_of, grid, (0, 0), labels.doors)
@@ -233,7 +230,7 @@ class OnlineRooms:
         """
         self._check(number)
         check_names((name,))
-        numbered = _NUMBERED.fullmatch(name)
+        numbered = NUMBERED.fullmatch(name)
         if numbered and int(numbered[1]) != number:
             raise InvalidValueError(
                 f"room {number} cannot be called {brief(name)}, the name of room {numbered[1]} as "
@@ -353,7 +350,7 @@ class RoomsUpdate:
 
 def _numbers(names: tuple[str, ...]) -> list[int]:
     """Return the numbers of rooms by their names."""
-    found = [_NUMBERED.fullmatch(name) for name in names]
+    found = [NUMBERED.fullmatch(name) for name in names]
     taken = {int(match[1]) for match in found if match}
     free = iter(n for n in range(1, len(names) + len(taken) + 1) if n not in taken)
     return [int(match[1]) if match else next(free) for match in found]

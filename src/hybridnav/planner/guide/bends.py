@@ -38,12 +38,12 @@ class Leg:
     endpoint: tuple[float, float] = (0.0, 0.0)
     """Point where it ends, `(x, y)` in metres, map frame."""
     shape: Shape = "room"
-    """Shape of the space outside rooms."""
+    """Shape of the room, or of the space outside rooms."""
 
     @property
     def space(self) -> Space:
-        """The room, or the space outside rooms by its shape."""
-        return Space(self.room, "room" if self.room is not None else self.shape)
+        """The room, or the space outside rooms, by its shape."""
+        return Space(self.room, self.shape)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plain values for JSON."""

@@ -40,7 +40,7 @@ class Space:
     name: str | None
     """Name of the room, None outside rooms."""
     shape: Shape = "room"
-    """Shape outside rooms."""
+    """Its shape; of a room that nobody has named its kind, of one with a name `"room"`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plain values for JSON."""

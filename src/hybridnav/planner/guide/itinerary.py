@@ -11,6 +11,7 @@ from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
 from hybridnav.route import RouteFinder
+from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -142,10 +143,12 @@ class Guide:
         return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
 
     def _shape(self, vertex: int, cells: LongArray) -> Shape:
-        """Return the shape of a vertex of the room level that has no name, for a path in it."""
+        """Return the shape of a vertex of the room level, for a path in it."""
         rooms, level = self._rooms, self._rooms.level
-        if rooms.label_of_vertex[vertex] >= 0:
-            return "room"
+        label = int(rooms.label_of_vertex[vertex])
+        if label >= 0:
+            kind = rooms.kinds[label] if FOUND_NAME.fullmatch(rooms.names[label]) else None
+            return "room" if kind is None else kind.name
         area_m2 = float(level.areas[vertex]) * rooms.grid.cell_area_m2
         if area_m2 < _LEAST_ROOM_M2:
             return "passage"

@@ -315,6 +315,10 @@ class _Writer:
         if space.name is None:
             found: SpaceWords = getattr(self.words, space.shape)
             return found
+        if space.shape != "room":
+            shape: SpaceWords = getattr(self.words, space.shape)
+            texts = {part: f"{text} {space.name}" for part, text in vars(shape).items()}
+            return type(shape)(**texts)
         named = self.words.common if _is_common(space.name) else self.words.named
         return type(named)(
             inside=named.inside.format(name=space.name),

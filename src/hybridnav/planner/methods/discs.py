@@ -13,10 +13,10 @@ from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import cost_along
 from hybridnav.planner.costs import CostFinish
+from hybridnav.planner.endpoints import refusal
 from hybridnav.planner.methods.cheapest import OverLattice
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.methods.shortest import OverMesh
-from hybridnav.planner.named import refusal
 from hybridnav.planner.settings import CheapestSettings, ShortestSettings
 from hybridnav.search.found import ClosedCells
 

@@ -20,6 +20,7 @@ from hybridnav.topology.rooms.doors import (
     farthest_ends,
     measured_clearance_m,
 )
+from hybridnav.topology.rooms.kinds import RoomKind, kinds_of
 from hybridnav.topology.rooms.listing import Listing
 
 if TYPE_CHECKING:
@@ -119,6 +120,14 @@ class Rooms:
     def names(self) -> tuple[str, ...]:
         """Names of the rooms."""
         return self.labels.names
+
+    @cached_property
+    def kinds(self) -> tuple[RoomKind | None, ...]:
+        """What each room is by its shape, None for one that is just a room."""
+        found = kinds_of(
+            self.labels.label_of, self.grid.measured == CellClass.FREE, self.grid.resolution_m
+        )
+        return (*found, *(None,) * (len(self.names) - len(found)))
 
     @cached_property
     def label_of_vertex(self) -> IntArray:

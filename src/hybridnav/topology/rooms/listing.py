@@ -20,7 +20,7 @@ LEAST_WIDTH_M = 1.0
 _LEAST_AREA_M2 = 1.0
 """Area below which a space without a name is a pocket, in square metres: the least area of a room
 that is found."""
-_FOUND = re.compile(r"room-\d+")
+FOUND_NAME = re.compile(r"room-\d+")
 """Names that `find_rooms` gives. Who gave another name wants to see it."""
 
 
@@ -64,7 +64,9 @@ class Listing:
         can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
         is_large = areas * level.grid.resolution_m**2 >= _LEAST_AREA_M2
         is_listed = is_wide & can_enter & is_large
-        is_own = np.array([_FOUND.fullmatch(name) is None for name in labels.names], dtype=np.bool_)
+        is_own = np.array(
+            [FOUND_NAME.fullmatch(name) is None for name in labels.names], dtype=np.bool_
+        )
         is_listed[:n_rooms] = (is_wide | can_enter)[:n_rooms] | is_own
         return cls(space_of, is_listed)
 

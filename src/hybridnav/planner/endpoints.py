@@ -1,0 +1,135 @@
+"""Checks of starts and goals."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.maps import CellClass
+from hybridnav.planner import PlanStatus
+
+if TYPE_CHECKING:
+    from typing import NoReturn
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.search.found import ClosedCells
+
+Cell = tuple[int, int]
+Points = tuple["FloatArray", "FloatArray"]
+
+_FREE, _UNEXPLORED = int(CellClass.FREE), int(CellClass.UNEXPLORED)
+_OUTSIDE = PlanStatus.START_OUTSIDE, PlanStatus.GOAL_OUTSIDE
+_REFUSED = (
+    {
+        CellClass.OCCUPIED: PlanStatus.START_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.START_UNEXPLORED,
+    },
+    {
+        CellClass.OCCUPIED: PlanStatus.GOAL_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
+    },
+)
+
+
+def no_places() -> NoReturn:
+    """Refuse what needs places, on a grid that changed after they were built."""
+    raise InvalidValueError(
+        "the map changed after its places were built, and places, rooms and doors belong to them: "
+        "call update with topology, the topological map of the grid now"
+    )
+
+
+def check_at(at: str) -> None:
+    """Refuse a position in a room that is none of the two.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is another word.
+    """
+    if at not in {"anywhere", "point"}:
+        raise InvalidValueError(f"at must be 'anywhere' or 'point', got {brief(at)}")
+
+
+def cells_of_endpoints(
+    grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
+) -> tuple[Cell, Cell] | PlanStatus:
+    """Return the cells of start and goal, or the status of one that is not valid."""
+    (x, y), (goal_x, goal_y) = points[0].tolist(), points[1].tolist()
+    cells = grid.frame.cell_of(x, y), grid.frame.cell_of(goal_x, goal_y)
+    classes = grid.classes
+    rows, cols = classes.shape
+    for (row, col), outside in zip(cells, _OUTSIDE, strict=True):
+        if not (0 <= row < rows and 0 <= col < cols):
+            return outside
+    for cell, refused in zip(cells, _REFUSED, strict=True):
+        of_class = classes[cell]
+        may_enter = of_class == _FREE or (allow_unexplored and of_class == _UNEXPLORED)
+        if not may_enter:
+            return refused[CellClass(of_class)]
+    return cells
+
+
+def refusal(
+    closed: ClosedCells, cells: tuple[Cell, Cell], shape: tuple[int, int]
+) -> PlanStatus | None:
+    """Return the status of a query whose start or goal is closed, None if neither is."""
+    shut = closed.holds(np.array(cells) @ [shape[1], 1])
+    if not shut.any():
+        return None
+    return PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
+
+
+def _numbers(given: ArrayLike) -> FloatArray:
+    """Convert to float64; a single NaN for a value that is not numeric."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.full(1, np.nan)
+
+
+def read_point(name: str, point: ArrayLike) -> FloatArray:
+    """Return a position, float64 (2,)."""
+    xy = _numbers(point)
+    if xy.shape != (2,) or not (math.isfinite(xy[0]) and math.isfinite(xy[1])):
+        raise InvalidValueError(
+            f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
+        )
+    return xy
+
+
+def read_end(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
+    """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
+    pose = _numbers(given)
+    if pose.shape == (2,) and not needs_heading and np.isfinite(pose).all():
+        return pose
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
+        raise InvalidValueError(
+            f"{name} must be {pair}three finite numbers (x, y, yaw) in metres and radians, "
+            f"got {given!r:.80}"
+        )
+    return pose
+
+
+def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
+    """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0.
+
+    Headings that are given and not needed are left out: nothing of a batch depends on them.
+    """
+    rows, width = _numbers(points), 3 if needs_heading else 2
+    if rows.shape in {(0,), (0, 2), (0, 3)}:
+        return np.empty((0, width))
+    if rows.ndim != 2 or rows.shape[1] not in {width, 3} or not np.isfinite(rows).all():  # noqa: PLR2004
+        pair = "" if needs_heading else "coordinates (x, y) in metres, shape (n, 2), or "
+        raise InvalidValueError(
+            f"{name} must be finite {pair}poses (x, y, yaw) in metres and radians, shape (n, 3), "
+            f"got {points!r:.80}"
+        )
+    return rows[:, :width]
