@@ -6,7 +6,6 @@ import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
-from hybridnav._base.files import printable
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.attach import placed_points
 from hybridnav.ext.graphs.judge import FreeSpace
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 _MOVED_M = 1e-3
 """Distance in metres above which a node has moved: files are written in more digits."""
-_SHOWN = 8
-"""Ids in a line of a summary."""
 
 Graph = RouteGraph | WaypointGraph
 
@@ -64,17 +61,6 @@ def graph_changes(before: Graph, after: Graph) -> dict[str, dict[str, list[Any]]
         }
         for at, kind in enumerate(("nodes", "edges"))
     }
-
-
-def change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
-    """Return the lines of a summary about changes, none where no graph was given."""
-    lines = []
-    for kind, ids in changes.items():
-        for what, names in ids.items():
-            more = ", ..." if len(names) > _SHOWN else ""
-            listed = ", ".join(printable(str(name)) for name in names[:_SHOWN]) + more
-            lines += [f"{what:<10} {len(names):,} {kind}: {listed}"] if names else []
-    return lines or ["changed    nothing"] * bool(changes)
 
 
 def first_broken_edge(

@@ -25,7 +25,6 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
-from hybridnav.ext.graphs.changes import change_lines
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     AnchorOption,
@@ -59,6 +58,8 @@ _ENDINGS = {
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
 _STYLES = ("lanes", "roadmap")
+_SHOWN = 8
+"""Ids in a line about changes."""
 _STRETCH = 1.05
 _APART_M, _NEAR_M, _FAR_M = 4.0, 1.0, 2.0
 """Spacing of lanes; of roadmaps for Nav2, which joins them at the nearest node; and of all other
@@ -183,7 +184,7 @@ def export(
     after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
     figures |= {"changes": changes} if changes else {}
-    _respond(figures, [*lines, *change_lines(changes)], seconds, as_json=as_json)
+    _respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
     if plot is not None:
         from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
@@ -267,6 +268,17 @@ def _export_over_floors(
     links = ", ".join(printable(link.name) for link in graph.links) or "none"
     lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
     _respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
+
+
+def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
+    """Return the lines of a summary about changes, none where no graph was given."""
+    lines = []
+    for kind, ids in changes.items():
+        for what, names in ids.items():
+            more = ", ..." if len(names) > _SHOWN else ""
+            listed = ", ".join(printable(str(name)) for name in names[:_SHOWN]) + more
+            lines += [f"{what:<10} {len(names):,} {kind}: {listed}"] if names else []
+    return lines or ["changed    nothing"] * bool(changes)
 
 
 def _respond(
