@@ -103,6 +103,64 @@ def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
     assert cli(*given, "--keep", tmp_path / "no.geojson").refuses(3, "no.geojson")
 
 
+def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
+    folder = tmp_path / "robot"
+    given = ("export", FIGURE, *SMALL[:2], "--bundle", folder)
+    done = cli(*given, "--json")
+    assert (done.code, done.err, done.answer["left_out"]) == (0, "", [])
+    graph = read_nav2(folder / "graph.geojson")
+    assert (done.answer["nodes"], done.answer["edges"]) == (len(graph.points), len(graph.edges))
+    assert "changes" not in done.answer
+    # The map is the same, so are the ids, and the folder is a bundle of before.
+    done = cli(*given, "--operations", "--keep", folder / "graph.geojson")
+    assert (done.code, "changed    nothing" in done.out.splitlines()) == (0, True)
+    assert read_nav2(folder / "graph.geojson").edges == graph.edges
+    # Edges in a keepout zone are gone, and at the next time nothing has changed.
+    (x, y), (u, v) = next(iter(graph.lines.values()))
+    corner = [(x + u) / 2 - 0.05, (y + v) / 2 - 0.05, 0]
+    (tmp_path / "zone.pgm").write_bytes(b"P5 1 1 255 " + bytes([100]))
+    (tmp_path / "zone.yaml").write_text(
+        f"{{image: zone.pgm, resolution: 0.1, origin: {corner}, negate: 0, mode: raw, "
+        "free_thresh: 0.196, occupied_thresh: 0.65}"
+    )
+    zone = (*given, "--costs", f"keepout:{tmp_path / 'zone.yaml'}")
+    done = cli(*zone, "--keep", folder / "graph.geojson", "--json")
+    gone = done.answer["changes"]["edges"]["gone"]
+    assert set(gone) == set(graph.edges) - set(read_nav2(folder / "graph.geojson").edges)
+    assert gone
+    assert done.answer["left_out"] == [f"{len(gone)} edges through keepout zones"]
+    assert "changed    nothing" in cli(*zone, "--keep", folder / "graph.geojson").out
+    assert cli(*given, "-o", tmp_path / "g.geojson").refuses(2, "--out does not go with --bundle")
+    assert cli(*given, "--polylines").refuses(2, "--polylines does not go with --bundle")
+    assert cli(*given, "--format", "rooms").refuses(2, "--format rooms does not go with --bundle")
+    assert cli(*given, "--costs", "clearance").refuses(2, "costs of a bundle are")
+    assert cli(*given, "--costs", "speed:none.yaml").refuses(3, "none.yaml")
+    assert cli("export", FIGURE).refuses(2, "--out is missing")
+    plain = ("export", FIGURE, "-o", tmp_path / "g.geojson")
+    assert cli(*plain, "--operations").refuses(2, "--operations needs --bundle")
+    assert cli(*plain, "--costs", "speed:x").refuses(2, "--costs needs --bundle")
+    (folder / "notes.txt").write_text("mine")
+    assert cli(*given).refuses(2, "bundle", "it holds notes.txt")
+    assert cli("export", FIGURE, "--bundle", tmp_path / "a" / "b").refuses(2, "there is no folder")
+    assert cli("export", FIGURE, "--bundle", folder / "notes.txt").refuses(2, "Not a directory")
+    assert cli("export", FIGURE, "--bundle", tmp_path / ("x" * 300)).refuses(2, "too long")
+
+
+def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):
+    first, second = tmp_path / "a.geojson", tmp_path / "b.geojson"
+    cli("export", FIGURE, "-o", first, *SMALL[:2])
+    whole = json.loads(first.read_text())
+    gone = next(f for f in whole["features"] if f["geometry"]["type"] == "LineString")
+    whole["features"].remove(gone)
+    first.write_text(json.dumps(whole))
+    given = ("export", FIGURE, "-o", second, *SMALL[:2], "--keep", first)
+    changes = cli(*given, "--json").answer["changes"]
+    assert (len(changes["edges"]["added"]), changes["edges"]["gone"]) == (1, [])
+    assert changes["nodes"] == {"added": [], "gone": [], "moved": []}
+    (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("added ")]
+    assert line == f"added      1 edges: {changes['edges']['added'][0]}"
+
+
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
     given = ("export", FIGURE, "-o", tmp_path / "g.geojson", *SMALL)
     assert "ids  " not in cli(*given).out

@@ -5,9 +5,9 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_050,
-    "lines": 91_520,
-    "files": 376,
+    "code": 55_440,
+    "lines": 92_160,
+    "files": 378,
     "code outside ext": 38_160,
     "lines of a file, median": 268,
     "lines of a file, most": 450,
@@ -20,8 +20,8 @@ LIMITS = {
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 44,
-    "parameters of commands, shared ones once": 111,
-    "lines of tests": 57_330,
+    "parameters of commands, shared ones once": 113,
+    "lines of tests": 58_010,
 }
 
 

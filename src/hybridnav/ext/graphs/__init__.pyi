@@ -1,4 +1,6 @@
 from .build import build_route_graph as build_route_graph
+from .bundle import export_bundle as export_bundle
+from .changes import first_broken_edge as first_broken_edge, graph_changes as graph_changes
 from .check import GraphCheck as GraphCheck, check_graph as check_graph
 from .gather import (
     BUILDING_KINDS as BUILDING_KINDS,

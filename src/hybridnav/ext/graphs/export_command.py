@@ -28,13 +28,23 @@ from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     AnchorOption,
+    Bundle,
+    BundleOption,
     Fleet,
+    KeepOption,
+    LanesOption,
+    NodesOption,
     NoDoorsOption,
+    OperationsOption,
+    PolylinesOption,
+    ReportOption,
+    StretchOption,
+    StyleOption,
     VehiclesOption,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
 
@@ -48,40 +58,15 @@ _ENDINGS = {
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
 _STYLES = ("lanes", "roadmap")
+_SHOWN = 8
+"""Ids in a line about changes."""
 _STRETCH = 1.05
 _APART_M, _NEAR_M, _FAR_M = 4.0, 1.0, 2.0
 """Spacing of lanes; of roadmaps for Nav2, which joins them at the nearest node; and of all other
 roadmaps: one-way lanes need long edges."""
-_MOST_PAIRS = 1_000_000
 
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
-]
-StyleOption = Annotated[
-    str,
-    typer.Option(
-        "--style",
-        metavar="NAME",
-        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
-        "nodes, for routes nearly as short as paths.",
-    ),
-]
-KeepOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--keep",
-        metavar="FILE",
-        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
-    ),
-]
-NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        min=1,
-        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
-    ),
 ]
 SpacingOption = Annotated[
     float | None,
@@ -93,40 +78,6 @@ SpacingOption = Annotated[
         f"formats other than nav2 {_FAR_M:g}.",
     ),
 ]
-StretchOption = Annotated[
-    float,
-    typer.Option(
-        "--stretch",
-        metavar="S",
-        help="Most by which routes between nodes in sight are longer, as a factor.",
-    ),
-]
-LanesOption = Annotated[
-    float | None,
-    typer.Option(
-        "--lanes",
-        metavar="APART",
-        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
-        "the distance in metres between the robots.",
-    ),
-]
-PolylinesOption = Annotated[
-    bool,
-    typer.Option(
-        "--polylines",
-        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
-    ),
-]
-ReportOption = Annotated[
-    int | None,
-    typer.Option(
-        "--report",
-        metavar="N",
-        min=1,
-        max=_MOST_PAIRS,
-        help="Compare the routes of N random pairs with shortest paths.",
-    ),
-]
 
 
 @with_map(
@@ -136,7 +87,10 @@ ReportOption = Annotated[
 )
 def export(
     map_file: options.MapOrBuildingArgument,
-    out: options.OutOption[Path],
+    out: options.OutOption[Path | None] = None,
+    bundle: BundleOption = None,
+    costs: options.CostsOption = None,
+    operations: OperationsOption = False,
     kind: FormatOption = "nav2",
     style: StyleOption = "lanes",
     keep: KeepOption = None,
@@ -165,74 +119,72 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    _check_out(kind, out)
-    if polylines and (report is not None or plot is not None or lanes_m is not None):
-        raise UsageError(
-            "--polylines does not go with --report, --plot and --lanes, which are for straight "
-            "edges: leave them out"
-        )
+    others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
+    robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
+    out = bundle or _checked_out(kind, out)
+    _check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
-    if fleet is not None and polylines:
-        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:
-        given = {
-            "--style": style != _STYLES[0],
-            "--keep": keep is not None,
-            "--nodes": nodes is not None,
-            "--spacing": spacing_m is not None,
-            "--stretch": stretch != _STRETCH,
-            "--lanes": lanes_m is not None,
-            "--polylines": polylines,
-            "--report": report is not None,
-            "--plot": plot is not None,
-        }
-        _check_plain(kind, given)
-    is_stretched = stretch != _STRETCH and not polylines
-    _check_style(style, {"--nodes": nodes, "--stretch": is_stretched or None}, {"--keep": keep})
+        _check_plain(
+            kind,
+            {
+                "--style": style != _STYLES[0],
+                "--keep": keep is not None,
+                "--nodes": nodes is not None,
+                "--spacing": spacing_m is not None,
+                "--stretch": stretch != _STRETCH,
+                "--lanes": lanes_m is not None,
+                "--polylines": polylines,
+                "--report": report is not None,
+                "--plot": plot is not None,
+            },
+        )
+    of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
+    _check_style(style, of_roadmaps, {"--keep": keep})
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
-    find_rooms = kind != "places"
-    topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=find_rooms)
+    topology = grow_topology(
+        model, settings, seconds, rooms_file=rooms_file, find_rooms=kind != "places"
+    )
     if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
             _write_parts(topology, kind, out, frame)
         _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
         return
+    before = None if keep is None else hn.ext.graphs.load_graph(keep)
     began = time.perf_counter()
+    build = _builder(
+        style,
+        nodes,
+        spacing_m,
+        is_near=kind == "nav2" and lanes_m is None,
+        stretch=stretch,
+        seed=settings.pyramid.seed,
+    )
     with progress_bar("building the graph") as advance:
-        if style == "lanes":
-            before = None if keep is None else hn.ext.graphs.load_graph(keep)
-            apart_m = _APART_M if spacing_m is None else spacing_m
-            graph = hn.ext.graphs.build_lane_graph(
-                topology, spacing_m=apart_m, keep=before, progress=advance
-            )
-        else:
-            graph = hn.ext.graphs.build_route_graph(
-                topology,
-                nodes=nodes,
-                spacing_m=_spacing(spacing_m, is_near=kind == "nav2" and lanes_m is None),
-                stretch=stretch,
-                seed=settings.pyramid.seed,
-                progress=advance,
-            )
+        graph = build(topology, progress=advance, **({"keep": before} if before else {}))
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
-        left_out = _write_graph(topology, (graph, written), fleet, out, frame)
+        left_out = _write_graph(topology, (graph, written), fleet or robot, out, frame)
     judged = None
     if report is not None:
         with stage("comparing routes", seconds, "report"):
             judged = hn.ext.graphs.judge_route_graph(graph, pairs=report)
     figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
-    figures |= {} if fleet is None else {"left_out": list(left_out)}
+    figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
     lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
     lines += _ids_line(written) if fleet is None else []
-    _respond(figures, lines, seconds, as_json=as_json)
+    # A bundle leaves out edges in keepout zones.
+    after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
+    changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
+    figures |= {"changes": changes} if changes else {}
+    _respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
     if plot is not None:
         from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
@@ -240,10 +192,32 @@ def export(
         save_figure(plot_route_graph(graph), plot)
 
 
+def _builder(
+    style: str,
+    nodes: int | None,
+    spacing_m: float | None,
+    *,
+    is_near: bool,
+    stretch: float,
+    seed: int,
+) -> Callable[..., RouteGraph]:
+    """Return what builds the graph of a map in a style; see `export`."""
+    if style == "lanes":
+        apart_m = _APART_M if spacing_m is None else spacing_m
+        return partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
+    return partial(
+        hn.ext.graphs.build_route_graph,
+        nodes=nodes,
+        spacing_m=_spacing(spacing_m, is_near=is_near),
+        stretch=stretch,
+        seed=seed,
+    )
+
+
 def _export_over_floors(
     *,
     map_file: Path,
-    out: Path,
+    out: Path | None,
     kind: str,
     style: str,
     nodes: int | None,
@@ -256,7 +230,7 @@ def _export_over_floors(
     reading: MapOptions,
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    _check_out(kind, out)
+    out = _checked_out(kind, out)
     _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
@@ -267,16 +241,8 @@ def _export_over_floors(
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    apart_m = _APART_M if spacing_m is None else spacing_m
-    build = partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
-    if style != "lanes":
-        build = partial(
-            hn.ext.graphs.build_route_graph,
-            nodes=nodes,
-            spacing_m=_spacing(spacing_m, is_near=False),
-            stretch=stretch,
-            seed=reading.seed or 0,
-        )
+    seed = reading.seed or 0
+    build = _builder(style, nodes, spacing_m, is_near=False, stretch=stretch, seed=seed)
     began = time.perf_counter()
     with progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
@@ -304,6 +270,17 @@ def _export_over_floors(
     _respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
 
 
+def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
+    """Return the lines of a summary about changes, none where no graph was given."""
+    lines = []
+    for kind, ids in changes.items():
+        for what, names in ids.items():
+            more = ", ..." if len(names) > _SHOWN else ""
+            listed = ", ".join(printable(str(name)) for name in names[:_SHOWN]) + more
+            lines += [f"{what:<10} {len(names):,} {kind}: {listed}"] if names else []
+    return lines or ["changed    nothing"] * bool(changes)
+
+
 def _respond(
     figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
 ) -> None:
@@ -315,11 +292,25 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _check_out(kind: str, out: Path) -> None:
+def _checked_out(kind: str, out: Path | None) -> Path:
     """Refuse formats that are none, and files of other ones."""
+    if out is None:
+        raise UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
+    return out
+
+
+def _check_polylines(kind: str, *, given: bool, straight: bool) -> None:
+    """Refuse the option with others that are for straight edges, and for other formats."""
+    if given and straight:
+        raise UsageError(
+            "--polylines does not go with --report, --plot and --lanes, which are for straight "
+            "edges: leave them out"
+        )
+    if given and kind in ENDINGS:
+        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
 
 
 def _check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
@@ -348,15 +339,17 @@ def _check_plain(kind: str, given: dict[str, bool]) -> None:
 def _write_graph(
     topology: hn.TopologicalMap,
     graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
-    fleet: Fleet | None,
+    aim: Fleet | Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
-    if fleet is None:
-        hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
-        return ()
-    return fleet.write(topology, graphs[0], out)
+    if isinstance(aim, Fleet):
+        return aim.write(topology, graphs[0], out)
+    if aim is not None:
+        return hn.ext.graphs.export_bundle(topology, graphs[0], out, frame=frame, **aim._asdict())
+    hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
+    return ()
 
 
 def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:

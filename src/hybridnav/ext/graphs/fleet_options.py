@@ -1,10 +1,11 @@
-"""Options of formats that fleets speak, and what `hybridnav export` writes in them."""
+"""Options of `hybridnav export`, and what it writes for fleets and as a bundle for Nav2."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -12,8 +13,6 @@ import hybridnav as hn
 from hybridnav.cli.common import UsageError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import RouteGraph
 
@@ -22,6 +21,68 @@ ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", "
 _FEWEST, _MOST = 2, 3
 """Numbers of an anchor: latitude, longitude, and the heading if there is one."""
 
+_MOST_PAIRS = 1_000_000
+
+StyleOption = Annotated[
+    str,
+    typer.Option(
+        "--style",
+        metavar="NAME",
+        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
+        "nodes, for routes nearly as short as paths.",
+    ),
+]
+KeepOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--keep",
+        metavar="FILE",
+        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
+    ),
+]
+NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes",
+        metavar="N",
+        min=1,
+        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
+    ),
+]
+StretchOption = Annotated[
+    float,
+    typer.Option(
+        "--stretch",
+        metavar="S",
+        help="Most by which routes between nodes in sight are longer, as a factor.",
+    ),
+]
+LanesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lanes",
+        metavar="APART",
+        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
+        "the distance in metres between the robots.",
+    ),
+]
+PolylinesOption = Annotated[
+    bool,
+    typer.Option(
+        "--polylines",
+        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
+    ),
+]
+ReportOption = Annotated[
+    int | None,
+    typer.Option(
+        "--report",
+        metavar="N",
+        min=1,
+        max=_MOST_PAIRS,
+        help="Compare the routes of N random pairs with shortest paths.",
+    ),
+]
 AnchorOption = Annotated[
     str | None,
     typer.Option(
@@ -45,6 +106,50 @@ NoDoorsOption = Annotated[
         "--no-doors", help="For rmf: name no doors, which robots would ask to open and wait for."
     ),
 ]
+BundleOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--bundle",
+        metavar="DIR",
+        help="Write all that Nav2 needs into a folder, in place of --out: graph, masks for costmap "
+        "filters of rooms and of --costs, poses, parameters.",
+    ),
+]
+OperationsOption = Annotated[
+    bool,
+    typer.Option(
+        "--operations", help="With --bundle: edges through doors call a service to open them."
+    ),
+]
+
+
+class Bundle(NamedTuple):
+    """The options of a bundle: masks as `costs`, and whether edges have `operations`."""
+
+    costs: tuple[str, ...]
+    operations: bool
+
+    @classmethod
+    def checked(cls, folder: Path | None, given: Bundle, others: dict[str, Any]) -> Bundle | None:
+        """Return the options, None for no bundle. Refuse folders that hold other files, costs that
+        are no masks, and options that do not go with a bundle, or without one.
+
+        Raises
+        ------
+        InvalidValueError, UsageError
+            When one of them is given.
+        """
+        from hybridnav.ext.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
+
+        for option, value in others.items() if folder else given._asdict().items():
+            if value:
+                wrong = f"{option} does not go with" if folder else f"--{option} needs"
+                raise UsageError(f"{wrong} --bundle: leave it out")
+        if folder is None:
+            return None
+        checked_masks(given.costs)
+        check_bundle(folder)
+        return given
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,18 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     else:
         name = checked_type("graph", graph, RouteGraph).grid.name
     file = NewFile.named(path, "route graph", "a route graph of Nav2", (".geojson", ".json"))
+    file.write(nav2_bytes(name, nav2_features(graph, frame)))
+
+
+def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[str, Any]]:
+    """Return the features of a route graph for Nav2, nodes first; see `export_nav2`.
+
+    Raises
+    ------
+    InvalidValueError
+        When Nav2 would refuse the graph, or the frame has no name.
+    """
+    name = graph.name if isinstance(graph, WaypointGraph) else graph.grid.name
     if not frame:
         raise InvalidValueError("frame must be the name of the map frame, got an empty text")
     if not graph.n_edges:
@@ -77,13 +89,16 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
             f"{MOST_ID} ids of Nav2: build it with fewer nodes"
         )
     if isinstance(graph, WaypointGraph):
-        features = features_of(graph, frame)
-    else:
-        features = [*_nodes(graph, frame), *_edges(graph)]
-    # One feature a line, so that people can read and compare files.
+        return features_of(graph, frame)
+    return [*_nodes(graph, frame), *_edges(graph)]
+
+
+def nav2_bytes(name: str, features: Sequence[dict[str, Any]]) -> bytes:
+    """Return the content of a GeoJSON file, one feature a line, so that people can read and compare
+    files."""
     lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
     head = f'{{"type": "FeatureCollection", "name": {json.dumps(name)}, "features": ['
-    file.write(f"{head}\n{lines}\n]}}\n".encode())
+    return f"{head}\n{lines}\n]}}\n".encode()
 
 
 def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
