@@ -6,10 +6,10 @@ from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
     "code": 55_440,
-    "lines": 92_150,
+    "lines": 92_160,
     "files": 378,
-    "code outside ext": 38_160,
-    "lines of a file, median": 268,
+    "code outside ext": 38_170,
+    "lines of a file, median": 269,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 44,
     "parameters of commands, shared ones once": 113,
-    "lines of tests": 58_010,
+    "lines of tests": 58_020,
 }
 
 

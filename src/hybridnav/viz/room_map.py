@@ -119,7 +119,11 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
 
 
 def plot_rooms_beside(
-    old: TopologicalMap, new: TopologicalMap, *, width_in: float = 2 * style.FULL_WIDTH_IN
+    old: TopologicalMap,
+    new: TopologicalMap,
+    *,
+    axes: Sequence[Axes] | None = None,
+    width_in: float = 2 * style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw the rooms of two maps beside each other, such as before and after names were carried.
 
@@ -127,8 +131,10 @@ def plot_rooms_beside(
     ----------
     old, new
         Topological maps with rooms; see `plot_rooms`.
+    axes
+        Two axes to draw on; None for a figure of their own.
     width_in
-        Width of the figure in inches.
+        Width of that figure in inches.
 
     Returns
     -------
@@ -149,15 +155,15 @@ def plot_rooms_beside(
     >>> len(plot_rooms_beside(topology, topology).figure.axes)
     2
     """
-    sizes = [known_view(each.grid).size for each in (old, new)]
-    height = max(float(high / wide) for wide, high in sizes)
-    figure = new_figure(width_in, _AROUND + _PANEL * min(MAX_HEIGHT, height))
-    axes = figure.subplots(1, 2)
-    figure.subplots_adjust(left=0.04, right=0.99, bottom=0.17, top=0.94, wspace=0.1)
+    if axes is None:
+        sizes = [known_view(each.grid).size for each in (old, new)]
+        height = max(float(high / wide) for wide, high in sizes)
+        figure = new_figure(width_in, _AROUND + _PANEL * min(MAX_HEIGHT, height))
+        axes = figure.subplots(1, 2)
+        figure.subplots_adjust(left=0.04, right=0.99, bottom=0.17, top=0.94, wspace=0.1)
     for ax, each in zip(axes, (old, new), strict=True):
         plot_rooms(each, ax=ax)
-    right: Axes = axes[1]
-    return right
+    return axes[1]
 
 
 def _key(numbered: Sequence[int], names: Sequence[str]) -> list[Entry]:
