@@ -479,7 +479,7 @@ def _killed(tmp_path: Path, kills: int) -> None:
     assert done.returncode == 0, done.stderr
     writes, killed, is_new = done.stdout.split()
     assert (int(killed), is_new) == (kills, "True")
-    assert int(writes) >= kills / 2
+    assert int(writes) >= kills / 4  # a save is killed in many places
     hn.load(tmp_path / "m.hnm")
 
 
