@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
+from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, centre, components, distances, move_graph, recounted
 from tests.strategies import Scene, drawn, examples, occupancy_grid, scenes
 
@@ -261,7 +262,10 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
         nearby = on_route.copy()
         nearby[topology.arcs[on_route[topology.arcs].any(axis=1)]] = True
         fields = topology.level.field_of
-        twice = on_route | joined_twice(topology, result.route, on_route)
+        inside = corridor_of(
+            topology, list(result.route.places), allow_unexplored=allow_unexplored == "true"
+        )
+        twice = np.isin(np.arange(topology.n_places), inside)
         check_path(result.path, grid, enterable, on_route[fields] & (fields >= 0))
         check_path(middle.path, grid, enterable, twice[fields] & (fields >= 0))
         check_path(wide.path, grid, enterable, nearby[fields] & (fields >= 0))
@@ -269,21 +273,6 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
         assert result.lower_bound - 1e-9 <= optimum <= wide.cost + 1e-9
         assert wide.cost <= middle.cost + 1e-9
         assert middle.cost <= result.cost + 1e-9
-
-
-def joined_twice(topology: hn.TopologicalMap, route: hn.Route, on_route: Any) -> Any:
-    """The places with two arcs to a route, or one to its first or last place."""
-    ends = {route.places[0], route.places[-1]}
-    found = np.zeros(topology.n_places, dtype=bool)
-    for place in range(topology.n_places):
-        ways = [
-            int(other)
-            for arc in topology.arcs.tolist()
-            for here, other in (arc, arc[::-1])
-            if here == place and on_route[other]
-        ]
-        found[place] = len(ways) > 1 or bool(ends & set(ways))
-    return found
 
 
 def check_route(route: hn.Route, topology: hn.TopologicalMap, enterable: Any) -> None:

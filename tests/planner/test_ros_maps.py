@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
+from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, components, inflated, length_of_points, recounted
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def judge(result: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
     places = np.searchsorted(topology.place_ids, route.places)
     assert topology.place_ids[places].tolist() == list(route.places)
     at = topology.level.field_of[path.cells[:, 0], path.cells[:, 1]]
-    inside = corridor(topology, places.tolist())
+    inside = corridor_of(topology, places.tolist())
     assert np.isin(at, inside).all()
     assert_legal(path.cells, site.enterable)
     assert at[0] == places[0]
@@ -129,18 +129,6 @@ def judge(result: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
     assert path.length_m == result.cost == pytest.approx(exact, rel=1e-12)
     assert 0 <= result.lower_bound <= result.cost
     assert result.stats.corridor_cells == topology.level.areas[inside].sum()
-
-
-def corridor(topology: hn.TopologicalMap, places: list[int]) -> list[int]:
-    """The places of a route, the free ones with two arcs to it, and those beside its ends."""
-    route, ends = set(places), {places[0], places[-1]}
-    counts: Counter[int] = Counter()
-    for arc in topology.arcs.tolist():
-        for one, other in (arc, arc[::-1]):
-            if other in route:
-                counts[one] += 2 if other in ends else 1
-    is_free = topology.level.classes == CellClass.FREE
-    return sorted(route | {one for one, n in counts.items() if n > 1 and is_free[one]})
 
 
 def compare(hybrid: hn.PlanResult, whole: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
