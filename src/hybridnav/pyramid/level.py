@@ -251,13 +251,6 @@ class Level:
         )
         return found
 
-    @property
-    def removed_edges(self) -> BoolArray:
-        """bool (2 rows cols,), the base edges that were removed as redundant, not contracted."""
-        end = self._record.edge_end
-        removed: BoolArray = (end & 1 == 1) & (end < min(2 * self.index + 2, SURVIVES))
-        return removed
-
     @cached_property
     def dual(self) -> DualGraph:
         """The dual graph: faces, their kinds, and the dual edge of each arc."""
