@@ -13,7 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
-from hybridnav.route.coarse import ArcSearch, along
+from hybridnav.route.coarse import ArcSearch, Beside, along
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ class RegionPlanner:
         joined: IntArray | None = None,
     ) -> None:
         self._region_of = region_of
-        self._graph, self._joined = graph, joined
+        self._graph = graph
+        self._joined = np.empty((0, 2), dtype=np.int32) if joined is None else joined
+        self._beside: Beside = "route" if joined is None else "joined"
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
         self.memory_bytes = array_bytes(self, graph) + self._grid_search.memory_bytes
 
@@ -70,10 +72,7 @@ class RegionPlanner:
         if plan.vertices is None:
             return MethodResult(None, expanded_nodes=plan.expanded, seconds=seconds)
         began = time.perf_counter()
-        in_corridor = np.zeros(self._graph.n_vertices, dtype=np.bool_)
-        in_corridor[plan.vertices] = True
-        if self._joined is not None:
-            in_corridor = along(self._joined, plan.vertices, "joined", self._graph.allowed)
+        in_corridor = along(self._joined, plan.vertices, self._beside, self._graph.allowed)
         found = self._grid_search.search(
             start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
