@@ -38,7 +38,7 @@ class Leg:
     endpoint: tuple[float, float] = (0.0, 0.0)
     """Point where it ends, `(x, y)` in metres, map frame."""
     shape: Shape = "room"
-    """Shape of the room, or of the space outside rooms."""
+    """Shape of the space outside rooms; in instructions also of rooms that nobody has named."""
 
     @property
     def space(self) -> Space:

@@ -11,6 +11,7 @@ from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
 from hybridnav.route import RouteFinder
+from hybridnav.topology.rooms.kinds import WIDEST_CORRIDOR_M
 from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 _SLIVER_M = 0.5
 _LEAST_ROOM_M2 = 6.0
 _LEAST_HALL_M2 = 60.0
-_WIDEST_CORRIDOR_M = 4.0
 _LONG_SHAPE = 3.0
 """Length over breadth from which a space is no room."""
 
@@ -126,7 +126,8 @@ class Guide:
         heading_rad
             Heading at the start, radians counter-clockwise from the x axis; None if there is none.
         """
-        return tuple(instructions_of(paths, legs, self._landmarks, heading_rad))
+        told = [[self._told(leg) for leg in each] for each in legs]
+        return tuple(instructions_of(paths, told, self._landmarks, heading_rad))
 
     def of(self, path: Path, waypoint: ArrayLike | str, start: Sequence[float]) -> GuidedPath:
         """Return what the instructions of one path are found from.
@@ -142,13 +143,18 @@ class Guide:
         """
         return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
 
+    def _told(self, leg: Leg) -> Leg:
+        """Return a leg as words tell it: a room that nobody has named has the shape of its kind."""
+        if leg.room is None or not FOUND_NAME.fullmatch(leg.room):
+            return leg
+        kind = self._rooms.kinds[self._rooms.labels.index(leg.room)]
+        return leg if kind is None else replace(leg, shape=kind.name)
+
     def _shape(self, vertex: int, cells: LongArray) -> Shape:
         """Return the shape of a vertex of the room level, for a path in it."""
         rooms, level = self._rooms, self._rooms.level
-        label = int(rooms.label_of_vertex[vertex])
-        if label >= 0:
-            kind = rooms.kinds[label] if FOUND_NAME.fullmatch(rooms.names[label]) else None
-            return "room" if kind is None else kind.name
+        if rooms.label_of_vertex[vertex] >= 0:
+            return "room"
         area_m2 = float(level.areas[vertex]) * rooms.grid.cell_area_m2
         if area_m2 < _LEAST_ROOM_M2:
             return "passage"
@@ -156,7 +162,7 @@ class Guide:
         breadth_m = 2 * float(rooms.clearance_m[tuple(field.T)].max())
         if area_m2 >= _LONG_SHAPE * breadth_m * breadth_m:
             nearby_m = 2 * float(np.quantile(rooms.clearance_m[tuple(cells.T)], 0.75))
-            if min(breadth_m, nearby_m) <= _WIDEST_CORRIDOR_M:
+            if min(breadth_m, nearby_m) <= WIDEST_CORRIDOR_M:
                 return "corridor"
         return "hall" if area_m2 >= _LEAST_HALL_M2 else "room"
 

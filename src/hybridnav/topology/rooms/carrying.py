@@ -45,6 +45,7 @@ _REMAINS = 0.2
 _ROOM_SAMPLE = 600
 """Most points of a room's walls by which its drift is measured."""
 _FEWEST_POINTS = 20
+"""Fewest points by which it is measured; other rooms move as all do."""
 _TINY_M2 = 1e-9
 _SURE_DOOR_M = 0.5
 """How far a door may lie from an old one if it is a gap now or only one room is carried."""

@@ -160,7 +160,8 @@ class Surface:
         away, nearest = ndimage.distance_transform_edt(
             is_bare, sampling=side_m, return_indices=True
         )
-        # Of two walls equally near, the transform takes the lower one; turned round, the upper one.
+        # Where two walls are equally near, the transform names the first in the order of the array:
+        # run on the array turned round, it names the other one, so that both are known.
         turned_round = ndimage.distance_transform_edt(
             is_bare[::-1, ::-1], return_distances=False, return_indices=True
         )[:, ::-1, ::-1]
