@@ -119,6 +119,12 @@ CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
 ]
+WhyOption = Annotated[
+    bool,
+    typer.Option(
+        "--why", help="Also print the widest robot that could go, and where it is tightest."
+    ),
+]
 
 
 @with_map(
@@ -145,6 +151,7 @@ def plan(
     keep: KeepOption = False,
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
+    why: WhyOption = False,
     plot: options.PlotOption = None,
     poses: PosesOption = None,
     bag: BagOption = None,
@@ -184,6 +191,7 @@ def plan(
         at=where,
         wanted=wanted,
         compare=compare,
+        why=why,
         plot=plot,
         poses=poses,
         bag=bag,

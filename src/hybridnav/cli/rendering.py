@@ -85,6 +85,8 @@ def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict
     ]
     if "outside" in figures["status"]:
         lines.append(extent_line(grid))
+    for number, line in enumerate((figures.get("why") or {"words": ()})["words"]):
+        lines.append(f"{'' if number else 'why':<10} {line}")
     lines += _tour_lines(figures) if "words" in figures else _plan_lines(figures)
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"

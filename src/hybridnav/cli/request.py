@@ -44,6 +44,7 @@ class Request:
     at: At
     wanted: Wanted
     compare: bool
+    why: bool
     plot: Path | None
     poses: Path | None
     bag: Path | None
@@ -85,6 +86,7 @@ class Request:
             beside = _alternatives_figures(found)
         elif self.compare and isinstance(outcome, hn.PlanResult):
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
+        beside |= self._why(planner, outcome, closed, seconds)
         self._respond(grid, outcome, beside, seconds)
         if self.poses is not None:
             hn.export_path(outcome, self.poses)
@@ -162,6 +164,28 @@ class Request:
                 at=self.at,
                 blocked=closed,
             )
+
+    def _why(
+        self,
+        planner: hn.HybridPlanner,
+        outcome: hn.PlanResult | hn.Tour,
+        closed: hn.Blocked | None,
+        seconds: dict[str, float],
+    ) -> dict[str, Any]:
+        """Explain why there is no path, or, if asked, where a path is tightest."""
+        if (outcome.solved and not self.why) or "outside" in outcome.status:
+            return {}
+        results = outcome.results if isinstance(outcome, hn.Tour) else (outcome,)
+        with stage("explaining", seconds, "why"):
+            found = [
+                planner.explain(one.start, one.goal, blocked=closed)
+                for one in results
+                if one.start is not None and one.goal is not None and one.solved == outcome.solved
+            ]
+        tightest = min(found, key=lambda one: one.widest_m, default=None)
+        if tightest is None:
+            return {"why": None}
+        return {"why": tightest.to_dict() | {"words": tightest.words(self.language)}}
 
     def _on_whole_grid(
         self,

@@ -197,3 +197,55 @@ def polyline_lengths(points, starts):
         if starts[k + 1] > starts[k]:
             lengths[k] = polyline_length(points[starts[k] : starts[k + 1]])
     return lengths
+
+
+# Widest paths: cells join in order of clearance.
+
+
+@njit(cache=True, nogil=True)
+def _top_of(top, cell):
+    """Return the root of a cell's set, and shorten the way to it."""
+    while top[cell] != cell:
+        top[cell] = top[top[cell]]
+        cell = top[cell]
+    return cell
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def joined_in_order(order, shape, diagonal):
+    """Return the tree of sets of cells that join, as two int32 (rows * cols,).
+
+    Cells are entered in the order given, int64 (m,), and join the sets of their neighbours: the
+    four beside them, with `diagonal` also the four at their corners. When two sets join, the root
+    of the smaller gets the other as its parent, and the place in the order as its time. So no cell
+    is more than log2(m) steps below its root. A root is its own parent; a cell that never enters
+    has the parent -1. Times of cells without another parent are m.
+    """
+    rows, cols = shape
+    parent = np.full(rows * cols, -1, np.int32)
+    time = np.full(rows * cols, len(order), np.int32)
+    top = parent.copy()
+    size = np.ones(rows * cols, np.int32)
+    for k in range(len(order)):
+        cell = order[k]
+        parent[cell] = top[cell] = cell
+        row, col = cell // cols, cell % cols
+        for down in range(-1, 2):
+            for across in range(-1, 2):
+                if (down == 0) == (across == 0) and not (diagonal and down != 0):
+                    continue
+                if not (0 <= row + down < rows and 0 <= col + across < cols):
+                    continue
+                near = cell + down * cols + across
+                if parent[near] < 0:
+                    continue
+                one, other = _top_of(top, cell), _top_of(top, near)
+                if one == other:
+                    continue
+                if size[one] < size[other]:
+                    one, other = other, one
+                parent[other] = top[other] = one
+                size[one] += size[other]
+                time[other] = k
+    return parent, time

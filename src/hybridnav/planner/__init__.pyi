@@ -40,5 +40,11 @@ from .speed import (
     SpeedProfile as SpeedProfile,
 )
 from .tour import Tour as Tour, plan_tour as plan_tour
+from .why import (
+    BlockedEnd as BlockedEnd,
+    Closure as Closure,
+    Explanation as Explanation,
+    TightPlace as TightPlace,
+)
 
 __all__: list[str]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.named import At
     from hybridnav.planner.planning import Smooth
     from hybridnav.planner.result import PlanDraft
+    from hybridnav.planner.why import Explanation
     from hybridnav.search.found import ClosedCells, Method, Prepared
     from hybridnav.topology import TopologicalMap
 
@@ -141,7 +143,7 @@ class HybridPlanner:
     @property
     def prepared(self) -> Prepared | None:
         """The structure built for queries: a mesh or a jump-point graph; None before that, and
-        with presets that build none or, as the lattice is, one that changes with the costs."""
+        with presets that build none, or one that changes with the costs, as the lattice does."""
         return self._now.method.prepared
 
     @property
@@ -206,7 +208,48 @@ class HybridPlanner:
         """
         with self._query():
             now = self._now
-            return now.plan(now.read(start, goal, smooth, blocked, at, keep))
+            result = now.plan(now.read(start, goal, smooth, blocked, at, keep))
+            if result.path is not None:
+                return result
+            ends = result.start, result.goal
+            return replace(result, why_source=partial(_explained, now, ends, blocked))
+
+    def explain(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        *,
+        blocked: Closable | ClosedCells | None = None,
+        radius_m: float | None = None,
+    ) -> Explanation:
+        """Explain why there is a path between two points or none, and what would have to change.
+
+        It finds the widest path, the fewest closures to open, and whether unexplored cells could
+        help: exactly, for a disc on the cells of the map. Dropped islands count as free.
+
+        Parameters
+        ----------
+        start, goal, blocked
+            As in `plan`; a room stands for its point.
+        radius_m
+            The robot's radius in metres, >= 0; None for the map's.
+
+        Raises
+        ------
+        InvalidValueError
+            As in `plan`, and when the radius is no number >= 0.
+
+        Examples
+        --------
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> planner = hn.HybridPlanner(topology)
+        >>> print(planner.explain((0.5, 0.5), (-2.0, 2.5)).words("de")[0])
+        Das Ziel liegt außerhalb der Karte.
+        """
+        with self._query():
+            now = self._now
+            poses = now.read(start, goal, None, blocked, "point").poses
+            return _explained(now, poses, blocked, radius_m)
 
     def _query(self) -> AbstractContextManager[bool]:
         """Return the lock to hold while the map and the costs must stay as they are."""
@@ -362,7 +405,7 @@ class HybridPlanner:
             self._now.ompl.close()
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
-        """Return the cells of a closure, None for no closure."""
+        """Return the cells of a closure, None for none."""
         return self._now.closed(blocked)
 
     def points_of(
@@ -372,8 +415,7 @@ class HybridPlanner:
         at: At = "anywhere",
         blocked: Closable | ClosedCells | None = None,
     ) -> list[ArrayLike]:
-        """Return a point for each waypoint, a name too, so that the path through all of them is
-        cheapest."""
+        """Return a point for each waypoint, so that the path through all of them is cheapest."""
         return self._now.points_of(waypoints, at, blocked)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
@@ -381,7 +423,12 @@ class HybridPlanner:
         return self._now.closed_for_all(closed)
 
 
-# Check of the robot's radius, which map and preset both state.
+def _explained(
+    now: Planning, ends: Any, blocked: Any, radius_m: float | None = None
+) -> Explanation:
+    from hybridnav.planner.why import explain  # noqa: PLC0415 - plans do not need shapely
+
+    return explain(now, ends, blocked, radius_m=radius_m)
 
 
 def check_radius(grid: OccupancyGrid, preset: Preset) -> None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
     from hybridnav.planner.speed import MotionLimits
+    from hybridnav.planner.why import Explanation
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
@@ -135,6 +136,8 @@ class PlanResult:
     rounded, `(x, y)` in metres, map frame; None of other paths."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
+    why_source: Callable[[], Explanation] | Explanation | None = field(default=None, repr=False)
+    """The explanation, or how to find it."""
 
     @cached_property
     def lower_bound(self) -> float:
@@ -182,6 +185,18 @@ class PlanResult:
         source = self.instruction_source
         return source if isinstance(source, tuple) else source.instructions()
 
+    @cached_property
+    def explanation(self) -> Explanation | None:
+        """Why there is no path, found when it is read first, in about a second on a million cells;
+        None with a path, and in batches."""
+        source = self.why_source
+        return source() if callable(source) else source
+
+    @property
+    def reason(self) -> str:
+        """Why there is no path, in one line: see `HybridPlanner.explain`; empty with a path."""
+        return "" if self.explanation is None else self.explanation.reason
+
     def words(self, language: str = "en") -> list[str]:
         """Return a description of the path for a person, as `Tour.words`; no lines without a path,
         and on a map without rooms."""
@@ -189,12 +204,13 @@ class PlanResult:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with what is found on demand, so that copies hold no map."""
-        found = {"route", "instructions", "lower_bound", "duration_s"}
+        found = {"route", "instructions", "lower_bound", "duration_s", "explanation"}
         state = {name: value for name, value in vars(self).items() if name not in found}
         return state | {
             "route_source": self.route,
             "instruction_source": self.instructions,
             "bound_source": self.lower_bound,
+            "why_source": self.explanation,
         }
 
     @property

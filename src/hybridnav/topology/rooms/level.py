@@ -307,10 +307,30 @@ class Rooms:
         InvalidValueError
             When no door has the number.
         """
+        return np.unique(self.moves_through(number))
+
+    def moves_through(self, number: int) -> LongArray:
+        """Return the moves across a door's boundary, on the map as measured.
+
+        Parameters
+        ----------
+        number
+            The number of a door.
+
+        Returns
+        -------
+        LongArray
+            int64 (n, 2), the flat cells on both sides, 4-adjacent, the lower one first.
+
+        Raises
+        ------
+        InvalidValueError
+            When no door has the number.
+        """
         found = self._boundaries
         of_door = self._numbers == self.door(number).number
         edges = found.edges[of_door[found.boundary_of]]
-        return np.unique(endpoints_of(edges, self.grid.shape[1]))
+        return np.stack(endpoints_of(edges, self.grid.shape[1]), axis=1)
 
     def door_ends(self, number: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the two points of a door's boundary that lie farthest apart, `(x, y)` in metres,
