@@ -289,24 +289,8 @@ class Rooms:
         return {arc.index: door for door in self.doors for arc in door.arcs}
 
     def cells_beside(self, number: int) -> LongArray:
-        """Return the cells on both sides of a door's boundary, on the map as measured.
-
-        Parameters
-        ----------
-        number
-            The number of a door.
-
-        Returns
-        -------
-        LongArray
-            int64 (n,), flat cells `row * cols + col`, sorted, each once. The robot's radius may
-            have taken some of them away.
-
-        Raises
-        ------
-        InvalidValueError
-            When no door has the number.
-        """
+        """Return the cells on both sides of a door's boundary, sorted, int64 (n,); see
+        `moves_through`. The robot's radius may have taken some of them away."""
         return np.unique(self.moves_through(number))
 
     def moves_through(self, number: int) -> LongArray:
