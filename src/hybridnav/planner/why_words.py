@@ -157,7 +157,9 @@ class _Writer:
         if place.door is not None:
             kind, door = self.table[place.door.kind], place.door
             width = self.number(min(door.width_m, door.passage_m))
-            at = self.table["in_door"].format(point=at, kind=kind, number=door.number, width=width)
+            at = self.table["in_door"].format(
+                point=self._point(place.point), kind=kind, number=door.number, width=width
+            )
         return [self.say(key, widest=self.number(radius_m), place=at)]
 
     def end(self, end: BlockedEnd) -> list[str]:

@@ -16,6 +16,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from hybridnav._base.extension import extension
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import GRID
 from hybridnav.ext.page.opening import PreparingError
@@ -109,7 +110,9 @@ class Guard:
         return None
 
 
-def make_app(shown: Site | Opening, *, token: str, port: int, folder: Path) -> ASGIApp:
+def make_app(
+    shown: Site | Opening, *, token: str, port: int, folder: Path, allow_edits: bool = False
+) -> ASGIApp:
     """Return the application of a page.
 
     Parameters
@@ -122,12 +125,14 @@ def make_app(shown: Site | Opening, *, token: str, port: int, folder: Path) -> A
         The port on 127.0.0.1.
     folder
         The only folder in which anything is written.
+    allow_edits
+        Whether programs may change what others see, as people may on the page.
     """
     at = f"/{token}"
     routes = [
         Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
         *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
-        *_Answers(shown, folder).routes(at),
+        *_Answers(shown, folder).routes(at, allow_edits=allow_edits),
     ]
     return Guard(Starlette(routes=routes), token, port)
 
@@ -138,9 +143,12 @@ class _Answers:
     def __init__(self, shown: Site | Opening, folder: Path) -> None:
         self._shown, self._folder = shown, folder
 
-    def routes(self, at: str) -> list[Route]:
+    def routes(self, at: str, *, allow_edits: bool) -> list[Route]:
         """Return the routes below a path: those of the whole site, and those of its floors."""
         floor = f"{at}/floor/{{floor}}"
+        tools = extension("formats", "tools").HttpTools(
+            self._session, _body, allow_edits=allow_edits
+        )
         gets: dict[str, Callable[[Request], Any]] = {
             f"{at}/map.json": lambda _: self._shown.describe(),
             f"{at}/state.json": lambda _: self._shown.state(),
@@ -187,6 +195,7 @@ class _Answers:
                 Route(f"{above}/export/{{kind}}", _post_file(answer), methods=["POST"])
                 for above, answer in files.items()
             ),
+            *tools.routes(at, floor),
         ]
 
     def _floor(self, request: Request) -> Any:

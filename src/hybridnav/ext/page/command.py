@@ -54,6 +54,13 @@ PortOption = Annotated[
 BrowserOption = Annotated[
     bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
 ]
+EditsOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-edits",
+        help="Let programs that call the server close and open doors and rooms, and name rooms.",
+    ),
+]
 
 
 @with_map(over_floors=lambda: _view_over_floors)
@@ -63,6 +70,7 @@ def view(
     routes: RouteOption = None,
     port: PortOption = 0,
     browser: BrowserOption = True,
+    allow_edits: EditsOption = False,
     rooms_file: options.RoomsOption = None,
     costs: options.CostsOption = None,
     *,
@@ -77,7 +85,7 @@ def view(
     for text in routes or ():
         _ends(text, ("",))
     page = MapPage.read(map_file, rooms_file, options.parsed_costs(costs), reading)
-    _show(page, save, routes, port, browser=browser)
+    _show(page, save, routes, port, browser=browser, allow_edits=allow_edits)
 
 
 def _view_over_floors(
@@ -87,11 +95,13 @@ def _view_over_floors(
     routes: list[str] | None,
     port: int,
     browser: bool,
+    allow_edits: bool,
     reading: MapOptions,
 ) -> None:
     """Open a building as a page; see `view`."""
     _check_save(save, routes)
-    _show(BuildingPage(map_file, reading), save, routes, port, browser=browser)
+    page = BuildingPage(map_file, reading)
+    _show(page, save, routes, port, browser=browser, allow_edits=allow_edits)
 
 
 def _check_save(save: Path | None, routes: list[str] | None) -> None:
@@ -107,15 +117,16 @@ def _show(
     port: int,
     *,
     browser: bool,
+    allow_edits: bool,
 ) -> None:
     """Write a page into a file, or serve it."""
     if save is not None:
         _save(source.make(lambda _: None), save, routes or ())
     else:
-        _serve(source.opening(), source.folder, port, browser=browser)
+        _serve(source, port, browser=browser, allow_edits=allow_edits)
 
 
-def _serve(shown: Opening | Site, folder: Path, port: int, *, browser: bool) -> None:
+def _serve(source: MapPage | BuildingPage, port: int, *, browser: bool, allow_edits: bool) -> None:
     """Serve a page until Ctrl-C, and print its address."""
     from hybridnav.ext.page import serve  # noqa: PLC0415 - loads numba and matplotlib
 
@@ -126,7 +137,8 @@ def _serve(shown: Opening | Site, folder: Path, port: int, *, browser: bool) -> 
 
             webbrowser.open(address)
 
-    serve(shown, folder, port=port, ready=ready)
+    folder = source.folder
+    serve(source.opening(), folder, port=port, allow_edits=allow_edits, ready=ready)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ def serve(
     folder: Path,
     *,
     port: int = 0,
+    allow_edits: bool = False,
     ready: Callable[[str], object] | None = None,
 ) -> None:
     """Serve a page on 127.0.0.1 until Ctrl-C.
@@ -33,6 +34,8 @@ def serve(
         The only folder in which anything is written.
     port
         The port; 0 for a free one.
+    allow_edits
+        Whether programs that call the server may change what others see, as people may on the page.
     ready
         Called with the address, which holds a token that nobody can guess.
 
@@ -81,7 +84,7 @@ def serve(
             raise InvalidValueError(f"port {port} cannot be used: {reason}") from None
         listening.listen(MOST_CONNECTIONS)
         port = listening.getsockname()[1]
-        app = make_app(shown, token=token, port=port, folder=folder)
+        app = make_app(shown, token=token, port=port, folder=folder, allow_edits=allow_edits)
         server = make_server(app)
         opening = shown if isinstance(shown, Opening) else None
         if opening is not None:

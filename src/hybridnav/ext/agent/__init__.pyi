@@ -1,0 +1,5 @@
+from .answers import Answers as Answers
+from .questions import TOOLS as TOOLS, Tool as Tool
+from .serving import serve_stdio as serve_stdio
+
+__all__: list[str]

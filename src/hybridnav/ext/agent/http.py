@@ -1,0 +1,109 @@
+"""The table of functions as JSON over HTTP, on the server of the page, with its description."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from hybridnav._version import __version__
+from hybridnav.errors import HybridNavError
+from hybridnav.ext.agent.answers import Answers
+from hybridnav.ext.agent.questions import TOOLS, Answer
+from hybridnav.ext.agent.serving import INSTRUCTIONS, answered, schema_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from starlette.requests import Request
+
+    from hybridnav.ext.page.session import Session
+
+_UNPROCESSABLE = 422
+
+
+class HttpTools:
+    """The functions of the floors of a page.
+
+    Parameters
+    ----------
+    session_of
+        Returns the session of the floor that a request names.
+    body_of
+        Returns the value of the body of a request, or the response that refuses it.
+    allow_edits
+        Whether what changes something is answered.
+    """
+
+    def __init__(
+        self,
+        session_of: Callable[[Request], Session],
+        body_of: Callable[[Request], Any],
+        *,
+        allow_edits: bool = False,
+    ) -> None:
+        self._session_of, self._body_of, self._allow_edits = session_of, body_of, allow_edits
+        self._answers: WeakKeyDictionary[Session, Answers] = WeakKeyDictionary()
+
+    def routes(self, at: str, floor: str) -> list[Route]:
+        """Return the routes below the path of the page and that of a floor."""
+        return [
+            Route(f"{at}/openapi.json", self._described),
+            Route(f"{floor}/api/{{name}}", self._called, methods=["POST"]),
+        ]
+
+    async def _described(self, _: Request) -> JSONResponse:
+        return JSONResponse(description())
+
+    async def _called(self, request: Request) -> Any:
+        arguments = await self._body_of(request)
+        if isinstance(arguments, Response):
+            return arguments
+        if not isinstance(arguments, dict):
+            wrong = {"ok": False, "text": "expected a JSON object of arguments"}
+            return JSONResponse(wrong, _UNPROCESSABLE)
+        try:
+            session = self._session_of(request)
+        except HybridNavError as error:
+            return JSONResponse({"ok": False, "text": str(error)}, _UNPROCESSABLE)
+        answers = self._answers.get(session)
+        if answers is None:
+            answers = Answers(session, allow_edits=self._allow_edits)
+            self._answers[session] = answers
+        found = await answered(answers, request.path_params["name"], arguments)
+        if "png" in found:
+            found["png"] = base64.b64encode(found["png"]).decode()
+        return JSONResponse(found, 200 if found["ok"] else _UNPROCESSABLE)
+
+
+def description() -> dict[str, Any]:
+    """Return what there is to call, as OpenAPI describes it.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.agent.http import description
+    >>> sorted(description()["paths"])[0]
+    '/floor/{floor}/api/can_reach'
+    """
+    answer = {"application/json": {"schema": Answer.model_json_schema()}}
+    floor = {"name": "floor", "in": "path", "required": True, "schema": {"type": "integer"}}
+    paths = {
+        f"/floor/{{floor}}/api/{tool.name}": {
+            "post": {
+                "operationId": tool.name,
+                "summary": " ".join((tool.asks.__doc__ or "").split()),
+                "parameters": [floor],
+                "requestBody": {"content": {"application/json": {"schema": schema_of(tool.asks)}}},
+                "responses": {
+                    "200": {"description": "The answer.", "content": answer},
+                    "422": {"description": "What to do instead.", "content": answer},
+                },
+            }
+        }
+        for tool in TOOLS
+    }
+    info = {"title": "hybridnav", "version": __version__, "description": INSTRUCTIONS}
+    return {"openapi": "3.1.0", "info": info, "paths": paths}

@@ -1,0 +1,153 @@
+"""Names and places as programs give them, and what an answer shows of a room."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.errors import HybridNavError
+from hybridnav.maps import CellClass
+from hybridnav.maps.names import did_you_mean, folded, matching, natural_key
+from hybridnav.planner import Blocked
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav.topology.rooms import Door, Rooms
+
+Point = tuple[float, float]
+_ARTICLES = {"the", "a", "an", "der", "die", "das", "dem", "den", "ein", "eine", "einen", "einem"}
+_DOOR = re.compile(r"(?:door|tür|tuer)[ :#-]*(\d{1,9})", re.IGNORECASE)
+_SIGNS = re.compile(r"[\W_]+")
+SHOWN = 10
+"""Choices, doors and neighbours of an answer."""
+
+
+class UnclearError(HybridNavError):
+    """A name that means nothing, or several things."""
+
+    def __init__(self, text: str, choices: Iterable[dict[str, Any]] = ()) -> None:
+        super().__init__(text)
+        self.choices = list(choices)
+
+
+class Places:
+    """The rooms and doors of one map, by what programs call them.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    """
+
+    def __init__(self, rooms: Rooms) -> None:
+        self.rooms = rooms
+
+    def listed(self) -> list[str]:
+        """Return the names of the rooms that lists show, in natural order."""
+        rooms = self.rooms
+        names = [name for name, on in zip(rooms.names, rooms.is_listed, strict=True) if on]
+        return sorted(names, key=natural_key)
+
+    def kind(self, name: str) -> str:
+        """Return what a room is: `room`, `corridor` or `hall`."""
+        kind = self.rooms.kinds[self.rooms.labels.index(name)]
+        return "room" if kind is None else kind.name
+
+    def doors_of(self, name: str) -> list[Door]:
+        """Return the listed doors of a room."""
+        return [door for door in self.rooms.listed_doors if name in door.rooms]
+
+    def room(self, name: str) -> dict[str, Any]:
+        """Return what a list shows of a room."""
+        rooms = self.rooms
+        return {
+            "name": name,
+            "kind": self.kind(name),
+            "area_m2": round(float(rooms.areas_m2[rooms.labels.index(name)]), 1),
+            "point": rounded(rooms.point_of(name)),
+            "doors": [door.number for door in self.doors_of(name)][:SHOWN],
+        }
+
+    def meant(self, name: str, known: list[str], what: str) -> str:
+        """Return the one name that a text means.
+
+        Raises
+        ------
+        UnclearError
+            When it means none, or several.
+        """
+        if name in known:
+            return name
+        wanted = folded(name).split()
+        while len(wanted) > 1 and wanted[0] in _ARTICLES:
+            wanted = wanted[1:]
+        text = " ".join(wanted)
+        found = [known[at] for at in matching(text, known)]
+        plain = _SIGNS.sub(" ", text).strip()
+        alike = [one for one in known if _SIGNS.sub(" ", folded(one)).strip() == plain]
+        found = alike or found
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            raise UnclearError(
+                f"no {what} is called {name!r:.80}{did_you_mean(name, tuple(known))}"
+            )
+        listed = self.rooms.names
+        raise UnclearError(
+            f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
+            [self.room(one) if one in listed else {"name": one} for one in found[:SHOWN]],
+        )
+
+    def place(self, place: str | list[float]) -> str | tuple[float, float]:
+        """Return a place as planners take it."""
+        if not isinstance(place, str):
+            return place[0], place[1]
+        labels = self.rooms.labels
+        return self.meant(place, list(dict.fromkeys((*labels.names, *labels.points))), "room")
+
+    def blocked(self, avoiding: list[str]) -> Blocked:
+        """Return what a question avoids."""
+        doors, rooms = [], []
+        for text in avoiding:
+            if number := _DOOR.fullmatch(text.strip()):
+                doors.append(self.rooms.listed_door(int(number[1])).number)
+            else:
+                rooms.append(self.meant(text, list(self.rooms.names), "room"))
+        return Blocked(doors=doors, rooms=rooms)
+
+    def candidates(
+        self, of: str, start: str | tuple[float, float]
+    ) -> list[tuple[dict[str, Any], tuple[float, float]]]:
+        """Return rooms or doors of a kind or name, each with a point to go to."""
+        rooms = self.rooms
+        if folded(of) in {"door", "doors", "tur", "turen"}:
+            return [
+                ({"number": door.number, "rooms": list(door.rooms)}, self._beside(door))
+                for door in rooms.listed_doors
+                if door.passable and not door.is_opening
+            ]
+        names = [name for name in self.listed() if name != start]
+        if of in {"room", "corridor", "hall"}:
+            found = [name for name in names if self.kind(name) == of]
+        else:
+            found = [names[at] for at in matching(of, names)]
+        if not found:
+            raise UnclearError(f"nothing is called {of!r:.80}{did_you_mean(of, tuple(names))}")
+        return [(self.room(name), rooms.point_of(name)) for name in found]
+
+    def _beside(self, door: Door) -> tuple[float, float]:
+        """Return a point in a door that the robot can stand on."""
+        grid = self.rooms.grid
+        cells = np.stack(divmod(self.rooms.cells_beside(door.number), grid.shape[1]), axis=1)
+        cells = cells[grid.classes[tuple(cells.T)] == CellClass.FREE]
+        points = grid.frame.points_of(cells)
+        x, y = points[np.hypot(*(points - door.position).T).argmin()].tolist()
+        return x, y
+
+
+def rounded(point: tuple[float, ...] | None) -> list[float] | None:
+    """Return a point to the millimetre."""
+    return None if point is None else [round(number, 3) for number in point]

@@ -1,0 +1,237 @@
+"""Tools for programs, through the real protocol and HTTP, judged by what was painted."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav.ext.agent import TOOLS, Answers, serving
+from hybridnav.ext.page import Session, Site
+from hybridnav.ext.page.session import RoomsFile
+from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
+from tests.ext.page.server import served
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
+mcp = pytest.importorskip("mcp")
+
+
+def session_of(floor: PaintedFloor, folder: Path) -> Session:
+    path = write_floor(floor, folder)
+    model = hn.load(path, robot_radius_m=0.2)
+    rooms = hn.load_rooms(folder / "rooms.yaml", model.grid)
+    settings = model.fitted(hn.load_preset("shortest"))
+    topology = model.grown(settings.pyramid, rooms)
+    return Session(model, topology, settings, file=RoomsFile(folder, "rooms.yaml"))
+
+
+def write_floor(floor: PaintedFloor, folder: Path) -> Path:
+    frame = hn.Frame(resolution_m=RESOLUTION_M)
+    grid = hn.OccupancyGrid((~floor.free).astype(np.float32), frame, robot_radius_m=0.2)
+    hn.write_ros_map(grid, folder / "floor.yaml")
+    hn.save_rooms(folder / "rooms.yaml", hn.RoomLabels(floor.names, floor.label_of), grid)
+    return folder / "floor.yaml"
+
+
+def asker(answers: Answers) -> Any:
+    return lambda tool, /, **arguments: answers.call(tool, arguments)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_answers_agree_with_what_was_painted(seed, tmp_path):
+    floor = PaintedFloor(seed)
+    answers = Answers(session_of(floor, tmp_path), allow_edits=True)
+    kinds = Counter(Judge(floor, asker(answers)).questions(64))
+    assert len(kinds) == 8
+    assert min(kinds.values()) == 8
+
+
+@asynccontextmanager
+async def connected(path: Path, *more: str) -> AsyncIterator[Any]:
+    """A client of a server in a process of its own."""
+    from mcp import ClientSession, StdioServerParameters
+    from mcp.client.stdio import stdio_client
+
+    words = ["-m", "hybridnav", "serve", str(path), "--robot-radius", "0.2", *more]
+    server = StdioServerParameters(command=sys.executable, args=words, env=dict(os.environ))
+    async with stdio_client(server) as streams, ClientSession(*streams) as client:
+        await client.initialize()
+        yield client
+
+
+async def asked(client: Any, name: str, /, **arguments: Any) -> dict[str, Any]:
+    result = await client.call_tool(name, arguments)
+    found: dict[str, Any] = json.loads(result.content[0].text)
+    assert found == result.structured_content
+    assert result.is_error == (not found["ok"])
+    return found
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(10))
+def test_a_hundred_questions_a_map_through_the_protocol(seed, tmp_path):
+    floor = PaintedFloor(100 + seed)
+    path = write_floor(floor, tmp_path)
+
+    async def main() -> Counter[str]:
+        async with connected(path, "--allow-edits") as client:
+            loop = asyncio.get_running_loop()
+
+            def ask(name: str, /, **arguments: Any) -> dict[str, Any]:
+                call = asked(client, name, **arguments)
+                return asyncio.run_coroutine_threadsafe(call, loop).result(120)
+
+            def judge() -> Counter[str]:
+                return Counter(Judge(floor, ask).questions(104))
+
+            return await asyncio.to_thread(judge)
+
+    assert min(asyncio.run(main()).values()) == 13
+
+
+def test_two_clients_errors_and_a_call_that_is_cancelled(tmp_path):
+    floor = PaintedFloor(0)
+    path = write_floor(floor, tmp_path)
+
+    async def main() -> None:
+        async with connected(path, "--allow-edits") as one, connected(path) as other:
+            listed = (await one.list_tools()).tools
+            assert [tool.name for tool in listed] == [tool.name for tool in TOOLS]
+            for tool in listed:
+                assert tool.description
+                assert tool.input_schema["type"] == "object"
+            assert (await asked(one, "close", rooms=[floor.names[0]]))["ok"]
+            refused = await asked(other, "close", rooms=[floor.names[0]])
+            assert "--allow-edits" in refused["text"]
+            assert (await asked(other, "describe_map"))["closed"] == {"doors": [], "rooms": []}
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(asked(one, "picture"), 0.001)
+            assert (await asked(one, "describe_map"))["closed"]["rooms"] == [floor.names[0]]
+            picture = await one.call_tool("picture", {})
+            assert [part.type for part in picture.content] == ["text", "image"]
+            assert "did you mean route" in (await asked(one, "rout"))["text"]
+
+    asyncio.run(main())
+
+
+def test_the_page_gives_the_same_answers_as_json(tmp_path):
+    floor = PaintedFloor(1)
+    session = session_of(floor, tmp_path)
+    with served(Site.of_map(session), tmp_path) as client:
+        described = client.get("openapi.json").value
+        assert sorted(described["paths"]) == sorted(
+            f"/floor/{{floor}}/api/{tool.name}" for tool in TOOLS
+        )
+        point, _, room = floor.inner_point()
+        found = client.post("floor/0/api/where_am_i", {"point": point})
+        assert found.code == 200
+        assert found.value == Answers(session).call("where_am_i", {"point": point})
+        assert found.value["room"] == floor.names[room]
+        assert client.post("floor/0/api/close", {"rooms": [floor.names[0]]}).code == 422
+        assert client.post("floor/0/api/route", [1]).code == 422
+        assert client.post("floor/7/api/describe_map", {}).code == 422
+        png = client.post("floor/0/api/picture", {}).value["png"]
+        assert png.startswith("iVBOR")
+
+
+@pytest.mark.parametrize("allow_edits", [False, True])
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("route", {}),
+        ("route", {"start": [0, 0], "goal": [1e99, 0]}),
+        ("route", {"start": [float("nan"), 0], "goal": [1, 0]}),
+        ("route", {"start": "../../etc/passwd", "goal": [1, 1]}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "avoiding": ["door 99999"]}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "language": "xx"}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "width": -1}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "width": 90}),
+        ("where_am_i", {"point": [1, 1, 1]}),
+        ("where_am_i", {"point": [-50, 1]}),
+        ("list_rooms", {"count": 10**9}),
+        ("list_rooms", {"unknown": 1}),
+        ("nearest", {"of": "\x00", "start": [1, 1]}),
+        ("close", {"doors": ["1"], "rooms": "all"}),
+        ("close", {}),
+        ("open", {"doors": [1]}),
+        ("undo", {}),
+        ("name_room", {"room": "nowhere", "name": "x"}),
+        ("__init__", {}),
+        ("call", {}),
+        ("", {}),
+        ("picture", {"start": [1, 1]}),
+    ],
+)
+def test_hostile_calls_end_in_one_line(name, arguments, allow_edits, tmp_path):
+    answers = Answers(session_of(PaintedFloor(2), tmp_path), allow_edits=allow_edits)
+    found = answers.call(name, arguments)
+    assert "\n" not in found["text"]
+    assert len(json.dumps(found)) < 2000
+    assert not found["ok"] or found["status"] != "solved"
+
+
+def test_names_of_rooms_are_saved_and_taken_back(tmp_path):
+    floor = PaintedFloor(3)
+    session = session_of(floor, tmp_path)
+    answers = Answers(session, allow_edits=True)
+    old = floor.names[0]
+    assert answers.call("close", {"rooms": [old]})["ok"]
+    assert answers.call("name_room", {"room": old, "name": "Archive"})["ok"]
+    assert "Archive" in hn.load_rooms(tmp_path / "rooms.yaml", session.grid).names
+    assert answers.call("describe_map", {})["closed"]["rooms"] == ["Archive"]
+    for bad in ("", "x" * 300, floor.names[1], "two\nlines", "1,2"):
+        found = answers.call("name_room", {"room": "Archive", "name": bad})
+        assert not found["ok"], bad
+    (tmp_path / "rooms.yaml").write_text("someone else's", encoding="utf-8")
+    found = answers.call("name_room", {"room": "Archive", "name": "Attic"})
+    assert not found["ok"]
+    assert (tmp_path / "rooms.yaml").read_text(encoding="utf-8") == "someone else's"
+    assert session.rooms.names[0] == "Archive"
+    answers.call("undo", {})
+
+
+def test_small_answers_and_a_limit_in_time(tmp_path, monkeypatch):
+    floor = PaintedFloor(4)
+    answers = Answers(session_of(floor, tmp_path))
+    start, goal = (floor.inner_point()[0] for _ in range(2))
+    for name, arguments in (
+        ("describe_map", {}),
+        ("list_rooms", {}),
+        ("where_am_i", {"point": start}),
+        ("route", {"start": start, "goal": goal}),
+        ("nearest", {"of": "door", "start": start, "count": 5}),
+        ("explain", {"start": start, "goal": goal}),
+    ):
+        assert len(json.dumps(answers.call(name, arguments)).encode()) <= 2048, name
+    monkeypatch.setattr(serving, "LIMIT_S", 0.05)
+    monkeypatch.setattr(answers, "call", lambda *_: __import__("time").sleep(0.4))
+    late = asyncio.run(serving.answered(answers, "route", {}))
+    assert not late["ok"]
+    assert "no answer within" in late["text"]
+
+
+def test_the_example_asks_a_map(tmp_path):
+    path = write_floor(PaintedFloor(5), tmp_path)
+    file = Path(__file__).parents[3] / "examples" / "ask_a_map.py"
+    done = subprocess.run(
+        [sys.executable, str(file), str(path)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    told = [line.split(":")[0] for line in done.stdout.splitlines() if ": " in line]
+    assert told == ["describe_map", "list_rooms", "route", "can_reach", "explain"]
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 40
