@@ -13,6 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.costs import PlannerCosts
+from hybridnav.planner.distances import Distances
 from hybridnav.planner.endpoints import no_places, read_points
 from hybridnav.planner.follow import begun, update_of
 from hybridnav.planner.methods import make_method
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 
 @copies_alike
-class HybridPlanner:
+class HybridPlanner(Distances):
     """Planner of paths between points of one map by a preset.
 
     Threads may share a planner; queries with OMPL run one after the other. The structures of a

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
     from hybridnav.route import Route
+    from hybridnav.search.distance_table import LabelSource
     from hybridnav.search.mesh import MeshSearch
     from hybridnav.search.octile import JumpSearch
     from hybridnav.topology import TopologicalMap
@@ -221,6 +222,14 @@ class Method(Protocol):
 
         A path between cells may meet a closed cell: the caller looks.
         """
+        return None
+
+    def cost_of(self, query: Query) -> float:
+        """Return the cost of the path that `find` finds, metres; infinite without a path."""
+        return self.find(query).cost_m
+
+    def labels(self) -> LabelSource | None:
+        """Return what makes labels for tables of distances; None for plans of each pair."""
         return None
 
     @property

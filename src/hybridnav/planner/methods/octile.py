@@ -18,6 +18,7 @@ from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
+    from hybridnav.search.distance_table import JumpLabels
     from hybridnav.search.found import MapChange, Metric, Query, QueryMany
 
 
@@ -101,6 +102,17 @@ class OverJumps(Method):
         )
         found = Found(path.cells, length_m, length_m, points, stats=stats)
         return round_closed(found, query, self._refiner)
+
+    def labels(self) -> JumpLabels | None:
+        """Return labels in the contracted graph; see `Method`."""
+        if self._grid.corner_cutting:
+            return None
+        from hybridnav.search.distance_table import JumpLabels  # noqa: PLC0415 - for tables alone
+
+        search = self._search or self.prepare()
+        if not search.graph.is_contracted:
+            search = JumpSearch(contract_graph(search.graph))
+        return JumpLabels(search) if search.graph.is_contracted else None
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:
         """Find a shortest path for each query, on all cores; see `Method`.

@@ -19,6 +19,7 @@ from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.mesh import (
+    CornerHierarchy,
     DetourSearch,
     MeshPath,
     MeshSearch,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.planner.settings import ShortestSettings
+    from hybridnav.search.distance_table import LabelSource
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
 Position = tuple[float, float]
@@ -203,6 +205,18 @@ class OverMesh(Method):
     def _sight(self, closed: LongArray | None) -> LineOfSight:
         """Return the shortener of cell paths, with some flat cells closed."""
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
+
+    def labels(self) -> LabelSource | None:
+        """Return labels in the hierarchy of corners, or on the graph that is not contracted; see
+        `Method`."""
+        # Loads kernels for tables alone.
+        from hybridnav.search.distance_table import MeshLabels, ViewLabels  # noqa: PLC0415
+
+        search = self._on_mesh()
+        search.prepare()
+        if isinstance(search.graph, CornerHierarchy):
+            return MeshLabels(search, search.graph)
+        return None if search.edges is None else ViewLabels(search, search.edges)
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:
         """Find a shortest path for each query, on all cores; see `Method`.

@@ -273,7 +273,7 @@ class JumpSearch:
         self.graph = graph
         tables = graph.index, graph.ahead, graph.order, graph.shape[1]
         arcs = graph.first, graph.arcs
-        self._arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
+        self.arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
         self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
@@ -305,6 +305,6 @@ class JumpSearch:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
         with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
-                self._arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
+                self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
             )
         return found

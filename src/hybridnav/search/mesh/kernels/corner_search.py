@@ -308,8 +308,8 @@ def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts,
     """
     sx, sy, tx, ty = endpoints
     from_row, from_col, to_row, to_col = cells
-    inner = _polygon_in(mesh, component, polygon_at, from_row, from_col)
-    last = _polygon_in(mesh, component, polygon_at, to_row, to_col)
+    inner = polygon_in(mesh, component, polygon_at, from_row, from_col)
+    last = polygon_in(mesh, component, polygon_at, to_row, to_col)
     if component[inner] != component[last]:
         return APART, 0, 0
     n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
@@ -322,7 +322,7 @@ def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts,
 
 
 @njit(cache=True, nogil=True)
-def _polygon_in(mesh, component, polygon_at, row, col):
+def polygon_in(mesh, component, polygon_at, row, col):
     """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
     cx, cy, _, first, begins, finishes, _, _ = mesh
     polygon = polygon_at[row, col]

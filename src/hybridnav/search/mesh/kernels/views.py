@@ -12,6 +12,8 @@ exact and never exceed the distance.
 import math
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
@@ -229,6 +231,34 @@ def _is_behind(mesh, x, y, corner, other):
     return (ux - x) * (wx - x) + (uy - y) * (wy - y) > 0.0
 
 
+def _has_target(target, polygon, x, y, rays):
+    """Return whether a target in a polygon is seen from a point between two rays."""
+
+
+@overload(_has_target)
+def _has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
+    """Return what stands for `_has_target`: one target, or many, of which those seen are marked."""
+
+    def one(target, polygon, x, y, rays):
+        tx, ty, goals = target
+        lx, ly, rx, ry = rays
+        for goal in goals:
+            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
+                return turn_of(x, y, lx, ly, tx, ty) <= 0
+        return False
+
+    def many(target, polygon, x, y, rays):
+        begin, listed, points, is_seen = target
+        lx, ly, rx, ry = rays
+        for k in listed[begin[polygon] : begin[polygon + 1]]:
+            tx, ty = points[k, 1], points[k, 0]
+            if turn_of(x, y, rx, ry, tx, ty) >= 0 and turn_of(x, y, lx, ly, tx, ty) <= 0:
+                is_seen[k] = True
+        return False
+
+    return one if isinstance(target[0], types.Float) else many
+
+
 @njit(cache=True, nogil=True)
 def _spread(mesh, x, y, target, room, n, found):
     """Follow the pending intervals; return the result of `see_from_point`.
@@ -242,7 +272,6 @@ def _spread(mesh, x, y, target, room, n, found):
     """
     cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
     whole, real, seen = room
-    tx, ty, goals = target
     is_target_seen = False
     while n:
         n -= 1
@@ -256,9 +285,7 @@ def _spread(mesh, x, y, target, room, n, found):
             return -1, False
 
         # All of a convex polygon that lies between the rays is seen, hence a target there too.
-        for goal in goals:
-            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
-                is_target_seen = is_target_seen or turn_of(x, y, lx, ly, tx, ty) <= 0
+        is_target_seen |= _has_target(target, polygon, x, y, (lx, ly, rx, ry))
 
         # The first end is the right one of the entry. It lies on the right ray or right of it, so
         # the ray itself limits the first interval.

@@ -1,0 +1,213 @@
+"""Kernels of many ends at once on a mesh: their labels in the hierarchy, and who sees whom."""
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.exact import turn_of
+from hybridnav.search.kernels.labels import climb, grow_rows
+from hybridnav.search.mesh.kernels.corner_search import polygon_in, polygons_with
+from hybridnav.search.mesh.kernels.views import class_of, cost_of, lobe_of, see_from_point
+
+
+@njit(cache=True, nogil=True)
+def _larger(room):
+    """Return twice the room of `see_from_point`."""
+    return grow_rows(room[0]), grow_rows(room[1]), np.empty(2 * len(room[2]), np.int32)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def labels_of_points(mesh, hierarchy, place, ends, work):
+    """Return the labels of points.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    hierarchy
+        See `climb`.
+    place
+        Component of polygons, and the polygon of each cell.
+    ends
+        int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
+    work
+        Room for polygons; room of `see_from_point`; work of `climb`.
+
+    Returns
+    -------
+    tuple
+        int64 (n + 1,) offsets; int32 corners, int64 costs in `UNITS`.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    component, polygon_at = place
+    cells, points = ends
+    inside, room, (records, heap) = work
+    follow = hierarchy[3]
+    offset = np.zeros(len(cells) + 1, np.int64)
+    nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
+    for k in range(len(cells)):
+        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
+        inner = polygon_in(mesh, component, polygon_at, row, col)
+        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
+        nowhere = (0.0, 0.0, inside[:0])
+        found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
+        while found < 0:
+            room = _larger(room)
+            found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
+        seen = room[2][:found]
+        to_seen, may_follow = np.empty(found, np.int64), np.empty(found, np.int64)
+        for i in range(found):
+            corner = seen[i]
+            dx, dy, kind = x - cx[corner], y - cy[corner], kinds[corner]
+            to_seen[i] = cost_of(x, y, cx[corner], cy[corner])
+            # An end on the corner rules nothing out.
+            is_on = dx == 0.0 and dy == 0.0
+            may_follow[i] = np.int64(-1) if is_on else follow[kind, class_of(kind, dx, dy)]
+        seeds = seen, to_seen, may_follow
+        nodes, costs, n, heap = climb(hierarchy, seeds, (records, heap), nodes, costs, n)
+        offset[k + 1] = n
+    return offset, nodes[:n], costs[:n]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def polygons_of_points(mesh, place, ends, inside):
+    """Return the polygons that contain each point: int64 (n + 1,) offsets and int32."""
+    component, polygon_at = place
+    cells, points = ends
+    offset = np.zeros(len(cells) + 1, np.int64)
+    listed = np.empty(4 * len(cells), np.int32)
+    n = 0
+    for k in range(len(cells)):
+        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
+        inner = polygon_in(mesh, component, polygon_at, row, col)
+        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
+        while n + n_inside > len(listed):
+            larger = np.empty(2 * len(listed), np.int32)
+            larger[:n] = listed[:n]
+            listed = larger
+        listed[n : n + n_inside] = inside[:n_inside]
+        n += n_inside
+        offset[k + 1] = n
+    return offset, listed[:n]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def straight_costs(mesh, starts, goals, room, table):
+    """Set the entries of a table whose ends see each other to the costs of straight lines.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    starts
+        float64 (n, 2) points, (row, col), and their polygons, see `polygons_of_points`.
+    goals
+        float64 (m, 2) points; int64 (p + 1,) and int32, the goals in each polygon.
+    room
+        See `see_from_point`.
+    table
+        int64 (n, m) costs in `UNITS`; changed.
+    """
+    points, offset, listed = starts
+    to_points, begin, members = goals
+    is_seen = np.zeros(len(to_points), np.bool_)
+    target = (begin, members, to_points, is_seen)
+    for k in range(len(points)):
+        y, x = points[k, 0], points[k, 1]
+        inside = listed[offset[k] : offset[k + 1]]
+        found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
+        while found < 0:
+            room = _larger(room)
+            found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
+        for polygon in inside:
+            is_seen[members[begin[polygon] : begin[polygon + 1]]] = True
+        for goal in np.flatnonzero(is_seen):
+            table[k, goal] = cost_of(x, y, to_points[goal, 1], to_points[goal, 0])
+        is_seen[:] = False
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def views_of_points(mesh, place, ends, work):
+    """Return the corners that points see, with the costs to them, as labels."""
+    cx, cy = mesh[0], mesh[1]
+    cells, points = ends
+    inside, room = work
+    offset = np.zeros(len(cells) + 1, np.int64)
+    nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
+    for k in range(len(cells)):
+        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
+        inner = polygon_in(mesh, place[0], place[1], row, col)
+        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
+        nowhere = (0.0, 0.0, inside[:0])
+        found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
+        while found < 0:
+            room = _larger(room)
+            found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
+        while n + found > len(nodes):
+            nodes, costs = grow(nodes), grow(costs)
+        for corner in room[2][:found]:
+            nodes[n], costs[n] = corner, cost_of(x, y, cx[corner], cy[corner])
+            n += 1
+        offset[k + 1] = n
+    return offset, nodes[:n], costs[:n]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def costs_to_corners(mesh, edges, point, view, work):
+    """Search all corners from a point, on a graph that is not contracted; return the heap.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    edges
+        int64 (2 n + 1,) and int32 (m,) of `edges_of`.
+    point
+        float64 (2,), (row, col).
+    view
+        int32 corners that the point sees, int64 costs to them.
+    work
+        int64 (n,) costs (`FAR`), filled in; int32 (n,) corners before; int64 heap.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    first, heads = edges
+    costs, came, heap = work
+    size = 0
+    for k in range(len(view[0])):
+        corner = view[0][k]
+        if view[1][k] < costs[corner]:
+            costs[corner], came[corner] = view[1][k], -1
+            if size == len(heap):
+                heap = grow_rows(heap)
+            push(heap, size, costs[corner], np.int64(corner))
+            size += 1
+    while size > 0:
+        cost, here = heap[0, 0], heap[0, 1]
+        pop(heap, size)
+        size -= 1
+        if cost != costs[here]:
+            continue
+        x, y, kind, before = cx[here], cy[here], kinds[here], came[here]
+        px, py = (point[1], point[0]) if before < 0 else (cx[before], cy[before])
+        dx, dy = x - px, y - py
+        # The blocked cell lies on the left of the path here, or on the right; a point on the corner
+        # rules nothing out.
+        is_on = dx == 0.0 and dy == 0.0
+        hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
+        at = 2 * here + (0 if is_on else lobe_of(kind, dx, dy))
+        for other in heads[first[at] : first[at + (2 if is_on else 1)]]:
+            if turn_of(px, py, x, y, cx[other], cy[other]) * hand < 0.0:
+                continue
+            further = cost + cost_of(x, y, cx[other], cy[other])
+            if further < costs[other]:
+                costs[other], came[other] = further, here
+                if size == len(heap):
+                    heap = grow_rows(heap)
+                push(heap, size, further, np.int64(other))
+                size += 1
+    return heap
