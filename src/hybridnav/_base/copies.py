@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 _T = TypeVar("_T")
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
@@ -22,6 +22,49 @@ def frozen(array: _Array) -> _Array:
     """Make an array read-only, and return it."""
     array.flags.writeable = False
     return array
+
+
+class _OnDemand:
+    """An attribute that may be a function, which is called when it is read first; an array that it
+    returns becomes read-only."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, thing: object, owner: type | None = None) -> Any:
+        if thing is None:
+            return self
+        held = vars(thing)
+        value = held[self._name]
+        if callable(value):
+            value = held[self._name] = value()
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        return value
+
+    def __set__(self, thing: object, value: Any) -> None:
+        vars(thing)[self._name] = value
+
+
+def on_demand(name: str) -> Callable[[type[_T]], type[_T]]:
+    """Let a field of a dataclass be given as a function, which is called when it is read first.
+
+    Parameters
+    ----------
+    name
+        The field; its values are never functions.
+
+    Returns
+    -------
+    Callable
+        The decorator, for a class that `dataclass` has made.
+    """
+
+    def decorate(cls: type[_T]) -> type[_T]:
+        setattr(cls, name, _OnDemand(name))
+        return cls
+
+    return decorate
 
 
 def copies_alike(cls: type[_T]) -> type[_T]:
@@ -50,7 +93,7 @@ def copies_alike(cls: type[_T]) -> type[_T]:
 def _state_of(thing: object) -> _State:
     """Return attributes, whether each array in them is writeable, names of views, and what makes
     locks."""
-    held = vars(thing)
+    held = {name: getattr(thing, name) for name in vars(thing)}  # what is found on demand too
     views = tuple(name for name, value in held.items() if isinstance(value, MappingProxyType))
     locks = {name: _LOCKS[type(value)] for name, value in held.items() if type(value) in _LOCKS}
     kept = {name: value for name, value in held.items() if name not in locks}

@@ -26,6 +26,19 @@ def centres(cells, frame):
 
 @guarded
 @njit(cache=True, nogil=True)
+def points_at(positions, frame):
+    """Return the points of positions in grid units, float64 (n, 2), as `Frame.points_of_grid`."""
+    resolution, origin_x, origin_y, cosine, sine = frame
+    points = np.empty((positions.shape[0], 2), np.float64)
+    for i in range(positions.shape[0]):
+        x, y = positions[i, 1] * resolution, positions[i, 0] * resolution
+        points[i, 0] = origin_x + cosine * x - sine * y
+        points[i, 1] = origin_y + sine * x + cosine * y
+    return points
+
+
+@guarded
+@njit(cache=True, nogil=True)
 def position_of(x, y, frame):
     """Return a point as (row, col) in grid units, that of `Frame.position_of` for near points.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, on_demand
 from hybridnav._base.messages import path_message
 from hybridnav._base.poses import Motion
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 @copies_alike
+@on_demand("cells")
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid, between the centres of two cells, or at any angle between two
@@ -63,7 +64,9 @@ class Path:
     """Heading to which the robot turns on the spot once it is there; None for no turn."""
 
     def __post_init__(self) -> None:
-        self.cells.flags.writeable = False
+        cells = vars(self)["cells"]
+        if not callable(cells):
+            cells.flags.writeable = False
         self.points.flags.writeable = False
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
@@ -82,9 +85,9 @@ class Path:
         start, goal
             `(x, y)`, no turn, or `(x, y, yaw)`, metres and radians, map frame.
         """
-        first, last = (float(end[2]) if len(end) > 2 else None for end in (start, goal))  # noqa: PLR2004
-        if first is None and last is None:
+        if len(start) == len(goal) == 2:  # noqa: PLR2004
             return self
+        first, last = (float(end[2]) if len(end) > 2 else None for end in (start, goal))  # noqa: PLR2004
         return replace(self, start_heading_rad=first, goal_heading_rad=last)
 
     @property

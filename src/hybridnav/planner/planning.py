@@ -248,7 +248,7 @@ class Planning:
                 points = self.grid.frame.points_of(found.cells)
             if metric != "octile" and not length_m > 0:
                 points = points[:1]
-            path = Path(found.cells, points, length_m)
+            path = Path(found.cells_on_demand, points, length_m)
             least = self._bound(query, found, length_m)
             result = self._solved(request, found, path, least, metric=metric)
         if result.path is None or not result.solved or self.guide is None:
@@ -385,19 +385,16 @@ class Planning:
 
     def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
-        # Each result has its own settings, so that a change of one does not affect the next.
-        settings = {
-            key: dict(value) if isinstance(value, dict) else value
-            for key, value in self._settings.items()
-        }
         start, goal = (tuple(pose.tolist()) for pose in request.poses)
-        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
+        own: Any = partial(_of_its_own, self._settings)
+        return PlanResult(status, settings=own, start=start, goal=goal, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path or no places."""
         if path is None or self._route_finder is None:
             return None
-        return RouteOfCells(self.built, self._route_finder, path.cells)
+        cells: Any = partial(getattr, path, "cells")
+        return RouteOfCells(self.built, self._route_finder, cells)
 
     @cached_property
     def _route_finder(self) -> RouteFinder | None:
@@ -448,3 +445,8 @@ class Planning:
             return self.plan(self.read(start, goal, finish, closed, "anywhere"))
 
         return plan_many(self.grid, at_once, pairs, closed, alone)
+
+
+def _of_its_own(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return settings for one result, so that a change of them does not affect the next one."""
+    return {k: dict(each) if isinstance(each, dict) else each for k, each in settings.items()}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import numpy as np
 
+from hybridnav._base.copies import on_demand
 from hybridnav.errors import PlanError
 from hybridnav.planner.guide import sentences
 from hybridnav.route.route import Route
@@ -96,6 +97,7 @@ class Refinement:
         return self.by == "grid"
 
 
+@on_demand("settings")
 @dataclass(frozen=True, eq=False)
 class PlanResult:
     """Outcome of one query; `path` and `route` are None unless it is solved.
@@ -210,6 +212,7 @@ class PlanResult:
             "route_source": self.route,
             "instruction_source": self.instructions,
             "bound_source": self.lower_bound,
+            "settings": self.settings,
             "why_source": self.explanation,
         }
 

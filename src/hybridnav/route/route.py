@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, on_demand
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
@@ -126,6 +126,7 @@ class RouteFinder:
         return next(own, passable[0] if passable else None)
 
 
+@on_demand("cells")
 @dataclass(frozen=True, eq=False)
 class RouteOfCells:
     """The route of one cell path, which is found when somebody reads it."""

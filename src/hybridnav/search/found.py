@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -165,6 +165,11 @@ class Found:
     def cost_m(self) -> float:
         """Length or cost in the metric of the method, metres; infinite without a path."""
         return self.cost() if callable(self.cost) else self.cost
+
+    @property
+    def cells_on_demand(self) -> Any:
+        """The cells, or how to find them."""
+        return partial(getattr, self, "cells") if callable(self.passed) else self.passed
 
     @cached_property
     def cells(self) -> LongArray:

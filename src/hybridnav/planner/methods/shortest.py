@@ -14,7 +14,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.geometry import cells_of_line, polyline_length, polyline_lengths
+from hybridnav.maps.geometry import cells_of_line, points_at, polyline_length, polyline_lengths
 from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
@@ -75,6 +75,7 @@ class OverMesh(Method):
                 "preset grid-astar"
             )
         self._grid, self._frame = grid, grid.frame
+        self._placing = grid.frame.for_kernels
         self._refiner = known.refiner(settings)
         self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
@@ -145,7 +146,7 @@ class OverMesh(Method):
         path, expanded = self._on_graph(query, positions)
         points = None
         if path.positions is not None:
-            points = self._frame.points_of_grid(path.positions)
+            points = points_at(path.positions, self._placing)
             points[0], points[-1] = query.points
         seconds["shortest"] = time.perf_counter() - now
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
@@ -155,6 +156,15 @@ class OverMesh(Method):
         if math.isinf(path.lower_bound_cells):
             return Found(None, stats=stats)
         return self._in_sight(query, path.lower_bound_cells, stats)
+
+    def cost_of(self, query: Query) -> float:
+        """Return the length of a shortest path; see `Method`."""
+        if query.closed is not None or self._search is None or self._budget_s is not None:
+            return self.find(query).cost_m
+        position_of = self._frame.position_of
+        start, goal = (position_of(*point[:2].tolist()) for point in query.points)
+        found = self._search.path(query.cells, (start, goal), epsilon=self._epsilon)
+        return found.length_cells * self._placing[0]
 
     def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
         """Return the path of the search of the mesh, and the nodes expanded."""
