@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from typing import Literal
+import re
+import unicodedata
+from typing import TYPE_CHECKING, Literal
 
 from hybridnav.errors import InvalidValueError, brief
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 MAX_NAME = 80
 """Characters of a name at most."""
@@ -42,16 +47,91 @@ def check_names(names: tuple[str, ...]) -> None:
         seen.add(name)
 
 
+_LETTERS = str.maketrans(
+    {"ø": "o", "ł": "l", "đ": "d", "ð": "d", "ħ": "h", "\u0131": "i", "æ": "ae", "œ": "oe"}
+)
+"""Letters that Unicode does not take apart."""
+
+
+def folded(text: str) -> str:
+    """Return a text without case, accents and doubled spaces, to compare names as people type them.
+
+    Examples
+    --------
+    >>> from hybridnav.maps.names import folded
+    >>> folded("Große  Küche") == folded("GROSSE KUCHE")
+    True
+    """
+    apart = unicodedata.normalize("NFKD", text.casefold()).translate(_LETTERS)
+    kept = (letter for letter in apart if not unicodedata.combining(letter))
+    return " ".join("".join(kept).split())
+
+
+def natural_key(name: str) -> tuple[tuple[bool, int, str], ...]:
+    """Return what sorts names as people do: numbers by their value, letters without case and
+    accents.
+
+    Examples
+    --------
+    >>> from hybridnav.maps.names import natural_key
+    >>> sorted(["ward 10", "Ward 2", "Äpfel"], key=natural_key)
+    ['Äpfel', 'Ward 2', 'ward 10']
+    """
+    parts = re.findall(r"[0-9]+|[^0-9]+", folded(name[:MAX_NAME]))
+    digits = [part[0] in "0123456789" for part in parts]
+    found = [
+        (not number, int(part) if number else 0, "" if number else part)
+        for part, number in zip(parts, digits, strict=True)
+    ]
+    return (*found, (False, -1, name))
+
+
+def matching(text: str, names: Sequence[str]) -> list[int]:
+    """Return the places of the names that a text may mean, as people type it.
+
+    Parameters
+    ----------
+    text
+        What was typed, in any case, with or without accents; words in any order.
+    names
+        The names to choose from.
+
+    Returns
+    -------
+    list of int
+        Places in `names`: first those that equal the text, then those that begin with it, that have
+        a word that begins with it, and that hold each of its words; each in natural order.
+
+    Examples
+    --------
+    >>> from hybridnav.maps.names import matching
+    >>> names = ["tea kitchen", "ward 10", "Küche", "kitchen", "ward 2"]
+    >>> [names[at] for at in matching("KIT", names)]
+    ['kitchen', 'tea kitchen']
+    >>> [names[at] for at in matching("kuche", names)]
+    ['Küche']
+    """
+    wanted = folded(text)
+    words = wanted.split()
+    ranked = []
+    for at, name in enumerate(names):
+        own = folded(name)
+        if all(word in own for word in words):
+            is_like = (own == wanted, own.startswith(wanted), f" {wanted}" in own, True)
+            ranked.append((is_like.index(True), natural_key(name), at))
+    return [at for *_, at in sorted(ranked)]
+
+
 def did_you_mean(name: str, known: tuple[str, ...]) -> str:
     """Return a clause that suggests the nearest names, else some of all."""
     if not known:
         return ": the map has no names"
-    folded: dict[str, str] = {}
+    called: dict[str, str] = {}
     for each in known:
-        folded.setdefault(each.casefold(), each)
-    near = difflib.get_close_matches(name[:MAX_NAME].casefold(), folded, n=3, cutoff=0.5)
+        called.setdefault(folded(each), each)
+    near = difflib.get_close_matches(folded(name[:MAX_NAME]), called, n=3, cutoff=0.5)
     if near:
-        return f": did you mean {' or '.join(folded[each] for each in near)}?"
+        return f": did you mean {' or '.join(called[each] for each in near)}?"
     shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")  # noqa: PLR2004
     return f": there are {shown}"
 

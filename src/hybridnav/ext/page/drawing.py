@@ -11,7 +11,11 @@ import shapely
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
+from hybridnav.maps.names import natural_key
+from hybridnav.planner import Blocked, load_preset, plan_alternatives, preset_names
+from hybridnav.planner.guide import sentences
+from hybridnav.planner.tour import tour_of
+from hybridnav.topology.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
+    from hybridnav.planner.guide import Instruction
     from hybridnav.planner.saved import Model
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -127,30 +132,37 @@ def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
 
 
 def room_facts(rooms: Rooms) -> dict[str, Any]:
-    """Return names, areas and positions of rooms, and their doors without gaps; `listed` tells
-    which of them the page shows unless it is asked for all."""
+    """Return names, areas, positions and boxes of rooms, in the order of their names, and their
+    doors without gaps.
+
+    `listed` tells which of them the page shows unless it is asked for all, `leads` which doors it
+    shows to people."""
     grid = rooms.grid
     shown = {door.number for door in rooms.listed_doors}
+    leading = {door.number for door in leading_doors(rooms)}
+    found = [
+        {
+            "name": name,
+            "area_m2": round(area, 2),
+            "fits": fits,
+            "listed": is_listed,
+            "at": in_grid(_middle(rooms, name, centre), grid),
+            "box": box,
+        }
+        for name, area, fits, is_listed, centre, box in zip(
+            rooms.names,
+            rooms.areas_m2.tolist(),
+            rooms.fits.tolist(),
+            rooms.is_listed.tolist(),
+            _centres_m(rooms.labels, grid),
+            _boxes(rooms.labels),
+            strict=True,
+        )
+    ]
     return {
-        "rooms": [
-            {
-                "name": name,
-                "area_m2": round(area, 2),
-                "fits": fits,
-                "listed": is_listed,
-                "at": in_grid(_middle(rooms, name, centre), grid),
-            }
-            for name, area, fits, is_listed, centre in zip(
-                rooms.names,
-                rooms.areas_m2.tolist(),
-                rooms.fits.tolist(),
-                rooms.is_listed.tolist(),
-                _centres_m(rooms.labels, grid),
-                strict=True,
-            )
-        ],
+        "rooms": sorted(found, key=lambda room: natural_key(room["name"])),
         "doors": [
-            _door(door, grid) | {"listed": door.number in shown}
+            _door(door, grid) | {"listed": door.number in shown, "leads": door.number in leading}
             for door in rooms.doors
             if not door.is_gap
         ],
@@ -171,9 +183,22 @@ def _centres_m(labels: RoomLabels, grid: OccupancyGrid) -> list[tuple[float, flo
     return [(x, y) for x, y in points]
 
 
+def _boxes(labels: RoomLabels) -> list[list[int]]:
+    """Return the first and last column and row of each room: names are written inside."""
+    from scipy.ndimage import find_objects  # noqa: PLC0415 - most of the page needs none
+
+    found = find_objects(labels.label_of + 1, max_label=len(labels.names))
+    return [
+        [0, 0, 0, 0] if box is None else [box[1].start, box[1].stop, box[0].start, box[0].stop]
+        for box in found
+    ]
+
+
 def _middle(rooms: Rooms, name: str, centre_m: tuple[float, float]) -> tuple[float, float]:
-    """Return where a room's name stands: its centre, unless that lies in another room."""
-    return centre_m if rooms.at(centre_m) == name else rooms.point_of(name)
+    """Return where a room's name stands: its centre, unless that lies elsewhere or on furniture."""
+    cell = rooms.grid.frame.cell_of(*centre_m)
+    is_free = rooms.at(centre_m) == name and rooms.grid.measured[cell] == CellClass.FREE
+    return centre_m if is_free else rooms.point_of(name)
 
 
 def _door(door: Door, grid: OccupancyGrid) -> dict[str, Any]:
@@ -260,8 +285,9 @@ class PagePlanning:
         closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
-        tour = plan_tour(planner, points, blocked=closed)
-        return self._facts(tour.results[0]) | self._itinerary(tour)
+        result = planner.plan(*points, blocked=closed)
+        tour = tour_of(planner, [result], named_ends(query, points))
+        return self._facts(result) | self._itinerary(tour, query.language)
 
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
@@ -284,7 +310,9 @@ class PagePlanning:
         found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
-            | self._itinerary(each.tour)
+            | self._itinerary(
+                tour_of(planner, [each.result], named_ends(query, (start, goal))), query.language
+            )
             | {"overlap": round(each.overlap, 3)}
             for each in found
         ]
@@ -330,20 +358,60 @@ class PagePlanning:
         length_m = None if path is None else path.length_m
         return facts_of(result, parts) | {"length_m": finite(length_m)}
 
-    def _itinerary(self, tour: Tour) -> dict[str, Any]:
+    def _itinerary(self, tour: Tour, language: str) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
         route = tour.results[0].route
         return {
             "legs": [
                 {
-                    "room": leg.room or f"the {leg.shape}",
+                    "room": leg.room,
+                    "shape": leg.shape,
                     "door": leg.door.number if leg.door else None,
                 }
                 for leg in tour.legs
             ],
-            "words": tour.words(),
+            "words": lines_of(tour.instructions, language, [(0, self.grid)]),
             "places": list(route.places) if route is not None else [],
         }
+
+
+def named_ends(query: PathQuery, points: Sequence[Any]) -> list[Any]:
+    """Return what words call the ends of a query: their names, or their points."""
+    ends = (query.start, query.goal)
+    return [end.name or point for end, point in zip(ends, points, strict=True)]
+
+
+def lines_of(
+    instructions: Sequence[Instruction], language: str, floors: Sequence[tuple[int, OccupancyGrid]]
+) -> list[dict[str, Any]]:
+    """Return the lines of instructions, each with the place and the door that it is about.
+
+    Parameters
+    ----------
+    instructions
+        What a person does on a route.
+    language
+        Code of the language.
+    floors
+        Number and map of each floor that is visited, in order.
+
+    Raises
+    ------
+    InvalidValueError
+        When there are no sentences in this language.
+    """
+    lines: list[dict[str, Any]] = []
+    visited = 0
+    for n_told, each in enumerate(instructions, 1):
+        # Two instructions may make one line: it is about the first of them.
+        while len(sentences(instructions[:n_told], language)) > len(lines):
+            floor, grid = floors[min(visited, len(floors) - 1)]
+            door = None if each.doorway is None else each.doorway.door
+            at = in_grid(each.position, grid)
+            lines.append({"floor": floor, "at": at, "door": door})
+        visited += each.kind == "ride"
+    texts = sentences(instructions, language)
+    return [line | {"text": text} for line, text in zip(lines, texts, strict=False)]
 
 
 def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 // What is closed: doors, rooms and areas of each floor, and links between floors.
 
 import { element } from "./route.js";
+import { t } from "./texts.js";
 
 const NOTHING = { doors: [], rooms: [], polygons: [] };
 const SAME = 1.5; // cells within which a door or a room is the one that was there before
@@ -86,7 +87,7 @@ export class Closures {
       const old = before[each.kind].find((one) => one[name] === each.what);
       const same = each.kind === "rooms" && all.find((one) => one.name === each.what);
       const found = same || (old && all.find((one) => Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
-      if (!found) lost.push(each.kind === "doors" ? `door ${each.what}` : each.what);
+      if (!found) lost.push(each.kind === "doors" ? t("door-n", each.what) : each.what);
       return found ? [{ ...each, what: found[name] }] : [];
     };
     this.list = this.list.flatMap(followed);
@@ -105,6 +106,7 @@ export class Closures {
     const corners = this.draft;
     this.draft = [];
     this.byId("area-done").hidden = true;
+    this.byId("area-start").ariaPressed = "false";
     this.page.scene.draw();
     return isKept && corners.length >= 3 ? this.toggle("polygons", corners) : null;
   }
@@ -112,12 +114,12 @@ export class Closures {
   show() {
     const { floors } = this.page;
     const areas = this.list.filter((each) => each.kind === "polygons");
-    const names = { doors: ({ what }) => `door ${what}`, polygons: (each) => `area ${areas.indexOf(each) + 1}` };
+    const names = { doors: ({ what }) => t("door-n", what), polygons: (each) => t("area-n", areas.indexOf(each) + 1) };
     const items = this.list.map((each, at) => {
-      const where = each.floor === null ? "" : floors.named(each.floor, (name) => `, floor ${name}`);
-      const text = (names[each.kind]?.(each) ?? each.what) + where;
+      const what = names[each.kind]?.(each) ?? each.what;
+      const text = (each.floor !== null && floors.named(each.floor, (name) => t("in-floor", what, name))) || what;
       const open = () => this.#become(this.list.toSpliced(at, 1));
-      return element("li", {}, text, element("button", { onclick: open, ariaLabel: `Open ${text}` }, "Open"));
+      return element("li", {}, text, element("button", { onclick: open, ariaLabel: t("open-it", text) }, t("open")));
     });
     this.byId("closed").replaceChildren(...items);
     this.byId("close-undo").disabled = !this.#before.length;
