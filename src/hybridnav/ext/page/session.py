@@ -24,7 +24,7 @@ from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_
 from hybridnav.maps import RoomLabels
 from hybridnav.maps.names import natural_key
 from hybridnav.planner.named import check_names
-from hybridnav.topology.rooms.choices import free_point
+from hybridnav.topology.rooms.choices import free_point, room_near
 from hybridnav.topology.rooms.files import save_rooms
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ class Session:
             room = name if name in rooms.names else rooms.at(wanted)
         else:
             wanted = in_metres(asked.point or (0, 0), self.grid)
-            room = name = rooms.at(wanted)
+            room = name = room_near(rooms, wanted)
         at = wanted if room is None else free_point(rooms, room, wanted)
         return {
             "name": name,

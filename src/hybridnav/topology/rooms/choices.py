@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import NO_ROOM, CellClass
 from hybridnav.topology.rooms.listing import free_components
 
 if TYPE_CHECKING:
     from hybridnav.maps.room_labels import Point
     from hybridnav.topology.rooms.level import Door, Rooms
+
+_REACH_M = 2.0
+"""Metres from a room within which a point on furniture or a wall means it."""
 
 
 def free_point(rooms: Rooms, name: str, near: Point | None = None) -> Point:
@@ -65,6 +69,48 @@ def free_point(rooms: Rooms, name: str, near: Point | None = None) -> Point:
         return point
     x, y = grid.frame.points_of(cells[nearest]).tolist()
     return x, y
+
+
+def room_near(rooms: Rooms, point: Point) -> str | None:
+    """Return the room that a person means by a point: the one that it lies in, or on whose
+    furniture or wall it lies.
+
+    Parameters
+    ----------
+    rooms
+        The rooms of a map.
+    point
+        `(x, y)` in metres, map frame.
+
+    Returns
+    -------
+    str or None
+        The name; None on free cells in no room, and farther than 2 m from all rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.topology.rooms.choices import room_near
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 1.0, 0.0]]), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen",), np.array([[0, -1, -1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> room_near(topology.rooms, (1.4, 0.5)), room_near(topology.rooms, (2.5, 0.5))
+    ('kitchen', None)
+    """
+    grid, of = rooms.grid, rooms.labels.label_of
+    name = rooms.at(point)
+    row, col = grid.frame.cell_of(*point)
+    is_on_map = 0 <= row < of.shape[0] and 0 <= col < of.shape[1]
+    if name is not None or (is_on_map and grid.measured[row, col] == CellClass.FREE):
+        return name
+    reach = round(_REACH_M / grid.resolution_m)
+    top, left = (max(0, at - reach) for at in (row, col))
+    window = of[top : max(0, row + reach + 1), left : max(0, col + reach + 1)]
+    cells = np.argwhere(window != NO_ROOM)
+    away = cells + 0.5 + (top, left) - grid.frame.positions_of(np.array([point]))[0]
+    squared = (away * away).sum(axis=1)
+    if not len(cells) or squared.min() > reach * reach:
+        return None
+    return rooms.names[int(window[tuple(cells[int(np.argmin(squared))])])]
 
 
 def leading_doors(rooms: Rooms) -> list[Door]:

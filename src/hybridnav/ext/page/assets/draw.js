@@ -143,6 +143,7 @@ export function paintNames(scene, rooms, taken, chosen) {
   const { context } = scene;
   const inks = inksOf(scene);
   const order = [...rooms].sort((a, b) => (b.name === chosen) - (a.name === chosen) || b.area_m2 - a.area_m2);
+  const placed = [];
   context.textAlign = "center";
   context.textBaseline = "middle";
   for (const room of order) {
@@ -163,6 +164,7 @@ export function paintNames(scene, rooms, taken, chosen) {
           const box = [middle - half, y + down - high, middle + half, y + down + high];
           if (!isFree(box)) continue;
           taken.push(box);
+          placed.push([room.name, ...box]);
           Object.assign(context, { strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
           lines.forEach((line, at) => {
             const level = y + down - high + (at + 0.5) * (size + 2);
@@ -174,6 +176,7 @@ export function paintNames(scene, rooms, taken, chosen) {
       }
     }
   }
+  scene.canvas.dataset.names = JSON.stringify(placed);
 }
 
 // Write the numbers of doors beside them where there is room: the first of a list go first.
