@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from tests.ext.page.server import FRAME, building_site_of, query_of, served, site_of, write_building
+from tests.ext.page.server import building_site_of, query_of, served, site_of, write_building
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,20 +22,6 @@ FILE = ".hybridnav-favourites.json"
 def _found(client: Client, text: str) -> list[tuple[int, str]]:
     places = client.post("find", {"text": text}).value["places"]
     return [(place["floor"], place["name"]) for place in places]
-
-
-@pytest.fixture
-def wards(folder: Path) -> Path:
-    """The map, its rooms named as in a hospital, with a chair in the middle of the kitchen."""
-    probability = hn.load_map(folder / "four.yaml").probability.copy()
-    probability[34:38, 15:19] = 1.0
-    grid = hn.OccupancyGrid(probability, frame=FRAME, robot_radius_m=0.2)
-    hn.write_ros_map(grid, folder / "four.yaml")
-    rooms = hn.load_rooms(folder / "rooms.yaml", grid)
-    names = ("Küche", "ward 10", "Ward 2", "ward 1")
-    chair = {"chair": tuple(FRAME.points_of_grid([36.0, 19.5]).tolist())}
-    hn.save_rooms(folder / "rooms.yaml", hn.RoomLabels(names, rooms.label_of, chair), grid)
-    return folder
 
 
 def test_places_are_found_as_people_type_them(wards: Path) -> None:

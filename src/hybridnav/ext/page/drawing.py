@@ -422,7 +422,8 @@ def lines_of(
         # Two instructions may make one line: it is about the first of them.
         while len(sentences(instructions[:n_told], language)) > len(lines):
             floor, grid = floors[min(visited, len(floors) - 1)]
-            door = None if each.doorway is None else each.doorway.door
+            crossed = each.doorway or each.landmark
+            door = None if crossed is None else crossed.door
             at = in_grid(each.position, grid)
             lines.append({"floor": floor, "at": at, "door": door})
         visited += each.kind == "ride"

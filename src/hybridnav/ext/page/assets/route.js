@@ -310,6 +310,13 @@ export class Routes {
     return this.routes[this.chosen]?.words ?? [];
   }
 
+  // What a line is about on the floor that is shown: its door, or the place where one follows it.
+  placeOf(line) {
+    if (line?.floor !== this.page.floors.at) return null;
+    const door = this.page.map.rooms.doors.find((each) => each.number === line.door);
+    return { at: door?.at ?? line.at, door: line.door };
+  }
+
   // Light a line and its door on the map; -1 for none.
   light(at) {
     if (at === this.lit) return;
@@ -322,18 +329,20 @@ export class Routes {
 
   // Light the line that is about a point of the screen; return whether there is one.
   lightAt(at) {
-    const { scene, floors } = this.page;
-    const reach = ({ at: point }) => Math.hypot(...scene.toScreen(point).map((value, axis) => value - at[axis]));
-    const near = this.lines.map((line, number) => [line.floor === floors.at ? reach(line) : Infinity, number]).filter(([away]) => away < 14);
-    const found = near.sort((one, other) => one[0] - other[0])[0]?.[1] ?? -1;
+    const { scene } = this.page;
+    const away = (line) => {
+      const place = this.placeOf(line);
+      return place ? Math.hypot(...scene.toScreen(place.at).map((value, axis) => value - at[axis])) : Infinity;
+    };
+    const least = Math.min(...this.lines.map(away));
+    const found = least < 14 ? this.lines.findLastIndex((line) => away(line) === least) : -1;
     this.light(found);
     return found >= 0;
   }
 
   async goTo(at) {
-    const { floor, at: point } = this.lines[at];
-    await this.page.showFloor(floor);
-    this.page.scene.reveal(point);
+    await this.page.showFloor(this.lines[at].floor);
+    this.page.scene.reveal(this.placeOf(this.lines[at]).at);
     this.light(at);
   }
 
