@@ -87,7 +87,7 @@ def natural_key(name: str) -> tuple[tuple[bool, int, str], ...]:
 
 
 def matching(text: str, names: Sequence[str]) -> list[int]:
-    """Return the places of the names that a text may mean, as people type it.
+    """Return which names a text may mean, as people type it.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def matching(text: str, names: Sequence[str]) -> list[int]:
     Returns
     -------
     list of int
-        Places in `names`: first those that equal the text, then those that begin with it, that have
-        a word that begins with it, and that hold each of its words; each in natural order.
+        Indices in `names`: first those that equal the text, then those that begin with it, that
+        have a word that begins with it, and that hold each of its words; each in natural order.
 
     Examples
     --------

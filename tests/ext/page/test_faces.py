@@ -227,7 +227,7 @@ def test_a_click_on_a_chair_means_its_room(browser: Any, wards: Path) -> None:
         shown = _opened(browser, client)
         shown.click(17.0, 36.2)
         shown.wait("document.getElementById('start').value === 'Küche'")
-        assert "Küche: the nearest free place" in shown.text("#status")
+        assert "Küche: the nearest spot that is free" in shown.text("#status")
         shown.click(70, 10)
         shown.wait_plan(1)
         assert shown.length_m > 10
@@ -247,7 +247,7 @@ def test_lists_have_ward_2_before_ward_10(browser: Any, wards: Path) -> None:
         assert rooms[1:] == ["Küche", "ward 1", "Ward 2", "ward 10"]
         shown.page.fill("#start", "nowhere")
         shown.page.keyboard.press("Enter")
-        shown.wait_text("#status", "No place is called “nowhere”")
+        shown.wait_text("#status", "No room is called “nowhere”")
         _take(shown, "start", "Ward 10")
         shown.page.click("#start-star")
         shown.wait_text("#status", "Ward 10 is a favourite")
@@ -341,7 +341,7 @@ def test_every_text_of_the_page_stands_in_the_tables() -> None:
         key
         for key in table.keys() - used
         if f'"{key}"' not in code
-        and not re.match(r"shape-|level-|place-robot|own-name|server", key)
+        and not re.match(r"shape-|level-|named-robot|own-name|server", key)
     }
     assert unused <= {"lift", "stairs", "ramp", "any-angle", "octile"}
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _NAMES = (
     *("texts.js", "scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js"),
-    *("names.js", "places.js", "pictures.js", "main.js"),
+    *("names.js", "ends.js", "pictures.js", "main.js"),
 )
 """The modules of the page."""
 ASSETS = (("page.css", "text/css"), *((name, "text/javascript") for name in _NAMES))

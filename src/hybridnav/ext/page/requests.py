@@ -107,13 +107,13 @@ class Stand(_Strict):
 
 
 class Find(_Strict):
-    """A text as it is typed, for places that it may mean."""
+    """A text as it is typed, for rooms and points that it may mean."""
 
     text: Annotated[str, StringConstraints(max_length=200)]
 
 
 class Favour(_Strict):
-    """A place that is a favourite from now on, or no longer."""
+    """A room or point that is a favourite from now on, or no longer."""
 
     floor: FloorNumber
     name: Name

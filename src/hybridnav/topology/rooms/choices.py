@@ -1,4 +1,4 @@
-"""What people choose on a map: a place to stand in a room, and the doors that lead somewhere."""
+"""What people choose on a map: where to stand in a room, and the doors that lead somewhere."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 // The page: connects its controls with the map, the routes and the rooms.
 
 import { Closures } from "./closures.js";
+import { Ends } from "./ends.js";
 import { Floors } from "./floors.js";
 import { download, openLink } from "./link.js";
 import { Names } from "./names.js";
 import { Pictures } from "./pictures.js";
-import { Places } from "./places.js";
 import { Routes, element } from "./route.js";
 import { Scene, steer } from "./scene.js";
 import { LANGUAGES, written, remember, said, settings, t, translate } from "./texts.js";
@@ -41,7 +41,7 @@ const page = {
   },
 };
 page.floors = new Floors(page);
-page.places = new Places(page);
+page.fields = new Ends(page);
 page.closures = new Closures(page);
 page.pictures = new Pictures(page);
 
@@ -352,7 +352,7 @@ async function begin() {
   connectRoutes();
   connectNames();
   connectExport();
-  page.places.connect(reported);
+  page.fields.connect(reported);
   page.closures.show();
   if (!page.map.ready || !whole.ready) await prepared();
   page.scene.version = page.map.rooms.version;
@@ -361,7 +361,7 @@ async function begin() {
   page.floors.note();
   await page.pictures.showLayer();
   page.pictures.useTheme();
-  if (page.link.isLive) await page.places.begin();
+  if (page.link.isLive) await page.fields.begin();
   page.canvas.dataset.ready = "true";
 }
 

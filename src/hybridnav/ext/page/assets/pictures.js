@@ -131,7 +131,7 @@ export class Pictures {
       const [x, y] = scene.toScreen(point);
       return [x - 8, y - 8, x + 8, y + 8];
     });
-    const lit = routes.placeOf(routes.lines[routes.lit]);
+    const lit = routes.spotOf(routes.lines[routes.lit]);
     taken.push(...links.flatMap((mark) => linkBoxes(scene, mark)), ...(lit ? litBoxes(scene, lit) : []));
     const said = new Set(lines.map((line) => line.door));
     const numbered = hasDoors ? names.shown.doors : [];

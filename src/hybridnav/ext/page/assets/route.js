@@ -80,8 +80,8 @@ export class Routes {
   // --- ends
 
   setEnd(which, point, isBrief = false) {
-    const { scene, floors, places } = this.page;
-    this.ends[which] = { floor: floors.at, point: scene.rounded(point), text: places.textOf(floors.at, scene.textOf(point)) };
+    const { scene, floors, fields } = this.page;
+    this.ends[which] = { floor: floors.at, point: scene.rounded(point), text: fields.textOf(floors.at, scene.textOf(point)) };
     this.showEnds();
     scene.draw();
     return this.plan(isBrief);
@@ -89,8 +89,8 @@ export class Routes {
 
   // For people a click means the room, and a free place in it; a robot stands where it is put.
   async putEnd(which, point) {
-    const { floors, places } = this.page;
-    const end = settings.face === "staff" && await places.endOf({ floor: floors.at, point });
+    const { floors, fields } = this.page;
+    const end = settings.face === "staff" && await fields.endOf({ floor: floors.at, point });
     if (!end) return this.setEnd(which, point);
     this.ends[which] = end;
     this.showEnds();
@@ -100,7 +100,7 @@ export class Routes {
 
   showEnds() {
     for (const which of ["start", "goal"]) this.byId(which).value = this.ends[which]?.text ?? "";
-    this.page.places.showStars();
+    this.page.fields.showStars();
   }
 
   clicked(point) {
@@ -109,8 +109,8 @@ export class Routes {
   }
 
   async typed() {
-    const [start, goal] = [await this.page.places.meant("start"), null];
-    const ends = { start, goal: start && await this.page.places.meant("goal") };
+    const [start, goal] = [await this.page.fields.meant("start"), null];
+    const ends = { start, goal: start && await this.page.fields.meant("goal") };
     if (!ends.goal) return;
     this.ends = ends;
     this.showEnds();
@@ -311,7 +311,7 @@ export class Routes {
   }
 
   // What a line is about on the floor that is shown: its door, or the place where one follows it.
-  placeOf(line) {
+  spotOf(line) {
     if (line?.floor !== this.page.floors.at) return null;
     const door = this.page.map.rooms.doors.find((each) => each.number === line.door);
     return { at: door?.at ?? line.at, door: line.door };
@@ -331,8 +331,8 @@ export class Routes {
   lightAt(at) {
     const { scene } = this.page;
     const away = (line) => {
-      const place = this.placeOf(line);
-      return place ? Math.hypot(...scene.toScreen(place.at).map((value, axis) => value - at[axis])) : Infinity;
+      const spot = this.spotOf(line);
+      return spot ? Math.hypot(...scene.toScreen(spot.at).map((value, axis) => value - at[axis])) : Infinity;
     };
     const least = Math.min(...this.lines.map(away));
     const found = least < 14 ? this.lines.findLastIndex((line) => away(line) === least) : -1;
@@ -342,7 +342,7 @@ export class Routes {
 
   async goTo(at) {
     await this.page.showFloor(this.lines[at].floor);
-    this.page.scene.reveal(this.placeOf(this.lines[at]).at);
+    this.page.scene.reveal(this.spotOf(this.lines[at]).at);
     this.light(at);
   }
 

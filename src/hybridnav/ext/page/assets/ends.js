@@ -5,7 +5,7 @@ import { settings, t } from "./texts.js";
 
 const FARTHEST = 1e7; // cells, as far as the server takes points
 
-export class Places {
+export class Ends {
   #found = { start: [], goal: [] };
   #active = 0;
   #asked = 0;
@@ -33,15 +33,15 @@ export class Places {
     await this.#find("");
   }
 
-  // Text of a place in a field, which the command line takes too: "2: kitchen".
+  // Text of an end in a field, which the command line takes too: "2: kitchen".
   textOf(floor, name) {
     return this.page.floors.named(floor, (floorName) => `${floorName}: `) + name;
   }
 
   async #find(text) {
-    const { places } = await this.page.link.post("find", { text: text.slice(0, 200) }, "");
-    for (const place of places) this.#mark(place, place.favourite);
-    return places;
+    const { found } = await this.page.link.post("find", { text: text.slice(0, 200) }, "");
+    for (const each of found) this.#mark(each, each.favourite);
+    return found;
   }
 
   async #suggest(which, text = this.byId(which).value) {
@@ -56,11 +56,11 @@ export class Places {
 
   #list(which) {
     const { floors } = this.page;
-    const items = this.#found[which].map((place, at) => {
-      const where = floors.named(place.floor, (name) => t("on-floor", name));
+    const items = this.#found[which].map((each, at) => {
+      const where = floors.named(each.floor, (name) => t("on-floor", name));
       const item = element("li", { id: `${which}-${at}`, role: "option", ariaSelected: String(at === this.#active) },
-        element("span", {}, place.favourite ? t("favourite", place.name) : place.name), element("small", {}, where));
-      item.addEventListener("click", () => this.choose(which, place));
+        element("span", {}, each.favourite ? t("favourite", each.name) : each.name), element("small", {}, where));
+      item.addEventListener("click", () => this.choose(which, each));
       return item;
     });
     this.byId(`${which}-list`).replaceChildren(...items);
@@ -93,17 +93,17 @@ export class Places {
     return this.#list(which);
   }
 
-  // Take a place that was chosen, go on to the other end, and show the way when both are there.
-  async choose(which, place) {
+  // Take a room that was chosen, go on to the other end, and show the way when both are there.
+  async choose(which, named) {
     this.#close(which);
     const { page } = this;
     page.say("");
     try {
-      page.routes.ends[which] = await this.endOf(place);
+      page.routes.ends[which] = await this.endOf(named);
       page.routes.showEnds();
       if (!page.routes.hasEnds) {
         this.byId(which === "start" ? "goal" : "start").focus();
-        await page.showFloor(place.floor);
+        await page.showFloor(named.floor);
         page.routes.show();
       } else {
         if (matchMedia("(pointer: coarse)").matches) this.byId(which).blur(); // the keys of a phone hide the way
@@ -114,7 +114,7 @@ export class Places {
     }
   }
 
-  // The end at a place, or in the room at a point: where one may stand there, and said if it lies elsewhere.
+  // The end in a room of a name, or in the room at a point: where one may stand there, and said if it lies elsewhere.
   async endOf({ floor, name, point }) {
     const found = await this.page.link.post("stand", name ? { name } : { point }, `floor/${floor}/`);
     if (found.name && found.away_m > this.page.map.resolution_m) this.page.say(t("beside", found.name, found.away_m));

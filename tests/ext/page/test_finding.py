@@ -1,4 +1,4 @@
-"""Places by name: what the server finds, where one stands, and the favourites that it keeps."""
+"""Rooms by name: what the server finds, where one stands, and the favourites that it keeps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FILE = ".hybridnav-favourites.json"
 
 
 def _found(client: Client, text: str) -> list[tuple[int, str]]:
-    places = client.post("find", {"text": text}).value["places"]
+    places = client.post("find", {"text": text}).value["found"]
     return [(place["floor"], place["name"]) for place in places]
 
 
@@ -120,11 +120,11 @@ def test_favourites_come_first_and_outlive_the_page(folder: Path) -> None:
         assert client.post("favour", place | {"kept": True}).code == 200
         assert client.post("favour", {"floor": 0, "name": "g", "kept": True}).code == 422
     with served(building_site_of(file), folder) as client:
-        places = client.post("find", {"text": ""}).value["places"]
+        places = client.post("find", {"text": ""}).value["found"]
         assert (places[0]["name"], places[0]["favourite"]) == ("g", True)
         assert not any(place["favourite"] for place in places[1:])
         assert client.post("favour", place | {"kept": False}).code == 200
-        assert not client.post("find", {"text": "g"}).value["places"][0]["favourite"]
+        assert not client.post("find", {"text": "g"}).value["found"][0]["favourite"]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Places by name on a page: found as people type them, and the favourites that are kept."""
+"""Rooms by name on a page: found as people type them, and the favourites that are kept."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOST_BYTES = 1_000_000
 _MOST_FOUND = 200
 
 
-class Places:
+class Finder:
     """Finds rooms and named points of a site, its favourites first. Threads may share it.
 
     Favourites stand in one file of the folder, so that they outlive the page, whose address is
@@ -45,16 +45,16 @@ class Places:
                 self._kept = {name: _pairs(pairs) for name, pairs in found.items()}
 
     def find(self, site: Site, asked: Find) -> dict[str, Any]:
-        """Return the places that a text may mean, the best first: `FLOOR:NAME`, or a name of any
-        floor, as `hybridnav.maps.names.matching` has it. All of them for an empty text."""
+        """Return the rooms and points that a text may mean, the best first: `FLOOR:NAME`, or a name
+        of any floor, as `hybridnav.maps.names.matching` has it. All of them for an empty text."""
         floor, text = None, asked.text
         before, colon, after = text.partition(":")
         for number, name in enumerate(site.names):
             if colon and folded(before) == folded(name):
                 floor, text = number, after
-        known = [place for place in _all_of(site) if floor in {None, place[0]}]
+        known = [named for named in _all_of(site) if floor in {None, named[0]}]
         kept = self._kept.get(site.name, [])
-        places = [
+        found = [
             {
                 "floor": known[at][0],
                 "name": known[at][1],
@@ -63,25 +63,25 @@ class Places:
             }
             for at in matching(text, [name for _, name in known])
         ]
-        places.sort(key=lambda place: (not place["same"], not place["favourite"]))
-        return {"places": places[:_MOST_FOUND]}
+        found.sort(key=lambda each: (not each["same"], not each["favourite"]))
+        return {"found": found[:_MOST_FOUND]}
 
     def favour(self, site: Site, asked: Favour) -> dict[str, Any]:
-        """Keep a place as a favourite, or no longer.
+        """Keep a room or point as a favourite, or no longer.
 
         Raises
         ------
         InvalidValueError
-            When there is no such place.
+            When there is none of this name.
         OSError
             When the file cannot be written: the favourite then lasts as long as the page.
         """
         if (asked.floor, asked.name) not in set(_all_of(site)):
-            raise InvalidValueError(f"no place is called {asked.name!r:.80}")
-        place = [site.names[asked.floor], asked.name]
+            raise InvalidValueError(f"no room or point is called {asked.name!r:.80}")
+        named = [site.names[asked.floor], asked.name]
         with self._lock:
-            others = [each for each in self._kept.get(site.name, []) if each != place]
-            self._kept[site.name] = [*others, place] if asked.kept else others
+            others = [each for each in self._kept.get(site.name, []) if each != named]
+            self._kept[site.name] = [*others, named] if asked.kept else others
             if self._file.is_symlink():
                 raise InvalidValueError(f"{_FILE} is a link: the page writes through none")
             replace_file(self._file, json.dumps(self._kept, ensure_ascii=False).encode())
