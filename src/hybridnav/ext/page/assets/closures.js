@@ -86,7 +86,7 @@ export class Closures {
       const [name, all] = [key[each.kind], after[each.kind]];
       const old = before[each.kind].find((one) => one[name] === each.what);
       const same = each.kind === "rooms" && all.find((one) => one.name === each.what);
-      const found = same || (old && all.find((one) => Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
+      const found = same || (old && all.find((one) => one.area_m2 === old.area_m2 && Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
       if (!found) lost.push(each.kind === "doors" ? t("door-n", each.what) : each.what);
       return found ? [{ ...each, what: found[name] }] : [];
     };
@@ -106,6 +106,7 @@ export class Closures {
     const corners = this.draft;
     this.draft = [];
     this.byId("area-done").hidden = true;
+    if (this.byId("area-start").ariaPressed === "true") document.querySelector("input[value=close]").checked = true;
     this.byId("area-start").ariaPressed = "false";
     this.page.scene.draw();
     return isKept && corners.length >= 3 ? this.toggle("polygons", corners) : null;

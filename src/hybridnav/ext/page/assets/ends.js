@@ -46,6 +46,7 @@ export class Ends {
 
   async #suggest(which, text = this.byId(which).value) {
     if (!this.page.map.ready) return;
+    this.#active = -1; // Enter takes nothing from a list that is about an older text
     const number = (this.#asked += 1);
     const found = /^[-\d.,;\s]+$/.test(text) && text.includes(",") ? [] : await this.#find(text);
     if (number !== this.#asked || document.activeElement !== this.byId(which)) return;
@@ -99,19 +100,24 @@ export class Ends {
     const { page } = this;
     page.say("");
     try {
-      page.routes.ends[which] = await this.endOf(named);
-      page.routes.showEnds();
-      if (!page.routes.hasEnds) {
-        this.byId(which === "start" ? "goal" : "start").focus();
-        await page.showFloor(named.floor);
-        page.routes.show();
-      } else {
-        if (matchMedia("(pointer: coarse)").matches) this.byId(which).blur(); // the keys of a phone hide the way
-        await page.routes.planAndFrame();
-      }
+      await this.take(which, await this.endOf(named));
     } catch (problem) {
       page.say(problem.message, true);
     }
+  }
+
+  async take(which, end) {
+    const { routes, showFloor } = this.page;
+    routes.ends[which] = end;
+    routes.showEnds();
+    if (routes.hasEnds) {
+      if (matchMedia("(pointer: coarse)").matches) this.byId(which).blur(); // the keys of a phone hide the way
+      await routes.planAndFrame();
+      return;
+    }
+    this.byId(which === "start" ? "goal" : "start").focus();
+    await showFloor(end.floor);
+    routes.show();
   }
 
   // The end in a room of a name, or in the room at a point: where one may stand there, and said if it lies elsewhere.
@@ -132,6 +138,7 @@ export class Ends {
       this.byId(which).focus();
       return null;
     };
+    if (!text) return refused("ends-first");
     const [floor, rest] = page.floors.split(text);
     const numbers = rest.split(/[,;\s]+/).filter(Boolean).map(Number);
     if (numbers.length === 2 && numbers.every(Number.isFinite)) {
@@ -140,7 +147,7 @@ export class Ends {
       if (point.some((value) => Math.abs(value) > FARTHEST)) return refused("far", t(which));
       return { floor, point, text: this.textOf(floor, rest.trim()) };
     }
-    const found = text ? await this.#find(text) : [];
+    const found = await this.#find(text);
     if (!found.length) return refused(settings.face === "robot" ? "not-found-robot" : "not-found", text);
     if (found.length > 1 && (!found[0].same || found[1].same)) {
       const problem = refused("which", text);

@@ -134,6 +134,10 @@ function connectRoutes() {
   on("close-undo", "click", () => closures.undo());
   on("close-clear", "click", () => closures.openAll());
   on("area-start", "click", () => {
+    if (byId("area-start").ariaPressed === "true") {
+      closures.endArea(false);
+      return;
+    }
     byId("area-start").ariaPressed = "true";
     document.querySelector("input[value=area]").checked = true;
     page.say(t("click-corners"));
@@ -184,8 +188,9 @@ function connectView() {
   on("language", "change", () => useSettings({ language: byId("language").value }));
   document.querySelectorAll("input[name=mode]").forEach((input) => input.addEventListener("change", () => {
     page.say("");
-    useMode();
+    byId("area-start").ariaPressed = "false"; // this choice counts
     page.closures.endArea(false);
+    useMode();
     if (page.names.tool) page.names.use("");
     scene.draw();
   }));

@@ -109,10 +109,15 @@ export class Routes {
   }
 
   async typed() {
-    const [start, goal] = [await this.page.fields.meant("start"), null];
-    const ends = { start, goal: start && await this.page.fields.meant("goal") };
-    if (!ends.goal) return;
-    this.ends = ends;
+    const { fields } = this.page;
+    const start = await fields.meant("start");
+    if (start && !this.byId("goal").value.trim()) {
+      await fields.take("start", start);
+      return;
+    }
+    const goal = start && await fields.meant("goal");
+    if (!goal) return;
+    this.ends = { start, goal };
     this.showEnds();
     await this.planAndFrame();
   }
