@@ -253,6 +253,7 @@ def test_lists_have_ward_2_before_ward_10(browser: Any, wards: Path) -> None:
         shown.wait_text("#status", "Ward 10 is a favourite")
         shown.page.click("#clear")
         shown.page.click("#goal")
+        shown.page.wait_for_selector("#goal-list li")
         shown.wait_text("#goal-list li", "★ ward 10")
         shown.page.keyboard.press("ArrowDown")
         shown.page.keyboard.press("Enter")

@@ -36,6 +36,12 @@ const timeOf = (seconds) => (seconds < 1 ? `${written(1000 * seconds, 1)} ms` : 
 const metres = (value) => (value === null ? t("none") : t("metres", written(value, 2)));
 const someMetres = (value) => t(value < 100 ? "metres" : "some-m", written(value < 100 ? Math.ceil(value) : 10 * Math.round(value / 10)));
 
+// How long a route is, for people: its length, and over floors its time.
+function shortly(route) {
+  const minutes = route.rides ? [t("minutes", Math.max(1, Math.round(route.travel_s / 60)))] : [];
+  return [someMetres(route.length_m), ...minutes].join(" · ");
+}
+
 export class Routes {
   ends = { start: null, goal: null }; // each { floor, point }
   routes = []; // the plan, or the plan and its alternatives
@@ -205,6 +211,7 @@ export class Routes {
     this.page.say(t("searching"));
     const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value) }));
     if (!found) return;
+    this.page.say("");
     if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null, lit: -1 });
     this.show();
     const note = said(found.note);
@@ -270,8 +277,7 @@ export class Routes {
   }
 
   #rowsForStaff(route) {
-    const rows = [["length", someMetres(route.length_m)]];
-    if (route.rides) rows.push(["time", t("minutes", Math.max(1, Math.round(route.travel_s / 60)))]);
+    const rows = [["length", shortly(route)]];
     const more = this.open?.solved ? amountOf(route) - amountOf(this.open) : 0;
     if (more > 0.5) rows.push(["detour", t("detour-staff", someMetres(more))]);
     return rows;
@@ -356,10 +362,9 @@ export class Routes {
     const cards = this.routes.length < 2 ? [] : this.routes.map((route, at) => {
       const colour = ROUTE_COLOURS[this.page.scene.theme][at % 5];
       const isOther = at && !route.start && route.solved && shortest.solved; // between the same ends
-      const amount = settings.face === "staff" ? someMetres : metres;
-      const more = isOther ? amount(amountOf(route) - amountOf(shortest)) : "";
-      const long = route.solved && amount(settings.face === "staff" ? route.length_m : amountOf(route));
-      const text = !route.solved ? t("no-route", said(route.status)) : more ? t("more", long, more) : long;
+      const more = isOther ? metres(amountOf(route) - amountOf(shortest)) : "";
+      const long = !route.solved ? "" : settings.face === "staff" ? shortly(route) : metres(amountOf(route));
+      const text = !route.solved ? t("no-route", said(route.status)) : more && settings.face === "robot" ? t("more", long, more) : long;
       const line = picture(`<path d="M2 4h22" stroke="${colour}" stroke-width="4" stroke-linecap="round"/>`);
       return element("button", { className: "route-card", ariaPressed: String(at === this.chosen), onclick: () => this.choose(at) },
         line, element("span", {}, text), element("small", {}, passagesOf(route)));
