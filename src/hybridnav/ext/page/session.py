@@ -232,14 +232,16 @@ class Session:
         InvalidValueError
             When no room or point has the name, or the robot does not fit in.
         """
-        rooms = self.planning.topology.rooms
-        name = asked.name
+        rooms, name, point = self.planning.topology.rooms, asked.name, asked.point
+        if (name is None) == (point is None):
+            raise InvalidValueError("a name or a point, one of them: neither or both were given")
         if name is not None:
             check_names(self.planning.topology, [name])
             wanted = rooms.point_of(name)
             room = name if name in rooms.names else rooms.at(wanted)
         else:
-            wanted = in_metres(asked.point or (0, 0), self.grid)
+            assert point is not None  # noqa: S101 - see above
+            wanted = in_metres(point, self.grid)
             room = name = room_near(rooms, wanted)
         at = wanted if room is None else free_point(rooms, room, wanted)
         return {
