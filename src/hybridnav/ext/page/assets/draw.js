@@ -130,11 +130,18 @@ export function linkBoxes(scene, { at, texts }) {
   return [[x - 11, y - 11, x + 11, y + 11], ...halves.map((half, line) => [middle - half, y + 12 + 15 * line, middle + half, y + 26 + 15 * line])];
 }
 
-// A text in one line or, broken at a space, in two, with half its width.
-function layouts(context, text) {
-  const breaks = [...text.matchAll(/[ -]/g)].map(({ index }) => [text.slice(0, index + 1).trim(), text.slice(index + 1)]);
-  return [[text], ...breaks].map((lines) => ({ lines, half: Math.max(...lines.map((line) => context.measureText(line).width)) / 2 + 2 }))
-    .sort((one, other) => one.lines.length - other.lines.length || one.half - other.half).slice(0, 2);
+const laidOut = new Map(); // by font and text: fonts and measures take longer than all the rest
+
+// A text in one line or, broken at a space or a hyphen, in two, with half its width.
+function layouts(context, font, text) {
+  const key = font + text;
+  if (!laidOut.has(key)) {
+    context.font = font;
+    const breaks = [...text.matchAll(/[ -]/g)].map(({ index }) => [text.slice(0, index + 1).trim(), text.slice(index + 1)]);
+    laidOut.set(key, [[text], ...breaks].map((lines) => ({ lines, half: Math.max(...lines.map((line) => context.measureText(line).width)) / 2 + 2 }))
+      .sort((one, other) => one.lines.length - other.lines.length || one.half - other.half).slice(0, 2));
+  }
+  return laidOut.get(key);
 }
 
 // Write names where they do not hide one another, those of large rooms first: inside of their
@@ -156,16 +163,17 @@ export function paintNames(scene, rooms, taken, chosen) {
     const isFree = (box) => isInside(box) && !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
     const weight = room.name === chosen ? 700 : 500;
     place: for (const size of [13, 11]) {
-      context.font = `${weight} ${size}px ${FONT}`;
-      for (const { lines, half } of layouts(context, room.name)) {
+      const font = `${weight} ${size}px ${FONT}`;
+      for (const { lines, half } of layouts(context, font, room.name)) {
         const high = (lines.length * (size + 2)) / 2;
+        if (2 * half > right - left + 2 * SLACK) continue;
         const middle = Math.max(left + half, Math.min(right - half, x)); // in its room
         for (const down of LABEL_SHIFTS) {
           const box = [middle - half, y + down - high, middle + half, y + down + high];
           if (!isFree(box)) continue;
           taken.push(box);
           placed.push([room.name, ...box]);
-          Object.assign(context, { strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
+          Object.assign(context, { font, strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
           lines.forEach((line, at) => {
             const level = y + down - high + (at + 0.5) * (size + 2);
             context.strokeText(line, middle, level);
@@ -187,7 +195,7 @@ export function paintNumbers(scene, doors, taken) {
   for (const door of doors) {
     const [x, y] = scene.toScreen(door.at);
     if (x < 0 || y < 0 || x > scene.width || y > scene.height) continue;
-    const half = context.measureText(door.number).width / 2 + 1;
+    const half = 3.5 * String(door.number).length + 1;
     const spots = [[half + 9, -8], [-half - 9, -8], [half + 9, 8], [-half - 9, 8]].map(([right, down]) => [x + right, y + down]);
     const boxOf = ([left, middle]) => [left - half, middle - 6, left + half, middle + 6];
     const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);

@@ -28,9 +28,13 @@ export class Names {
   get shown() {
     const { rooms, doors } = this.rooms;
     const isShown = ({ listed, name }) => listed || name === this.chosen || this.byId("show-all").checked;
-    const said = new Set(this.page.routes.lines.filter((line) => line.floor === this.page.floors.at).map((line) => line.door));
-    const isDoor = settings.face === "staff" ? (door) => door.leads || said.has(door.number) : isShown;
+    const isDoor = settings.face === "staff" ? (door) => door.leads || this.isTold(door) : isShown;
     return { rooms: rooms.filter(isShown), doors: doors.filter(isDoor) };
+  }
+
+  // Whether the words of the way are about a door of the floor that is shown.
+  isTold(door) {
+    return this.page.routes.lines.some((line) => line.floor === this.page.floors.at && line.door === door.number);
   }
 
   get ownRings() {

@@ -115,29 +115,28 @@ export class Pictures {
     const isNaming = this.page.mode === "names";
     const isRobot = settings.face === "robot";
     const hasDoors = this.byId("show-doors").checked || !isRobot;
-    const lines = routes.lines.filter((line) => line.floor === floors.at);
+    const shown = names.shown;
+    const listed = hasDoors ? shown.doors : [];
     if (isRobot && this.byId("show-graph").checked) paintGraph(scene, this.#graph);
     if (isNaming && names.chosen) paintOutline(scene, names.ownRings, names.tool === "corners");
     paintDashed(scene, routes.open, floors.at);
     paintRoutes(scene, routes.routes, routes.chosen, floors.at);
-    if (hasDoors) paintDoors(scene, names.shown.doors);
+    paintDoors(scene, listed);
     paintLinks(scene, links);
     const ends = floors.ends.filter(({ link }) => closures.links.includes(link.name)).map((end) => end.at);
     const crosses = [...closures.marks, ...ends];
     paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
-    const doors = hasDoors ? names.shown.doors.map((door) => door.at) : [];
     const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
-    const taken = [...doors, ...crosses, start, goal].filter(Boolean).map((point) => {
+    const taken = [...listed.map((door) => door.at), ...crosses, start, goal].filter(Boolean).map((point) => {
       const [x, y] = scene.toScreen(point);
       return [x - 8, y - 8, x + 8, y + 8];
     });
     const lit = routes.spotOf(routes.lines[routes.lit]);
     taken.push(...links.flatMap((mark) => linkBoxes(scene, mark)), ...(lit ? litBoxes(scene, lit) : []));
-    const said = new Set(lines.map((line) => line.door));
-    const numbered = hasDoors ? names.shown.doors : [];
-    paintNumbers(scene, numbered.filter((door) => said.has(door.number)), taken);
-    if (!isRobot || this.byId("show-names").checked) paintNames(scene, names.shown.rooms, taken, isNaming ? names.chosen : "");
-    if (scene.scale / scene.map.resolution_m >= NUMBERS_FROM) paintNumbers(scene, numbered.filter((door) => !said.has(door.number)), taken);
+    const isTold = (door) => names.isTold(door);
+    paintNumbers(scene, listed.filter(isTold), taken);
+    if (!isRobot || this.byId("show-names").checked) paintNames(scene, shown.rooms, taken, isNaming ? names.chosen : "");
+    if (scene.scale / scene.map.resolution_m >= NUMBERS_FROM) paintNumbers(scene, listed.filter((door) => !isTold(door)), taken);
     paintEnd(scene, start, "A");
     paintEnd(scene, goal, "B");
     if (lit) paintLit(scene, lit);
