@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 from PIL import Image
@@ -119,6 +122,44 @@ def draw_lanes(file: Path) -> None:
     save_figure(plot_route_graph(graph).figure, file, dpi=150)
 
 
+def draw_page(file: Path) -> None:
+    """Draw the page of the building on a laptop and on a phone; needs Chromium and its driver."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - for this picture alone
+
+    command = [sys.executable, "-m", "hybridnav", "view", str(BUILDING), "--no-browser"]
+    server = subprocess.Popen(  # noqa: S603 - our own command
+        [*command, "--robot-radius", "0.25"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert server.stdout is not None  # noqa: S101 - it is a pipe
+        address = server.stdout.readline().split()[1]
+        with sync_playwright() as driver:
+            chromium = shutil.which("chromium")
+            browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+            shots = [_page_shot(browser, address, size) for size in ((1180, 800), (390, 800))]
+    finally:
+        server.terminate()
+    whole = Image.new("RGB", (sum(shot.width for shot in shots) + 20, shots[0].height), "white")
+    whole.paste(shots[0], (0, 0))
+    whole.paste(shots[1], (shots[0].width + 20, 0))
+    whole.save(file)
+
+
+def _page_shot(browser: Any, address: str, size: tuple[int, int]) -> Image.Image:
+    """Return the page with the way from office 5 to 2.04."""
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]}, locale="en")
+    page.goto(address)
+    page.wait_for_selector("canvas[data-ready=true]")
+    for which, name in (("start", "1: office 5"), ("goal", "2: 2.04")):
+        page.fill(f"#{which}", name)
+    page.keyboard.press("Escape")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#words li")
+    page.locator("#words button").nth(1).focus()
+    page.wait_for_timeout(1000)
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -136,6 +177,7 @@ if __name__ == "__main__":
         (draw_robot, "office-robot.png"),
         (draw_building, "building.png"),
         (draw_lanes, "office-lanes.png"),
+        (draw_page, "view.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)

@@ -85,8 +85,14 @@ OTHERS = [
     "TopologicalMap.transform",
     "ext.graphs.WaypointGraph.from_networkx",
     "ext.live.RoomsUpdate.closed_doors",
+    "maps.names.folded",
+    "maps.names.matching",
+    "maps.names.natural_key",
     "refine.curves.shortest_curve",
     "refine.footprint.Footprint",
+    "topology.rooms.choices.free_point",
+    "topology.rooms.choices.leading_doors",
+    "topology.rooms.choices.room_near",
 ]
 """Names with examples that are not in the reference."""
 

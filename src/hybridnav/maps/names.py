@@ -48,7 +48,7 @@ def check_names(names: tuple[str, ...]) -> None:
 
 
 _LETTERS = str.maketrans(
-    {"ø": "o", "ł": "l", "đ": "d", "ð": "d", "ħ": "h", "ı": "i", "æ": "ae", "œ": "oe"}
+    {"ø": "o", "ł": "l", "đ": "d", "ð": "d", "ħ": "h", "\u0131": "i", "æ": "ae", "œ": "oe"}
 )
 """Letters that Unicode does not take apart."""
 
@@ -87,7 +87,7 @@ def natural_key(name: str) -> tuple[tuple[bool, int, str], ...]:
 
 
 def matching(text: str, names: Sequence[str]) -> list[int]:
-    """Return the places of the names that a text may mean, as people type it.
+    """Return which names a text may mean, as people type it.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def matching(text: str, names: Sequence[str]) -> list[int]:
     Returns
     -------
     list of int
-        Places in `names`: first those that equal the text, then those that begin with it, that have
-        a word that begins with it, and that hold each of its words; each in natural order.
+        Indices in `names`: first those that equal the text, then those that begin with it, that
+        have a word that begins with it, and that hold each of its words; each in natural order.
 
     Examples
     --------

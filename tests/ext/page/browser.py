@@ -43,14 +43,14 @@ def browsing() -> Iterator[Any]:
 class Shown:
     """A page, and what is on it."""
 
-    def __init__(self, context: Any, address: str) -> None:
+    def __init__(self, context: Any, address: str, face: str = "robot") -> None:
         self.errors: list[str] = []
         self.requests: list[str] = []
         self.page = context.new_page()
         self.page.set_default_timeout(1000 * _PATIENCE_S)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(address)
+        self.page.goto(f"{address}#face={face}" if "#" not in address else address)
         self.page.wait_for_selector("canvas[data-ready=true]")
         self.wait("document.getElementById('map').dataset.waiting === '0'")
 

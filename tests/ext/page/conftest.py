@@ -9,8 +9,16 @@ import pytest
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
+import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown, browsing
-from tests.ext.page.server import building_site_of, folder_in, served, site_of, write_building
+from tests.ext.page.server import (
+    FRAME,
+    building_site_of,
+    folder_in,
+    served,
+    site_of,
+    write_building,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,6 +38,20 @@ def browser() -> Iterator[Any]:
 def folder(tmp_path: Path) -> Path:
     """The folder of a map, with another one beside it that nothing may touch."""
     return folder_in(tmp_path)
+
+
+@pytest.fixture
+def wards(folder: Path) -> Path:
+    """The map, its rooms named as in a hospital, with a chair in the middle of the kitchen."""
+    probability = hn.load_map(folder / "four.yaml").probability.copy()
+    probability[34:38, 15:19] = 1.0
+    grid = hn.OccupancyGrid(probability, frame=FRAME, robot_radius_m=0.2)
+    hn.write_ros_map(grid, folder / "four.yaml")
+    rooms = hn.load_rooms(folder / "rooms.yaml", grid)
+    names = ("Küche", "ward 10", "Ward 2", "ward 1")
+    chair = {"chair": tuple(FRAME.points_of_grid([36.0, 19.5]).tolist())}
+    hn.save_rooms(folder / "rooms.yaml", hn.RoomLabels(names, rooms.label_of, chair), grid)
+    return folder
 
 
 @pytest.fixture

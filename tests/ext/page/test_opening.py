@@ -171,6 +171,7 @@ def test_the_page_shows_cells_and_how_far_it_is(tmp_path: Path) -> None:
         page.wait_for_selector("canvas[data-ready=true]")
         page.wait_for_selector("#progress", state="hidden")
         assert page.locator("#colours").input_value() == "rooms"
+        page.check("input[value=names]")
         page.select_option("#room", "a")
         assert errors == []
 

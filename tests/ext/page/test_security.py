@@ -228,7 +228,10 @@ def test_wrong_types_and_huge_numbers_are_refused(client: Client, change: dict[s
 
 
 @pytest.mark.parametrize("value", [None, [], 1, "plan", {}, {"version": 0}, {"version": -1}])
-@pytest.mark.parametrize("name", ["plan", "alternatives", "floor/0/edit", "floor/0/at"])
+@pytest.mark.parametrize(
+    "name",
+    ["plan", "alternatives", "find", "favour", "floor/0/edit", "floor/0/at", "floor/0/stand"],
+)
 def test_what_is_no_request_is_refused(client: Client, name: str, value: Any) -> None:
     assert client.post(name, value).code == 422
 

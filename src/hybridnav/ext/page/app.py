@@ -19,15 +19,19 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from hybridnav._base.extension import extension
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import GRID
+from hybridnav.ext.page.finding import Finder
 from hybridnav.ext.page.opening import PreparingError
 from hybridnav.ext.page.page import ASSETS, POLICY, asset, exported, exported_floor, live_page
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
     Edit,
+    Favour,
+    Find,
     PartQuery,
     PlanQuery,
     Save,
+    Stand,
     Undo,
     checked,
 )
@@ -141,7 +145,7 @@ class _Answers:
     """What each request does."""
 
     def __init__(self, shown: Site | Opening, folder: Path) -> None:
-        self._shown, self._folder = shown, folder
+        self._shown, self._folder, self._finder = shown, folder, Finder(folder)
 
     def routes(self, at: str, *, allow_edits: bool) -> list[Route]:
         """Return the routes below a path: those of the whole site, and those of its floors."""
@@ -174,6 +178,9 @@ class _Answers:
                 AlternativesQuery,
                 lambda _, query: self._shown.site.routes(query).alternatives(query),
             ),
+            f"{at}/find": (Find, lambda _, asked: self._finder.find(self._shown.site, asked)),
+            f"{at}/favour": (Favour, lambda _, asked: self._finder.favour(self._shown.site, asked)),
+            f"{floor}/stand": (Stand, lambda request, asked: self._session(request).stand(asked)),
             f"{floor}/at": (
                 At,
                 lambda request, asked: {"room": self._session(request).room_at(asked.point)},

@@ -11,7 +11,11 @@ import shapely
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
+from hybridnav.maps.names import natural_key
+from hybridnav.planner import Blocked, load_preset, plan_alternatives, preset_names
+from hybridnav.planner.guide import sentences
+from hybridnav.planner.tour import tour_of
+from hybridnav.topology.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
@@ -28,9 +32,10 @@ if TYPE_CHECKING:
         PathQuery,
         PlanQuery,
     )
-    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
+    from hybridnav.planner.guide import Instruction
     from hybridnav.planner.saved import Model
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -38,6 +43,12 @@ if TYPE_CHECKING:
 
 MOST_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not sent: it would be one grey area."""
+_MOST_BLOCKS = 40
+"""Blocks of cells along a room in which a place for its name is searched."""
+_WHOLE = 0.75
+"""Share of free cells from which a block belongs to that place."""
+_FLAT = 3
+"""Width of a line of text by its height, about."""
 _DECIMALS = 3
 _METRE_DECIMALS = 6
 """Decimals of points in metres: the page converts them there and back."""
@@ -127,53 +138,83 @@ def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
 
 
 def room_facts(rooms: Rooms) -> dict[str, Any]:
-    """Return names, areas and positions of rooms, and their doors without gaps; `listed` tells
-    which of them the page shows unless it is asked for all."""
+    """Return names, areas, positions and boxes of rooms, in the order of their names, and their
+    doors without gaps.
+
+    `listed` tells which of them the page shows unless it is asked for all, `leads` which doors it
+    shows to people."""
     grid = rooms.grid
     shown = {door.number for door in rooms.listed_doors}
+    leading = {door.number for door in leading_doors(rooms)}
+    found = [
+        {
+            "name": name,
+            "area_m2": round(area, 2),
+            "fits": fits,
+            "listed": is_listed,
+            "at": [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2],
+            "box": box,
+        }
+        for name, area, fits, is_listed, box in zip(
+            rooms.names,
+            rooms.areas_m2.tolist(),
+            rooms.fits.tolist(),
+            rooms.is_listed.tolist(),
+            _spots(rooms),
+            strict=True,
+        )
+    ]
     return {
-        "rooms": [
-            {
-                "name": name,
-                "area_m2": round(area, 2),
-                "fits": fits,
-                "listed": is_listed,
-                "at": in_grid(_middle(rooms, name, centre), grid),
-            }
-            for name, area, fits, is_listed, centre in zip(
-                rooms.names,
-                rooms.areas_m2.tolist(),
-                rooms.fits.tolist(),
-                rooms.is_listed.tolist(),
-                _centres_m(rooms.labels, grid),
-                strict=True,
-            )
-        ],
+        "rooms": sorted(found, key=lambda room: natural_key(room["name"])),
         "doors": [
-            _door(door, grid) | {"listed": door.number in shown}
+            _door(door, grid) | {"listed": door.number in shown, "leads": door.number in leading}
             for door in rooms.doors
             if not door.is_gap
         ],
     }
 
 
-def _centres_m(labels: RoomLabels, grid: OccupancyGrid) -> list[tuple[float, float]]:
-    """Return the centre of the free cells of each room, `(x, y)` in metres.
+def _spots(rooms: Rooms) -> list[list[int]]:
+    """Return where the name of each room is written, its first and last column and row: the
+    rectangle of its free cells that has most room for a line of text."""
+    free: BoolArray = rooms.grid.measured == CellClass.FREE
+    inside = np.where(free, rooms.labels.label_of, -1)
+    # Loads scipy's filters, which the rest of the page does not need.
+    from scipy.ndimage import find_objects  # noqa: PLC0415
 
-    Sums of rows and columns: a tenth of the time that sorting the cells takes on 16 M of them.
-    """
-    rows, cols = np.nonzero((grid.measured == CellClass.FREE) & (labels.label_of >= 0))
-    of, n_rooms = labels.label_of[rows, cols], len(labels.names)
-    counts = np.maximum(np.bincount(of, minlength=n_rooms), 1)
-    sums = [np.bincount(of, weights=at, minlength=n_rooms) for at in (rows, cols)]
-    middles = np.stack(sums, axis=1) / counts[:, None] + 0.5
-    points: list[list[float]] = grid.frame.points_of_grid(middles).tolist()
-    return [(x, y) for x, y in points]
+    found = []
+    for label, box in enumerate(find_objects(inside + 1, max_label=len(rooms.names))):
+        if box is None:  # no free cell: nothing is written on the map
+            found.append([0, 0, 0, 0])
+            continue
+        row, col = (part.start for part in box)
+        top, bottom, left, right = _widest(inside[box] == label)
+        found.append([col + left, col + right, row + top, row + bottom])
+    return found
 
 
-def _middle(rooms: Rooms, name: str, centre_m: tuple[float, float]) -> tuple[float, float]:
-    """Return where a room's name stands: its centre, unless that lies in another room."""
-    return centre_m if rooms.at(centre_m) == name else rooms.point_of(name)
+def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
+    """Return the first and last row and column of the widest rectangle of true cells, which is at
+    least a third as high, in blocks of cells: specks of noise do not count."""
+    step = -(-max(inside.shape) // _MOST_BLOCKS)
+    rows, cols = (-(-n // step) for n in inside.shape)
+    padded = np.zeros((rows * step, cols * step), dtype=np.bool_)
+    padded[: inside.shape[0], : inside.shape[1]] = inside
+    shares = padded.reshape(rows, step, cols, step).mean(axis=(1, 3))
+    whole = shares >= min(_WHOLE, float(shares.max()))
+    here, number = whole, np.arange(cols)
+    best, found = (0, 0), (0, 1, 0, 1)
+    for high in range(1, rows + 1):
+        if high > 1:
+            here = here[:-1] & whole[high - 1 :]
+        gap = np.maximum.accumulate(np.where(here, -1, number), axis=1)
+        row, last = np.unravel_index(int(np.argmax(number - gap)), here.shape)
+        wide = int(number[last] - gap[row, last])
+        score = (min(wide, _FLAT * high), wide * high)
+        if wide and score > best:
+            best, found = score, (int(row), int(row) + high, int(last) - wide + 1, int(last) + 1)
+    top, bottom, left, right = (step * n for n in found)
+    return top, min(bottom, inside.shape[0]), left, min(right, inside.shape[1])
 
 
 def _door(door: Door, grid: OccupancyGrid) -> dict[str, Any]:
@@ -260,8 +301,9 @@ class PagePlanning:
         closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
-        tour = plan_tour(planner, points, blocked=closed)
-        return self._facts(tour.results[0]) | self._itinerary(tour)
+        result = planner.plan(*points, blocked=closed)
+        tour = tour_of(planner, [result], named_ends(query, points))
+        return self._facts(result) | self._itinerary(tour, query.language)
 
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
@@ -284,7 +326,9 @@ class PagePlanning:
         found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
-            | self._itinerary(each.tour)
+            | self._itinerary(
+                tour_of(planner, [each.result], named_ends(query, (start, goal))), query.language
+            )
             | {"overlap": round(each.overlap, 3)}
             for each in found
         ]
@@ -330,20 +374,61 @@ class PagePlanning:
         length_m = None if path is None else path.length_m
         return facts_of(result, parts) | {"length_m": finite(length_m)}
 
-    def _itinerary(self, tour: Tour) -> dict[str, Any]:
+    def _itinerary(self, tour: Tour, language: str) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
         route = tour.results[0].route
         return {
             "legs": [
                 {
-                    "room": leg.room or f"the {leg.shape}",
+                    "room": leg.room,
+                    "shape": leg.shape,
                     "door": leg.door.number if leg.door else None,
                 }
                 for leg in tour.legs
             ],
-            "words": tour.words(),
+            "words": lines_of(tour.instructions, language, [(0, self.grid)]),
             "places": list(route.places) if route is not None else [],
         }
+
+
+def named_ends(query: PathQuery, points: Sequence[Any]) -> list[Any]:
+    """Return what words call the ends of a query: their names, or their points."""
+    ends = (query.start, query.goal)
+    return [end.name or point for end, point in zip(ends, points, strict=True)]
+
+
+def lines_of(
+    instructions: Sequence[Instruction], language: str, floors: Sequence[tuple[int, OccupancyGrid]]
+) -> list[dict[str, Any]]:
+    """Return the lines of instructions, each with the place and the door that it is about.
+
+    Parameters
+    ----------
+    instructions
+        What a person does on a route.
+    language
+        Code of the language.
+    floors
+        Number and map of each floor that is visited, in order.
+
+    Raises
+    ------
+    InvalidValueError
+        When there are no sentences in this language.
+    """
+    lines: list[dict[str, Any]] = []
+    visited = 0
+    for n_told, each in enumerate(instructions, 1):
+        # Two instructions may make one line: it is about the first of them.
+        while len(sentences(instructions[:n_told], language)) > len(lines):
+            floor, grid = floors[min(visited, len(floors) - 1)]
+            crossed = each.doorway or each.landmark
+            door = None if crossed is None else crossed.door
+            at = in_grid(each.position, grid)
+            lines.append({"floor": floor, "at": at, "door": door})
+        visited += each.kind == "ride"
+    texts = sentences(instructions, language)
+    return [line | {"text": text} for line, text in zip(lines, texts, strict=False)]
 
 
 def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:

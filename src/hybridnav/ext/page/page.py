@@ -15,6 +15,7 @@ from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.graphs.files import export_nav2
 from hybridnav.ext.page.tiles import TILE
 from hybridnav.planner import export_path, export_rooms
+from hybridnav.planner.guide import languages
 from hybridnav.planner.saved import save
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 
 _NAMES = (
-    *("scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js", "names.js"),
-    *("pictures.js", "main.js"),
+    *("texts.js", "scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js"),
+    *("names.js", "ends.js", "pictures.js", "main.js"),
 )
 """The modules of the page."""
 ASSETS = (("page.css", "text/css"), *((name, "text/javascript") for name in _NAMES))
@@ -53,7 +54,13 @@ def asset(name: str) -> str:
 def live_page() -> str:
     """Return the page that a server stands behind."""
     head = '<link rel="stylesheet" href="page.css">\n<script type="module" src="main.js"></script>'
-    return asset("page.html").replace("<!-- head -->", head)
+    return asset("page.html").replace("<!-- head -->", head).replace("<!-- end -->", _texts())
+
+
+def _texts() -> str:
+    """Return the texts of the page in all languages, as its modules read them."""
+    tables = ", ".join(f'"{code}": {asset(f"{code}.json")}' for code in languages())
+    return f'<script type="application/json" id="texts">{{{tables}}}</script>\n'
 
 
 def whole_page(data: object) -> str:
@@ -71,7 +78,7 @@ def whole_page(data: object) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{_SAVED_POLICY}">\n'
         f"<style>\n{asset('page.css')}</style>\n"
     )
-    end = (
+    end = _texts() + (
         f'<script type="application/json" id="saved">{text}</script>\n'
         f'<script type="module">\n{modules}</script>\n'
     )

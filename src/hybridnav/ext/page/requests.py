@@ -34,10 +34,11 @@ class _Strict(BaseModel):
 
 
 class FloorPoint(_Strict):
-    """A point in grid units of a floor, by the number of the floor."""
+    """A point in grid units of a floor, by the number of the floor; words call it by its name."""
 
     floor: FloorNumber
     point: Point
+    name: Name | None = None
 
 
 class FloorClosed(_Strict):
@@ -70,6 +71,8 @@ class PathQuery(_Strict):
     preset: _PresetName
     closed: Closed = Closed()
     stairs: bool = True
+    language: Annotated[str, StringConstraints(max_length=10)] = "en"
+    """The language of the words."""
 
 
 class PlanQuery(PathQuery):
@@ -94,6 +97,27 @@ class At(_Strict):
     """A point whose room is asked for."""
 
     point: Point
+
+
+class Stand(_Strict):
+    """A room or named point by its name, or the room at a point: where a robot may stand there."""
+
+    name: Name | None = None
+    point: Point | None = None
+
+
+class Find(_Strict):
+    """A text as it is typed, for rooms and points that it may mean."""
+
+    text: Annotated[str, StringConstraints(max_length=200)]
+
+
+class Favour(_Strict):
+    """A room or point that is a favourite from now on, or no longer."""
+
+    floor: FloorNumber
+    name: Name
+    kept: bool
 
 
 class Edit(_Strict):

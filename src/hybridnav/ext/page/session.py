@@ -4,23 +4,34 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError, RoomsError
-from hybridnav.ext.page.drawing import PagePlanning, in_metres, level_graph, map_facts, room_facts
+from hybridnav.ext.page.drawing import (
+    PagePlanning,
+    in_grid,
+    in_metres,
+    level_graph,
+    map_facts,
+    room_facts,
+)
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps import RoomLabels
+from hybridnav.maps.names import natural_key
+from hybridnav.planner.named import check_names
+from hybridnav.topology.rooms.choices import free_point, room_near
 from hybridnav.topology.rooms.files import save_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from hybridnav.ext.page.requests import Change, Edit, Save
+    from hybridnav.ext.page.requests import Change, Edit, Save, Stand
     from hybridnav.ext.page.tiles import Layer
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
@@ -154,9 +165,12 @@ class Session:
             }
 
     def outlines(self) -> dict[str, Any]:
-        """Return the corners of all rooms."""
+        """Return the corners of all rooms, in the order of their names."""
         with self._lock:
-            return {"version": self.version, "rings": rings_of(self.rooms, self.grid)}
+            rings = rings_of(self.rooms, self.grid)
+            names = self.rooms.names
+            ordered = sorted(range(len(names)), key=lambda at: natural_key(names[at]))
+            return {"version": self.version, "rings": [rings[at] for at in ordered]}
 
     def layer(self, name: str) -> Layer:
         """Return a layer: `map`, `rooms`, `level-3`, or `costs-` and a preset.
@@ -209,6 +223,32 @@ class Session:
     def room_at(self, point: Sequence[float]) -> str | None:
         """Return the room of a point in grid units, None for no room."""
         return self.rooms.at(in_metres(point, self.grid), self.grid)
+
+    def stand(self, asked: Stand) -> dict[str, Any]:
+        """Return where a robot may stand in a room, nearest to a point, and how far that is away.
+
+        Raises
+        ------
+        InvalidValueError
+            When no room or point has the name, or the robot does not fit in.
+        """
+        rooms, name, point = self.planning.topology.rooms, asked.name, asked.point
+        if (name is None) == (point is None):
+            raise InvalidValueError("a name or a point, one of them: neither or both were given")
+        if name is not None:
+            check_names(self.planning.topology, [name])
+            wanted = rooms.point_of(name)
+            room = name if name in rooms.names else rooms.at(wanted)
+        else:
+            assert point is not None  # noqa: S101 - see above
+            wanted = in_metres(point, self.grid)
+            room = name = room_near(rooms, wanted)
+        at = wanted if room is None else free_point(rooms, room, wanted)
+        return {
+            "name": name,
+            "point": in_grid(at, self.grid),
+            "away_m": round(math.dist(at, wanted), 2),
+        }
 
     def edit(self, edit: Edit) -> dict[str, Any]:
         """Change the rooms, and keep the change in the journal.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
-from hybridnav.ext.page.drawing import facts_of, finite, in_grid, in_metres
+from hybridnav.ext.fleet.plan import GuidedRoute
+from hybridnav.ext.page.drawing import facts_of, finite, in_grid, in_metres, lines_of
 from hybridnav.ext.page.session import Session
 from hybridnav.planner import Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
@@ -309,14 +311,14 @@ class _OverFloors:
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan over floors with its certificate; unless it is brief, with words."""
         plan = self._outcome(query)
-        return self._facts(plan) | ({} if query.brief else {"words": plan.words()})
+        return self._facts(plan) | ({} if query.brief else self._words(plan, query))
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by different links."""
         start, goal = self._ends(query)
         building, how = self._with(query.preset), self._how(query)
         found = building.alternatives(start, goal, query.count, **how)
-        routes = [self._facts(plan) | {"words": plan.words()} for plan in found]
+        routes = [self._facts(plan) | self._words(plan, query) for plan in found]
         few = len(routes) < query.count
         note = "there are no more routes by other links up to twice as dear" if few else ""
         return {"routes": routes, "complete": not few, "note": note}
@@ -339,6 +341,15 @@ class _OverFloors:
         if not here:
             raise InvalidValueError(f"the route does not visit floor {name}: choose another floor")
         return Tour(tuple(here), ())
+
+    def _words(self, plan: BuildingPlan, query: PathQuery) -> dict[str, Any]:
+        """Return the lines of a plan, which call its goal by its name."""
+        source = plan.instruction_source
+        if query.goal.name is not None and isinstance(source, GuidedRoute):
+            plan = replace(plan, instruction_source=replace(source, goal=query.goal.name))
+        numbers = [self._number_of[name] for name in plan.floors]
+        floors = [(number, self.sessions[number].grid) for number in numbers]
+        return {"words": lines_of(plan.instructions, query.language, floors)}
 
     def _outcome(self, query: PathQuery) -> BuildingPlan:
         start, goal = self._ends(query)

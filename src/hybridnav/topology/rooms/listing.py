@@ -98,15 +98,22 @@ def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray
     begins
         bool (n_spaces,), spaces in which a robot may begin: wide ones, and the largest.
     """
-    from scipy.sparse import coo_array  # noqa: PLC0415
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
     is_free = level.classes == CellClass.FREE
-    arcs = level.arcs[is_free[level.arcs].all(axis=1)]
-    shape = (level.n_vertices, level.n_vertices)
-    graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
-    parts = connected_components(graph, directed=False)[1][is_free]
+    parts = free_components(level)[is_free]
     spaces = space_of[is_free]
     joined = np.bincount(parts, weights=begins[spaces], minlength=1) > 0
     found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
+    return found
+
+
+def free_components(level: Level) -> IntArray:
+    """Return the connected set of each vertex of a level, int32 (n_vertices,), joined by arcs
+    between free ones alone."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - most callers need none
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    arcs = level.arcs[(level.classes == CellClass.FREE)[level.arcs].all(axis=1)]
+    shape = (level.n_vertices, level.n_vertices)
+    graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
+    found: IntArray = connected_components(graph, directed=False)[1]
     return found

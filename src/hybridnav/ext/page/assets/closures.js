@@ -1,6 +1,7 @@
 // What is closed: doors, rooms and areas of each floor, and links between floors.
 
 import { element } from "./route.js";
+import { t } from "./texts.js";
 
 const NOTHING = { doors: [], rooms: [], polygons: [] };
 const SAME = 1.5; // cells within which a door or a room is the one that was there before
@@ -85,8 +86,8 @@ export class Closures {
       const [name, all] = [key[each.kind], after[each.kind]];
       const old = before[each.kind].find((one) => one[name] === each.what);
       const same = each.kind === "rooms" && all.find((one) => one.name === each.what);
-      const found = same || (old && all.find((one) => Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
-      if (!found) lost.push(each.kind === "doors" ? `door ${each.what}` : each.what);
+      const found = same || (old && all.find((one) => one.area_m2 === old.area_m2 && Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
+      if (!found) lost.push(each.kind === "doors" ? t("door-n", each.what) : each.what);
       return found ? [{ ...each, what: found[name] }] : [];
     };
     this.list = this.list.flatMap(followed);
@@ -105,6 +106,8 @@ export class Closures {
     const corners = this.draft;
     this.draft = [];
     this.byId("area-done").hidden = true;
+    if (this.byId("area-start").ariaPressed === "true") document.querySelector("input[value=close]").checked = true;
+    this.byId("area-start").ariaPressed = "false";
     this.page.scene.draw();
     return isKept && corners.length >= 3 ? this.toggle("polygons", corners) : null;
   }
@@ -112,12 +115,12 @@ export class Closures {
   show() {
     const { floors } = this.page;
     const areas = this.list.filter((each) => each.kind === "polygons");
-    const names = { doors: ({ what }) => `door ${what}`, polygons: (each) => `area ${areas.indexOf(each) + 1}` };
+    const names = { doors: ({ what }) => t("door-n", what), polygons: (each) => t("area-n", areas.indexOf(each) + 1) };
     const items = this.list.map((each, at) => {
-      const where = each.floor === null ? "" : floors.named(each.floor, (name) => `, floor ${name}`);
-      const text = (names[each.kind]?.(each) ?? each.what) + where;
+      const what = names[each.kind]?.(each) ?? each.what;
+      const text = (each.floor !== null && floors.named(each.floor, (name) => t("in-floor", what, name))) || what;
       const open = () => this.#become(this.list.toSpliced(at, 1));
-      return element("li", {}, text, element("button", { onclick: open, ariaLabel: `Open ${text}` }, "Open"));
+      return element("li", {}, text, element("button", { onclick: open, ariaLabel: t("open-it", text) }, t("open")));
     });
     this.byId("closed").replaceChildren(...items);
     this.byId("close-undo").disabled = !this.#before.length;

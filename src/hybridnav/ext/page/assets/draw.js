@@ -10,8 +10,10 @@ const INKS = {
   dark: { ink: "#f2f4f5", halo: "#14181b", free: "#c3cad0", rim: "#8d979f", unexplored: "#6b757d",
     loop: "#ff9a80", closed: "#d79bea", door: "#f2f4f5", dot: "#7d8790", link: "#6bb0f5" },
 };
-const LABEL_SHIFTS = [0, -18, 18, -26, 26]; // pixels down from the middle of a room
 const FONT = "system-ui, 'Segoe UI', 'Noto Sans', 'DejaVu Sans', sans-serif";
+const LINK_FONT = `600 13px ${FONT}`;
+const LABEL_SHIFTS = [0, -18, 18, -26, 26]; // pixels down from the middle of a room
+const SLACK = 3; // pixels by which a name may reach into the walls of its room
 
 export function inksOf(scene) {
   return INKS[scene.theme];
@@ -93,7 +95,7 @@ export function linkOutline(kind, x, y, half) {
 export function paintLinks(scene, marks) {
   const { context } = scene;
   const inks = inksOf(scene);
-  for (const { kind, at, text, isTaken, fits } of marks) {
+  for (const { kind, at, texts, isTaken, fits } of marks) {
     const [x, y] = scene.toScreen(at);
     const half = 8;
     context.beginPath();
@@ -104,48 +106,136 @@ export function paintLinks(scene, marks) {
     context.fill();
     context.stroke();
     context.setLineDash([]);
-    context.font = `600 13px ${FONT}`;
-    const wide = context.measureText(text).width;
-    const isLeft = x + 14 + wide > scene.width;
-    Object.assign(context, { textAlign: isLeft ? "right" : "left", textBaseline: "middle", strokeStyle: inks.halo, lineWidth: 4, fillStyle: inks.link });
-    const from = isLeft ? x - 14 : x + 14;
-    context.strokeText(text, from, y);
-    context.fillText(text, from, y);
+    Object.assign(context, { font: LINK_FONT, textAlign: "center", textBaseline: "middle", strokeStyle: inks.halo, lineWidth: 4, fillStyle: inks.link });
+    const middle = middleOfLink(scene, x, texts);
+    texts.forEach((text, at) => {
+      context.strokeText(text, middle, y + 19 + 15 * at);
+      context.fillText(text, middle, y + 19 + 15 * at);
+    });
   }
 }
 
-// The room on the screen that a mark of a link takes.
-export function linkBox(scene, { at, text }) {
-  const [x, y] = scene.toScreen(at);
-  scene.context.font = `600 13px ${FONT}`;
-  const wide = scene.context.measureText(text).width + 18;
-  return x + wide > scene.width ? [x - wide, y - 11, x + 12, y + 11] : [x - 12, y - 11, x + wide, y + 11];
+// The texts of a link stand below its mark, whole on the screen.
+function middleOfLink(scene, x, texts) {
+  scene.context.font = LINK_FONT;
+  const half = Math.max(...texts.map((text) => scene.context.measureText(text).width)) / 2 + 3;
+  return Math.max(half, Math.min(scene.width - half, x));
 }
 
-// Write names where they do not hide one another, those of large rooms first.
+// The room on the screen that a mark of a link takes.
+export function linkBoxes(scene, { at, texts }) {
+  const [x, y] = scene.toScreen(at);
+  const middle = middleOfLink(scene, x, texts);
+  const halves = texts.map((text) => scene.context.measureText(text).width / 2 + 2);
+  return [[x - 11, y - 11, x + 11, y + 11], ...halves.map((half, line) => [middle - half, y + 12 + 15 * line, middle + half, y + 26 + 15 * line])];
+}
+
+const laidOut = new Map(); // by font and text: fonts and measures take longer than all the rest
+
+// A text in one line or, broken at a space or a hyphen, in two, with half its width.
+function layouts(context, font, text) {
+  const key = font + text;
+  if (!laidOut.has(key)) {
+    context.font = font;
+    const breaks = [...text.matchAll(/[ -]/g)].map(({ index }) => [text.slice(0, index + 1).trim(), text.slice(index + 1)]);
+    laidOut.set(key, [[text], ...breaks].map((lines) => ({ lines, half: Math.max(...lines.map((line) => context.measureText(line).width)) / 2 + 2 }))
+      .sort((one, other) => one.lines.length - other.lines.length || one.half - other.half).slice(0, 2));
+  }
+  return laidOut.get(key);
+}
+
+// Write names where they do not hide one another, those of large rooms first: inside of their
+// rooms and whole, or not at all.
 export function paintNames(scene, rooms, taken, chosen) {
   const { context } = scene;
   const inks = inksOf(scene);
   const order = [...rooms].sort((a, b) => (b.name === chosen) - (a.name === chosen) || b.area_m2 - a.area_m2);
+  const placed = [];
   context.textAlign = "center";
   context.textBaseline = "middle";
   for (const room of order) {
-    const [middle, y] = scene.toScreen(room.at);
-    if (middle < 0 || y < 0 || middle > scene.width || y > scene.height) continue;
-    context.font = `${room.name === chosen ? "700" : "500"} 13px ${FONT}`;
-    const half = context.measureText(room.name).width / 2 + 3;
-    const wide = 2.4 * Math.sqrt(room.area_m2) / scene.map.resolution_m * scene.scale;
-    if (2 * half > wide && room.name !== chosen) continue;
-    const x = Math.max(half + 4, Math.min(scene.width - half - 4, middle)); // all of it on the screen
-    const boxAt = (down) => [x - half, y + down - 8, x + half, y + down + 8];
-    const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
-    const down = LABEL_SHIFTS.find((each) => isFree(boxAt(each)));
-    if (down === undefined) continue;
-    taken.push(boxAt(down));
-    Object.assign(context, { strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
-    context.strokeText(room.name, x, y + down);
-    context.fillText(room.name, x, y + down);
+    const [x, y] = scene.toScreen(room.at);
+    if (x < 0 || y < 0 || x > scene.width || y > scene.height) continue;
+    const [left, bottom] = scene.toScreen([room.box[0], room.box[2]]);
+    const [right, top] = scene.toScreen([room.box[1], room.box[3]]);
+    const isInside = (box) => box[0] > Math.max(left - SLACK, 2) && box[2] < Math.min(right + SLACK, scene.width - 2)
+      && box[1] > Math.max(top - SLACK, 2) && box[3] < Math.min(bottom + SLACK, scene.height - 2);
+    const isFree = (box) => isInside(box) && !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
+    const weight = room.name === chosen ? 700 : 500;
+    place: for (const size of [13, 11]) {
+      const font = `${weight} ${size}px ${FONT}`;
+      for (const { lines, half } of layouts(context, font, room.name)) {
+        const high = (lines.length * (size + 2)) / 2;
+        if (2 * half > right - left + 2 * SLACK) continue;
+        const middle = Math.max(left + half, Math.min(right - half, x)); // in its room
+        for (const down of LABEL_SHIFTS) {
+          const box = [middle - half, y + down - high, middle + half, y + down + high];
+          if (!isFree(box)) continue;
+          taken.push(box);
+          placed.push([room.name, ...box]);
+          Object.assign(context, { font, strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
+          lines.forEach((line, at) => {
+            const level = y + down - high + (at + 0.5) * (size + 2);
+            context.strokeText(line, middle, level);
+            context.fillText(line, middle, level);
+          });
+          break place;
+        }
+      }
+    }
   }
+  scene.canvas.dataset.names = JSON.stringify(placed);
+}
+
+// Write the numbers of doors beside them where there is room: the first of a list go first.
+export function paintNumbers(scene, doors, taken) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  Object.assign(context, { font: `600 11px ${FONT}`, textAlign: "center", textBaseline: "middle", strokeStyle: inks.halo, lineWidth: 3, lineJoin: "round", fillStyle: inks.link });
+  for (const door of doors) {
+    const [x, y] = scene.toScreen(door.at);
+    if (x < 0 || y < 0 || x > scene.width || y > scene.height) continue;
+    const half = 3.5 * String(door.number).length + 1;
+    const spots = [[half + 9, -8], [-half - 9, -8], [half + 9, 8], [-half - 9, 8]].map(([right, down]) => [x + right, y + down]);
+    const boxOf = ([left, middle]) => [left - half, middle - 6, left + half, middle + 6];
+    const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
+    const spot = spots.find((each) => isFree(boxOf(each)));
+    if (!spot) continue;
+    taken.push(boxOf(spot));
+    context.strokeText(door.number, ...spot);
+    context.fillText(door.number, ...spot);
+  }
+}
+
+// The number of a lit door stands above its ring, below it near the upper rim.
+const levelOfLit = (y) => (y > 90 ? y - 28 : y + 28);
+
+export function litBoxes(scene, { at }) {
+  const [x, y] = scene.toScreen(at);
+  return [[x - 16, y - 16, x + 16, y + 16], [x - 18, levelOfLit(y) - 12, x + 18, levelOfLit(y) + 12]];
+}
+
+// A ring round what a line of the words is about, with the number of its door.
+export function paintLit(scene, { at, door }) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  const [x, y] = scene.toScreen(at);
+  context.beginPath();
+  context.arc(x, y, 13, 0, 2 * Math.PI);
+  for (const [colour, width] of [[inks.halo, 7], [inks.link, 3.5]]) {
+    Object.assign(context, { strokeStyle: colour, lineWidth: width });
+    context.stroke();
+  }
+  if (!door) return;
+  Object.assign(context, { font: `700 14px ${FONT}`, textAlign: "center", textBaseline: "middle" });
+  const half = context.measureText(door).width / 2 + 6;
+  const middle = levelOfLit(y);
+  context.fillStyle = inks.link;
+  context.beginPath();
+  context.roundRect(x - half, middle - 10, 2 * half, 20, 5);
+  context.fill();
+  context.fillStyle = inks.halo;
+  context.fillText(door, x, middle + 0.5);
 }
 
 // The lines of a route on one floor.

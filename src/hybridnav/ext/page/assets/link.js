@@ -1,5 +1,7 @@
 // Where the page's data come from: the server behind it, or the file that it was saved in.
 
+import { said, t } from "./texts.js";
+
 export class Failure extends Error {
   constructor(message, code) {
     super(message);
@@ -16,12 +18,11 @@ export class LiveLink {
     try {
       response = await fetch(path, options);
     } catch {
-      throw new Failure("The server does not answer: is the command still running? " +
-        "Changes of rooms are kept and come back when it is started again.", 0);
+      throw new Failure(t("no-server"), 0);
     }
     if (response.ok) return response;
     const answer = await response.json().catch(() => ({}));
-    throw new Failure(answer.error ?? `error ${response.status}`, response.status);
+    throw new Failure(answer.error ? said(answer.error) : t("error", response.status), response.status);
   }
 
   async get(name, base = this.base) {
@@ -65,7 +66,7 @@ export class SavedLink {
   async get(name, base = this.base) {
     if (name === "map") return this.#about(base).map;
     if (name.startsWith("graph/")) return this.#about(base).graph;
-    throw new Failure("not in this file", 404);
+    throw new Failure(t("not-in-file"), 404);
   }
 
   firstZoom(layer) {

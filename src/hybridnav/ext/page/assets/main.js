@@ -1,12 +1,14 @@
 // The page: connects its controls with the map, the routes and the rooms.
 
 import { Closures } from "./closures.js";
+import { Ends } from "./ends.js";
 import { Floors } from "./floors.js";
 import { download, openLink } from "./link.js";
 import { Names } from "./names.js";
 import { Pictures } from "./pictures.js";
 import { Routes, element } from "./route.js";
 import { Scene, steer } from "./scene.js";
+import { LANGUAGES, written, remember, said, settings, t, translate } from "./texts.js";
 
 const byId = (id) => document.getElementById(id);
 const FILES = { nav2: "route-graph.geojson", model: "model.hnm", rooms: "rooms.geojson", "path-geojson": "path.geojson", "path-csv": "path.csv" };
@@ -16,10 +18,13 @@ const page = {
   canvas: byId("map"),
   link: openLink(),
 
-  say(text, isProblem = false) {
-    byId("status").textContent = text;
+  say(text, isProblem = false, isDone = false) {
+    byId("status").textContent = text.charAt(0).toUpperCase() + text.slice(1);
     byId("status").classList.toggle("problem", isProblem);
+    byId("status").classList.toggle("done", isDone);
   },
+
+  showFloor,
 
   // What a click on the map means.
   get mode() {
@@ -36,6 +41,7 @@ const page = {
   },
 };
 page.floors = new Floors(page);
+page.fields = new Ends(page);
 page.closures = new Closures(page);
 page.pictures = new Pictures(page);
 
@@ -64,7 +70,7 @@ async function clickedToClose(at) {
   const door = names.shown.doors.find((each) => near(scene.toScreen(each.at), at, END_REACH));
   if (door) return closures.toggle("doors", door.number);
   const { room } = await page.link.post("at", { point: scene.toGrid(at) });
-  return room ? closures.toggle("rooms", room) : page.say("Neither a door nor a room lies there", true);
+  return room ? closures.toggle("rooms", room) : page.say(t("nothing-there"), true);
 }
 
 const handlers = {
@@ -85,14 +91,14 @@ const handlers = {
   },
   drop: (held, at) => reported(async () => {
     const point = page.scene.toGrid(at);
-    if (held.kind === "end") await page.routes.setEnd(held.which, point);
+    if (held.kind === "end") await page.routes.putEnd(held.which, point);
     else await page.names.drop(held, point);
   })(),
   click: (at) => reported(async () => {
     if (!page.link.isLive || !page.map.ready) return;
     const point = page.scene.toGrid(at);
     const { routes, closures } = page;
-    if (page.mode === "route") await routes.clicked(point);
+    if (page.mode === "route") await (routes.hasEnds && routes.lightAt(at) ? null : routes.clicked(point));
     else if (page.mode === "close") await clickedToClose(at);
     else if (page.mode === "names") await page.names.clicked(point);
     else if (closures.draft.length > 2 && near(page.scene.toScreen(closures.draft[0]), at, END_REACH)) await closures.endArea(true);
@@ -104,12 +110,13 @@ const handlers = {
     const { lifted } = names;
     names.lifted = lifted || page.mode !== "names" ? null : handlers.grab(at);
     if (lifted) handlers.drop(lifted, at);
-    else if (names.lifted) page.say("Move the map until its middle is where the corner belongs, then press space again");
+    else if (names.lifted) page.say(t("corner-held"));
     else handlers.click(at);
   },
   hover(at) {
     const text = at ? page.scene.textOf(page.scene.toGrid(at)) : "";
     byId("pointer").textContent = text && `${text} m`;
+    if (at && page.mode === "route") page.routes.lightAt(at);
   },
 };
 
@@ -121,11 +128,20 @@ function connectRoutes() {
   on("ends", "submit", () => routes.typed());
   on("preset", "change", async () => { await page.pictures.showCosts(); await routes.plan(); });
   on("optimum", "click", () => routes.optimum());
-  on("clear", "click", () => routes.clear());
+  for (const id of ["clear", "again"]) on(id, "click", () => routes.clear());
   on("alternatives", "click", () => routes.alternatives());
   on("stairs", "change", () => routes.plan());
   on("close-undo", "click", () => closures.undo());
   on("close-clear", "click", () => closures.openAll());
+  on("area-start", "click", () => {
+    if (byId("area-start").ariaPressed === "true") {
+      closures.endArea(false);
+      return;
+    }
+    byId("area-start").ariaPressed = "true";
+    document.querySelector("input[value=area]").checked = true;
+    page.say(t("click-corners"));
+  });
   on("area-done", "click", () => closures.endArea(true));
   for (const [id, kind, read] of [["close-door", "doors", Number], ["close-room", "rooms", String], ["close-link", "links", String]]) {
     on(id, "change", async () => {
@@ -168,8 +184,13 @@ function connectView() {
     const step = { PageUp: 1, PageDown: -1 }[event.key];
     return step && page.map.ready ? showFloor(page.floors.at + step) : null;
   }, false));
+  on("face", "change", () => useSettings({ face: byId("face").value }));
+  on("language", "change", () => useSettings({ language: byId("language").value }));
   document.querySelectorAll("input[name=mode]").forEach((input) => input.addEventListener("change", () => {
+    page.say("");
+    byId("area-start").ariaPressed = "false"; // this choice counts
     page.closures.endArea(false);
+    useMode();
     if (page.names.tool) page.names.use("");
     scene.draw();
   }));
@@ -190,10 +211,10 @@ function connectExport() {
     const kind = button.dataset.export;
     const isPath = kind.startsWith("path");
     if (isPath && !page.routes.hasEnds) {
-      page.say("Set a start and a goal first", true);
+      page.say(t("ends-first"), true);
       return;
     }
-    page.say("Writing…");
+    page.say(t("writing"));
     const asked = isPath ? page.routes.query({ floor: page.floors.at }) : null;
     const isWhole = isPath || kind === "model"; // not of one floor
     download(await page.link.file(kind, asked, isWhole ? "" : page.link.base), fileOf(kind));
@@ -225,20 +246,53 @@ function describe() {
   byId("level").value = map.place_level ?? 0;
 }
 
+// What a click means chooses what staff see; an area is a way to close something.
+function useMode() {
+  document.documentElement.dataset.mode = page.mode === "area" ? "close" : page.mode;
+}
+
+// Write everything anew for another face or language, which the address remembers.
+async function useSettings(change) {
+  remember(change);
+  showSettings();
+  describe();
+  listChoices();
+  page.names.list();
+  page.names.show();
+  page.closures.show();
+  page.pictures.showLegend();
+  page.routes.showEnds();
+  page.routes.show();
+  await page.pictures.showLayer();
+  await page.routes.plan(); // its words
+}
+
+function showSettings() {
+  document.documentElement.dataset.face = settings.face;
+  byId("face").value = settings.face;
+  byId("language").replaceChildren(...Object.entries(LANGUAGES).map(([value, name]) => element("option", { value }, name)));
+  byId("language").value = settings.language;
+  if (settings.face === "staff" && page.mode === "area") document.querySelector("input[value=close]").checked = true;
+  useMode();
+  translate();
+}
+
 // State what is shown, below its name.
 function stateFacts() {
   const { map, floors } = page;
-  const size = [map.cols, map.rows].map((n) => n.toLocaleString("en"));
-  const rooms = map.ready ? `, ${page.names.shown.rooms.length} rooms` : "";
-  const floor = floors.named(floors.at, (name) => `Floor ${name}: `);
-  byId("facts").textContent = `${floor}${size.join(" × ")} cells of ${map.resolution_m} m, robot radius ${map.robot_radius_m} m${rooms}`;
+  const facts = [];
+  if (settings.face === "robot") facts.push(t("facts-robot", written(map.cols), written(map.rows), map.resolution_m, map.robot_radius_m));
+  if (map.ready) facts.push(t("facts-rooms", page.names.shown.rooms.length));
+  byId("facts").textContent = floors.named(floors.at, (name) => t("facts-floor", name, facts.join(", "))) || facts.join(", ");
 }
 
 function listChoices() {
   const { floors } = page;
   const options = (names) => names.map((name) => element("option", { value: name }, name));
+  const preset = byId("preset").value;
   byId("preset").replaceChildren(...options(floors.presets));
-  byId("close-link").replaceChildren(element("option", { value: "" }, "choose…"), ...options(floors.links.map((link) => link.name)));
+  if (preset) byId("preset").value = preset;
+  byId("close-link").replaceChildren(element("option", { value: "" }, t("choose")), ...options(floors.links.map((link) => link.name)));
 }
 
 async function showFloor(number) {
@@ -261,7 +315,8 @@ async function followed(isEnough) {
     const state = await page.link.get("state", "");
     const { stage } = state;
     byId("progress").hidden = !stage;
-    byId("stage").textContent = stage ? `${stage[0].toUpperCase()}${stage.slice(1)}, ${Math.round(state.seconds)} s` : "";
+    const text = said(stage);
+    byId("stage").textContent = text ? `${text[0].toUpperCase()}${text.slice(1)}, ${t("seconds", Math.round(state.seconds))}` : "";
     if (!stage || isEnough(state)) return;
     await pause(400);
   }
@@ -286,6 +341,7 @@ async function prepared() {
 }
 
 async function begin() {
+  showSettings();
   const whole = await page.link.get("map", "");
   page.map = await page.floors.begin(whole);
   page.scene = new Scene(page.canvas, page.map, page.link);
@@ -301,6 +357,7 @@ async function begin() {
   connectRoutes();
   connectNames();
   connectExport();
+  page.fields.connect(reported);
   page.closures.show();
   if (!page.map.ready || !whole.ready) await prepared();
   page.scene.version = page.map.rooms.version;
@@ -309,6 +366,7 @@ async function begin() {
   page.floors.note();
   await page.pictures.showLayer();
   page.pictures.useTheme();
+  if (page.link.isLive) await page.fields.begin();
   page.canvas.dataset.ready = "true";
 }
 

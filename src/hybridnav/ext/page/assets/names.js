@@ -1,6 +1,7 @@
 // Rooms: their names, unions, cuts and corners, and the file that they are saved in.
 
 import { element } from "./route.js";
+import { said, settings, t } from "./texts.js";
 
 const NEAR = 12; // pixels within which a corner is meant
 
@@ -22,11 +23,18 @@ export class Names {
     return this.page.map.rooms;
   }
 
-  // Rooms and doors in lists and on the map: those that people look for, or all.
+  // Rooms and doors in lists and on the map: those that people look for, or all; for staff the
+  // doors that lead somewhere, and those of the way.
   get shown() {
     const { rooms, doors } = this.rooms;
     const isShown = ({ listed, name }) => listed || name === this.chosen || this.byId("show-all").checked;
-    return { rooms: rooms.filter(isShown), doors: doors.filter(isShown) };
+    const isDoor = settings.face === "staff" ? (door) => door.leads || this.isTold(door) : isShown;
+    return { rooms: rooms.filter(isShown), doors: doors.filter(isDoor) };
+  }
+
+  // Whether the words of the way are about a door of the floor that is shown.
+  isTold(door) {
+    return this.page.routes.lines.some((line) => line.floor === this.page.floors.at && line.door === door.number);
   }
 
   get ownRings() {
@@ -59,7 +67,7 @@ export class Names {
     if (this.tool === "split" && this.chosen) {
       this.line.push(point);
       if (this.line.length === 2) await this.#split();
-      else this.page.say("Click the other end of the line");
+      else this.page.say(t("other-end"));
       this.page.scene.draw();
       return;
     }
@@ -73,9 +81,9 @@ export class Names {
     this.line = [];
     this.lifted = null;
     this.show();
-    if (this.tool && !this.chosen) this.page.say("Choose a room first", true);
-    else if (this.tool === "split") this.page.say("Click two points of the line");
-    else if (this.tool === "corners") this.page.say("Drag a corner of the outline");
+    if (this.tool && !this.chosen) this.page.say(t("room-first"), true);
+    else if (this.tool === "split") this.page.say(t("two-points"));
+    else if (this.tool === "corners") this.page.say(t("drag-corner"));
   }
 
   grab(at) {
@@ -134,7 +142,7 @@ export class Names {
   rename() {
     const name = this.byId("room-name").value.trim();
     if (!this.chosen || !name) {
-      this.page.say("Choose a room and type its name", true);
+      this.page.say(t("name-first"), true);
       return null;
     }
     return this.edit({ op: "rename", room: this.chosen, name }, name);
@@ -143,7 +151,7 @@ export class Names {
   merge() {
     const other = this.byId("other-room").value;
     if (!this.chosen || !other) {
-      this.page.say("Choose two rooms that touch", true);
+      this.page.say(t("two-rooms"), true);
       return null;
     }
     return this.edit({ op: "merge", room: this.chosen, other });
@@ -165,11 +173,13 @@ export class Names {
   save() {
     const { map, link } = this.page;
     const { base } = link;
+    this.byId("save").textContent = t("saving");
     return this.#inTurn(async () => {
       try {
         map.rooms = await link.post("save", { version: map.rooms.version, replace: this.#isReplacing }, base);
         this.#isReplacing = false;
         this.show();
+        this.page.say(said(map.rooms.notice), false, true);
       } catch (problem) {
         this.#isReplacing = problem.code === 409;
         await this.#refused(problem);
@@ -190,7 +200,7 @@ export class Names {
     else await this.choose("");
     if (this.page.closures.list.length) await this.outlined();
     await this.page.changed();
-    if (lost.length) this.page.say(`Open again, as it is there no more: ${lost.join(", ")}`, true);
+    if (lost.length) this.page.say(t("gone", lost.join(", ")), true);
   }
 
   async #refused(problem) {
@@ -223,13 +233,13 @@ export class Names {
       element("option", { value: "" }, first),
       ...values.map((value) => element("option", { value }, text(value))),
     ];
-    this.byId("room").replaceChildren(...options("choose…", names));
-    this.byId("other-room").replaceChildren(...options("choose…", names));
-    this.byId("close-room").replaceChildren(...options("choose…", names));
+    this.byId("room").replaceChildren(...options(t("choose"), names));
+    this.byId("other-room").replaceChildren(...options(t("choose"), names));
+    this.byId("close-room").replaceChildren(...options(t("choose"), names));
     const doors = shown.map((door) => door.number);
     const beside = new Map(shown.map((door) => [door.number, door.rooms]));
-    const text = (n) => `${n}: ${beside.get(n).map((room) => room ?? "no room").join(" – ")}`;
-    this.byId("close-door").replaceChildren(...options("choose…", doors, text));
+    const text = (n) => t("door-between", n, ...beside.get(n).map((room) => room ?? t("no-room")));
+    this.byId("close-door").replaceChildren(...options(t("choose"), doors, text));
     this.byId("room").value = this.chosen;
   }
 
@@ -237,12 +247,12 @@ export class Names {
     for (const tool of ["split", "corners"]) this.byId(tool).ariaPressed = String(this.tool === tool);
     for (const id of ["split", "corners", "merge", "rename-done"]) this.byId(id).disabled = !this.chosen;
     const { unsaved, notice } = this.rooms;
-    const count = unsaved === 1 ? "1 change is not saved" : `${unsaved} changes are not saved`;
-    this.byId("unsaved").textContent = [unsaved ? count : "", notice].filter(Boolean).join("; ");
-    this.byId("no-file").textContent = this.page.map.no_file ?? "";
+    const count = t(unsaved === 1 ? "unsaved-1" : "unsaved-n", unsaved);
+    this.byId("unsaved").textContent = [unsaved ? count : "", said(notice)].filter(Boolean).join("; ");
+    this.byId("no-file").textContent = said(this.page.map.no_file ?? "");
     this.byId("names-undo").disabled = !unsaved;
     this.byId("save").disabled = !this.page.map.can_save;
-    this.byId("save").textContent = this.page.map.file ? `Save ${this.page.map.file}` : "Save";
+    this.byId("save").textContent = this.page.map.file ? t("save-file", this.page.map.file) : t("save");
     this.byId("save").classList.toggle("primary", Boolean(unsaved));
     this.page.scene.draw();
   }

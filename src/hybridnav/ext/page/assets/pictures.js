@@ -1,8 +1,10 @@
 // What the map shows: its colours, the graph and costs over them, marks, names, and the legend.
 
-import { inksOf, linkBox, linkOutline, paintClosed, paintDashed, paintDoors, paintEnd, paintGraph, paintLinks, paintMiddle, paintNames, paintOutline, paintRoutes, paintScaleBar } from "./draw.js";
+import { inksOf, linkBoxes, linkOutline, litBoxes, paintClosed, paintDashed, paintDoors, paintEnd, paintGraph, paintLinks, paintLit, paintMiddle, paintNames, paintNumbers, paintOutline, paintRoutes, paintScaleBar } from "./draw.js";
 import { element, picture } from "./route.js";
+import { written, settings, t } from "./texts.js";
 
+const NUMBERS_FROM = 11; // pixels per metre from which numbers of doors are read
 const systemTheme = matchMedia("(prefers-color-scheme: dark)");
 
 export class Pictures {
@@ -38,8 +40,8 @@ export class Pictures {
     this.byId("level-row").hidden = colours !== "level" || !link.isLive;
     scene.layer = colours === "level" ? `level-${level}` : colours;
     const facts = map.levels[level];
-    this.byId("level-text").textContent = `${level}${facts.name ? ` (${facts.name})` : ""}`;
-    this.byId("level").setAttribute("aria-valuetext", `level ${level}, ${facts.vertices} vertices, ${facts.arcs} arcs`);
+    this.byId("level-text").textContent = `${level}${facts.name ? ` (${t(`level-${facts.name}`)})` : ""}`;
+    this.byId("level").setAttribute("aria-valuetext", t("level-is", level, facts.vertices, facts.arcs));
     scene.draw();
     const wanted = colours === "level" ? level : String(map.place_level);
     const isWanted = this.byId("show-graph").checked;
@@ -51,7 +53,7 @@ export class Pictures {
       if (number !== this.#asked) return; // another one is wanted meanwhile
       this.#graph = graph;
     }
-    if (!this.#graph.drawn) this.byId("level-note").textContent = `Level ${wanted} has ${this.#graph.vertices.toLocaleString("en")} vertices: too many to draw its arcs`;
+    if (!this.#graph.drawn) this.byId("level-note").textContent = t("level-full", wanted, written(this.#graph.vertices));
     scene.draw();
   }
 
@@ -62,7 +64,7 @@ export class Pictures {
     if (this.byId("show-costs").checked) {
       const preset = this.byId("preset").value;
       this.#costs = await link.get(`costs/${preset}`);
-      if (this.#costs.most === null) this.page.say(`Preset ${preset} plans by lengths, without costs: choose robot, or start with --costs`, true);
+      if (this.#costs.most === null) this.page.say(t("no-costs", preset), true);
       else scene.overlay = `costs-${preset}`;
     }
     this.showLegend();
@@ -77,21 +79,21 @@ export class Pictures {
     const three = (first) => [0, 1, 2].map((n) => `<rect x="${1 + 8 * n}" y="1" width="8" height="12" fill="${colours[first + n]}"/>`).join("");
     const line = (colour, dash = "") => `<path d="M1 7h24" stroke="${colour}" stroke-width="2" stroke-dasharray="${dash}"/>`;
     const shown = this.byId("colours").value;
-    const entries = [[box(colours[0]), "free"], [box(colours[1]), "unexplored"], [box(colours[2]), `within ${map.robot_radius_m} m`], [box(colours[3]), "occupied"]];
-    if (shown !== "map") entries.push([three(4), shown === "rooms" ? "rooms" : "free places"]);
-    if (shown === "level") entries.push([three(10), "unexplored places"]);
+    const entries = [[box(colours[0]), t("free")], [box(colours[1]), t("unexplored")], [box(colours[2]), t("within", map.robot_radius_m)], [box(colours[3]), t("occupied")]];
+    if (shown !== "map") entries.push([three(4), t(shown === "rooms" ? "colours-rooms" : "free-places")]);
+    if (shown === "level") entries.push([three(10), t("unexplored-places")]);
     if (this.byId("show-graph").checked) {
-      entries.push([`${line(inks.free)}<circle cx="5" cy="7" r="3.5" fill="${inks.ink}"/>`, "place, arc"], [line(inks.loop, "4 2"), "self-loop"]);
+      entries.push([`${line(inks.free)}<circle cx="5" cy="7" r="3.5" fill="${inks.ink}"/>`, t("place-arc")], [line(inks.loop, "4 2"), t("self-loop")]);
     }
     if (this.byId("show-doors").checked) {
-      entries.push([`<circle cx="13" cy="7" r="5" fill="${inks.door}"/>`, "door"], [`<rect x="8" y="2" width="10" height="10" fill="${inks.door}"/>`, "opening"],
-        [`<circle cx="13" cy="7" r="4.5" fill="${inks.halo}" stroke="${inks.door}" stroke-width="1.5"/>`, "too narrow"]);
+      entries.push([`<circle cx="13" cy="7" r="5" fill="${inks.door}"/>`, t("a-door")], [`<rect x="8" y="2" width="10" height="10" fill="${inks.door}"/>`, t("an-opening")],
+        [`<circle cx="13" cy="7" r="4.5" fill="${inks.halo}" stroke="${inks.door}" stroke-width="1.5"/>`, t("too-narrow")]);
     }
     for (const kind of new Set(floors.links.map((link) => link.kind))) {
-      entries.push([`<polygon points="${linkOutline(kind, 13, 7, 5)}" fill="${inks.halo}" stroke="${inks.link}" stroke-width="2"/>`, kind]);
+      entries.push([`<polygon points="${linkOutline(kind, 13, 7, 5)}" fill="${inks.halo}" stroke="${inks.link}" stroke-width="2"/>`, t(kind)]);
     }
     const most = this.#costs?.most;
-    if (most) entries.push([`<defs><linearGradient id="c"><stop stop-color="#fff6b5"/><stop offset="1" stop-color="#b10026"/></linearGradient></defs>${box("url(#c)")}`, `costs 1 to ${Number(most.toPrecision(3))}`]);
+    if (most) entries.push([`<defs><linearGradient id="c"><stop stop-color="#fff6b5"/><stop offset="1" stop-color="#b10026"/></linearGradient></defs>${box("url(#c)")}`, t("costs-to", Number(most.toPrecision(3)))]);
     this.byId("legend").replaceChildren(...entries.map(([content, text]) => element("li", {}, picture(content), text)));
   }
 
@@ -101,8 +103,9 @@ export class Pictures {
     const rides = routes.routes[routes.chosen]?.rides ?? [];
     return floors.ends.map(({ link, at }) => {
       const ride = rides.find((each) => each.link === link.name && (each.from === floors.at || each.to === floors.at));
-      const other = ride && (ride.from === floors.at ? `to floor ${floors.nameOf(ride.to)}` : `from floor ${floors.nameOf(ride.from)}`);
-      return { kind: link.kind, at, fits: link.fits, isTaken: Boolean(ride), text: link.name + (ride ? `, ${other}` : "") };
+      const isLeft = ride?.from === floors.at;
+      const where = ride ? [t(isLeft ? "to-floor" : "from-floor", floors.nameOf(isLeft ? ride.to : ride.from))] : [];
+      return { kind: link.kind, at, fits: link.fits, isTaken: Boolean(ride), texts: [link.name, ...where] };
     });
   }
 
@@ -110,26 +113,33 @@ export class Pictures {
     const { routes, names, closures, floors } = this.page;
     const links = this.#linkMarks();
     const isNaming = this.page.mode === "names";
-    const hasDoors = this.byId("show-doors").checked;
-    if (this.byId("show-graph").checked) paintGraph(scene, this.#graph);
+    const isRobot = settings.face === "robot";
+    const hasDoors = this.byId("show-doors").checked || !isRobot;
+    const shown = names.shown;
+    const listed = hasDoors ? shown.doors : [];
+    if (isRobot && this.byId("show-graph").checked) paintGraph(scene, this.#graph);
     if (isNaming && names.chosen) paintOutline(scene, names.ownRings, names.tool === "corners");
     paintDashed(scene, routes.open, floors.at);
     paintRoutes(scene, routes.routes, routes.chosen, floors.at);
-    if (hasDoors) paintDoors(scene, names.shown.doors);
+    paintDoors(scene, listed);
     paintLinks(scene, links);
     const ends = floors.ends.filter(({ link }) => closures.links.includes(link.name)).map((end) => end.at);
     const crosses = [...closures.marks, ...ends];
     paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
-    const doors = hasDoors ? names.shown.doors.map((door) => door.at) : [];
     const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
-    const taken = [...doors, ...crosses, start, goal].filter(Boolean).map((point) => {
+    const taken = [...listed.map((door) => door.at), ...crosses, start, goal].filter(Boolean).map((point) => {
       const [x, y] = scene.toScreen(point);
       return [x - 8, y - 8, x + 8, y + 8];
     });
-    taken.push(...links.map((mark) => linkBox(scene, mark)));
-    if (this.byId("show-names").checked) paintNames(scene, names.shown.rooms, taken, isNaming ? names.chosen : "");
+    const lit = routes.spotOf(routes.lines[routes.lit]);
+    taken.push(...links.flatMap((mark) => linkBoxes(scene, mark)), ...(lit ? litBoxes(scene, lit) : []));
+    const isTold = (door) => names.isTold(door);
+    paintNumbers(scene, listed.filter(isTold), taken);
+    if (!isRobot || this.byId("show-names").checked) paintNames(scene, shown.rooms, taken, isNaming ? names.chosen : "");
+    if (scene.scale / scene.map.resolution_m >= NUMBERS_FROM) paintNumbers(scene, listed.filter((door) => !isTold(door)), taken);
     paintEnd(scene, start, "A");
     paintEnd(scene, goal, "B");
+    if (lit) paintLit(scene, lit);
     if (scene.canvas.matches(":focus-visible")) paintMiddle(scene);
     paintScaleBar(scene);
   }

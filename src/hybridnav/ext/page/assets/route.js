@@ -1,10 +1,10 @@
 // Routes: two ends, a plan with its certificate, and alternatives.
 
 import { ROUTE_COLOURS } from "./draw.js";
+import { written, said, settings, t } from "./texts.js";
 
 const MOST_UNDER_WAY = 3; // requests at a time
-const FARTHEST = 1e7; // cells, as far as the server takes points
-const METRICS = { "any-angle": "at any angle", octile: "from cell to cell", weighted: "by costs" };
+const phone = matchMedia("(max-width: 760px)");
 
 export function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
@@ -27,13 +27,20 @@ const amountOf = (route) => (route.rides?.length ? route.cost : route.length_m);
 
 function passagesOf(route) {
   if (!route.solved) return "";
-  if (route.rides) return route.rides.length ? `by ${route.rides.map((ride) => ride.link).join(", ")}` : "on one floor";
+  if (route.rides) return route.rides.length ? t("by", route.rides.map((ride) => ride.link).join(", ")) : t("on-one-floor");
   const doors = (route.legs ?? []).filter((leg) => leg.door).map((leg) => leg.door).join(", ");
-  return doors ? `doors ${doors}` : "no doors";
+  return doors ? t("doors", doors) : t("no-doors");
 }
 
-const timeOf = (seconds) => (seconds < 1 ? `${(1000 * seconds).toFixed(1)} ms` : `${seconds.toFixed(1)} s`);
-const metres = (value) => (value === null ? "none" : `${value.toFixed(2)} m`);
+const timeOf = (seconds) => (seconds < 1 ? `${written(1000 * seconds, 1)} ms` : t("seconds", written(seconds, 1)));
+const metres = (value) => (value === null ? t("none") : t("metres", written(value, 2)));
+const someMetres = (value) => t(value < 100 ? "metres" : "some-m", written(value < 100 ? Math.ceil(value) : 10 * Math.round(value / 10)));
+
+// How long a route is, for people: its length, and over floors its time.
+function shortly(route) {
+  const minutes = route.rides ? [t("minutes", Math.max(1, Math.round(route.travel_s / 60)))] : [];
+  return [someMetres(route.length_m), ...minutes].join(" · ");
+}
 
 export class Routes {
   ends = { start: null, goal: null }; // each { floor, point }
@@ -41,6 +48,7 @@ export class Routes {
   chosen = 0;
   open = null; // the plan without closures, while something is closed
   grid = null; // the optimum on the grid
+  lit = -1; // the line of the words that is lit, with its door
   #wanted = null;
   #underWay = 0;
   #asked = 0;
@@ -65,8 +73,9 @@ export class Routes {
 
   query(more = {}) {
     const { closures } = this.page;
-    const preset = this.byId("preset").value;
-    return { ...this.ends, preset, closed: closures.asked, stairs: this.byId("stairs").checked, ...more };
+    const end = ({ floor, point, name = null }) => ({ floor, point, name });
+    const [start, goal] = [this.ends.start, this.ends.goal].map(end);
+    return { start, goal, preset: this.byId("preset").value, closed: closures.asked, stairs: this.byId("stairs").checked, language: settings.language, ...more };
   }
 
   // Plans are about all floors: their names have nothing before them.
@@ -77,51 +86,63 @@ export class Routes {
   // --- ends
 
   setEnd(which, point, isBrief = false) {
-    const { scene, floors } = this.page;
-    this.ends[which] = { floor: floors.at, point: scene.rounded(point) };
-    this.byId(which).value = this.#textOf(floors.at, scene.textOf(point));
+    const { scene, floors, fields } = this.page;
+    this.ends[which] = { floor: floors.at, point: scene.rounded(point), text: fields.textOf(floors.at, scene.textOf(point)) };
+    this.showEnds();
     scene.draw();
     return this.plan(isBrief);
   }
 
-  #textOf(floor, text) {
-    return this.page.floors.named(floor, (name) => `${name}: `) + text;
+  // For people a click means the room, and a free place in it; a robot stands where it is put.
+  async putEnd(which, point) {
+    const { floors, fields } = this.page;
+    const end = settings.face === "staff" && await fields.endOf({ floor: floors.at, point });
+    if (!end) return this.setEnd(which, point);
+    this.ends[which] = end;
+    this.showEnds();
+    this.page.scene.draw();
+    return this.plan();
+  }
+
+  showEnds() {
+    for (const which of ["start", "goal"]) this.byId(which).value = this.ends[which]?.text ?? "";
+    this.page.fields.showStars();
   }
 
   clicked(point) {
     if (this.hasEnds) this.clear();
-    return this.setEnd(this.ends.start ? "goal" : "start", point);
+    return this.putEnd(this.ends.start ? "goal" : "start", point);
   }
 
   async typed() {
-    const ends = {};
-    for (const which of ["start", "goal"]) {
-      const [floor, text] = this.page.floors.split(this.byId(which).value);
-      const numbers = text.split(/[,;\s]+/).filter(Boolean).map(Number);
-      if (floor < 0 || numbers.length !== 2 || !numbers.every(Number.isFinite)) {
-        const before = floor < 0 ? "the name of a floor, a colon, and " : "";
-        this.page.say(`Expected ${before}two numbers of metres for the ${which}, such as 1.5, 2`, true);
-        this.byId(which).focus();
-        return null;
-      }
-      const point = this.page.scene.fromMetres(numbers, await this.page.floors.map(floor));
-      if (point.some((value) => Math.abs(value) > FARTHEST)) {
-        this.page.say(`The ${which} lies far outside of the map`, true);
-        this.byId(which).focus();
-        return null;
-      }
-      ends[which] = { floor, point };
-      this.byId(which).value = this.#textOf(floor, text.trim());
+    const { fields } = this.page;
+    const start = await fields.meant("start");
+    if (start && !this.byId("goal").value.trim()) {
+      await fields.take("start", start);
+      return;
     }
-    this.ends = ends;
-    return this.plan();
+    const goal = start && await fields.meant("goal");
+    if (!goal) return;
+    this.ends = { start, goal };
+    this.showEnds();
+    await this.planAndFrame();
+  }
+
+  // Plan between ends that were typed; staff see the way from its start, which may lie elsewhere.
+  async planAndFrame() {
+    const { page } = this;
+    await this.plan();
+    if (settings.face === "robot") return;
+    const part = this.routes[this.chosen]?.parts[0];
+    await page.showFloor(part?.floor ?? this.ends.start.floor);
+    if (part) page.scene.frame(part.line);
   }
 
   clear() {
     this.#asked += 1;
     this.#answered = this.#asked; // what is still under way is about other ends
-    Object.assign(this, { ends: { start: null, goal: null }, routes: [], open: null, grid: null, chosen: 0 });
-    for (const id of ["start", "goal"]) this.byId(id).value = "";
+    Object.assign(this, { ends: { start: null, goal: null }, routes: [], open: null, grid: null, chosen: 0, lit: -1 });
+    this.showEnds();
     this.show();
   }
 
@@ -158,7 +179,7 @@ export class Routes {
     if (number < this.#answered) return;
     this.#answered = number;
     this.#plans += 1;
-    Object.assign(this, { routes: found, open, grid: null, chosen: 0 });
+    Object.assign(this, { routes: found, open, grid: null, chosen: 0, lit: -1 });
     this.show(asked.brief);
     if (problem) this.page.say(problem.message, true);
   }
@@ -184,21 +205,22 @@ export class Routes {
 
   async alternatives() {
     if (!this.hasEnds) {
-      this.page.say("Set a start and a goal first", true);
+      this.page.say(t("ends-first"), true);
       return;
     }
-    this.page.say("Looking for routes…");
+    this.page.say(t("searching"));
     const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value) }));
     if (!found) return;
-    if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
+    this.page.say("");
+    if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null, lit: -1 });
     this.show();
-    const note = found.note.charAt(0).toUpperCase() + found.note.slice(1);
-    if (found.routes.length) this.byId("others-note").textContent = note;
-    else this.page.say(`No routes: ${found.note}`, true);
+    const note = said(found.note);
+    if (found.routes.length) this.byId("others-note").textContent = note.charAt(0).toUpperCase() + note.slice(1);
+    else this.page.say(t("no-others", note), true);
   }
 
   choose(at) {
-    this.chosen = at;
+    Object.assign(this, { chosen: at, lit: -1 });
     this.#takeEnds();
     this.show();
     this.byId("others").children[at]?.focus();
@@ -230,42 +252,109 @@ export class Routes {
     this.#showCards();
     this.byId("others-note").textContent = "";
     this.page.floors.note();
-    if (route) this.page.say(route.solved ? "" : `No route: ${route.status}`, !route.solved);
+    this.#place(Boolean(route?.solved));
+    if (route && !route.solved) this.page.say(t("no-route", said(route.status)), true);
+  }
+
+  // On a phone the way stands above the controls: it is what somebody reads while walking.
+  #place(isRouted) {
+    document.documentElement.classList.toggle("routed", isRouted);
+    const [result, modes, home] = ["result", "modes", "route"].map(this.byId);
+    const isFirst = isRouted && phone.matches;
+    const [place, side] = !isFirst ? [home, "after"] : [modes, settings.face === "staff" ? "after" : "before"];
+    const beside = side === "after" ? result.previousElementSibling : result.nextElementSibling;
+    if (beside !== place) place[side](result); // a move takes the focus away
+    if (isFirst) this.byId("panel").scrollTop = 0;
   }
 
   #showFigures(route) {
-    const rows = [];
-    if (route?.solved) {
-      const isDearer = route.metric === "weighted" || route.rides?.length > 0; // a cost, not a length
-      rows.push(["length", `${metres(route.length_m)} ${route.metric === "weighted" ? "" : METRICS[route.metric] ?? ""}`]);
-      rows.push(...this.#ridesOf(route));
-      if (isDearer) rows.push(["cost", metres(route.cost)]);
-      const isOptimal = route.gap !== null && route.gap < 1e-9;
-      rows.push(["bound", `${metres(route.lower_bound)}: nothing is ${isDearer ? "cheaper" : "shorter"}`]);
-      rows.push(["gap", isOptimal ? "0 %, proved optimal" : `${(100 * route.gap).toFixed(2)} %`]);
-      if (this.open?.solved) rows.push(["detour", `${metres(amountOf(route) - amountOf(this.open))} more than ${metres(amountOf(this.open))}`]);
-      if (this.grid?.solved) rows.push(["grid", `${metres(amountOf(this.grid))} on the cells of the whole grid`]);
-      rows.push(["time", `${timeOf(route.seconds)} to plan`]);
-    }
+    const rows = !route?.solved ? [] : settings.face === "staff" ? this.#rowsForStaff(route) : this.#rowsForRobot(route);
     const text = JSON.stringify(rows);
     if (text === this.#last) return;
     this.#last = text;
     this.byId("figures").replaceChildren(
-      ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+      ...rows.flatMap(([name, value]) => [element("dt", {}, t(name)), element("dd", {}, value)]));
+  }
+
+  #rowsForStaff(route) {
+    const rows = [["length", shortly(route)]];
+    const more = this.open?.solved ? amountOf(route) - amountOf(this.open) : 0;
+    if (more > 0.5) rows.push(["detour", t("detour-staff", someMetres(more))]);
+    return rows;
+  }
+
+  #rowsForRobot(route) {
+    const isDearer = route.metric === "weighted" || route.rides?.length > 0; // a cost, not a length
+    const isOptimal = route.gap !== null && route.gap < 1e-9;
+    const rows = [["length", `${metres(route.length_m)} ${route.metric === "weighted" ? "" : t(route.metric)}`], ...this.#ridesOf(route)];
+    if (isDearer) rows.push(["cost", metres(route.cost)]);
+    rows.push(["bound", t("bound-is", metres(route.lower_bound), t(isDearer ? "cheaper" : "shorter"))]);
+    rows.push(["gap", isOptimal ? t("optimal") : `${written(100 * route.gap, 2)} %`]);
+    if (this.open?.solved) rows.push(["detour", t("detour-is", metres(amountOf(route) - amountOf(this.open)), metres(amountOf(this.open)))]);
+    if (this.grid?.solved) rows.push(["grid", t("grid-is", metres(amountOf(this.grid)))]);
+    return [...rows, ["time", t("time-is", timeOf(route.seconds))]];
   }
 
   #ridesOf(route) {
     const { floors } = this.page;
-    const rides = (route.rides ?? []).map((ride) => ["ride", `${ride.link}, floor ${floors.nameOf(ride.from)} to ${floors.nameOf(ride.to)}: ${Math.round(ride.seconds)} s, charged ${metres(ride.charge_m)}`]);
-    return route.travel_s === undefined ? rides : [...rides, ["travel", `${Math.round(route.travel_s)} s`]];
+    const rides = (route.rides ?? []).map((ride) => ["ride", t("ride-is", ride.link, floors.nameOf(ride.from), floors.nameOf(ride.to), Math.round(ride.seconds), metres(ride.charge_m))]);
+    return route.travel_s === undefined ? rides : [...rides, ["travel", t("seconds", Math.round(route.travel_s))]];
   }
 
   #showWay(route) {
     const steps = route?.rides
-      ? route.parts.flatMap((part, at) => [`floor ${this.page.floors.nameOf(part.floor)}`, route.rides[at]?.link])
-      : (route?.legs ?? []).flatMap((leg) => [leg.room, leg.door && `door ${leg.door}`]);
+      ? route.parts.flatMap((part, at) => [t("on-floor", this.page.floors.nameOf(part.floor)), route.rides[at]?.link])
+      : (route?.legs ?? []).flatMap((leg) => [leg.room ?? t(`shape-${leg.shape}`), leg.door && t("door-n", leg.door)]);
     this.byId("way").textContent = steps.filter(Boolean).join(" → ");
-    this.byId("words").replaceChildren(...(route?.words ?? []).map((line) => element("li", {}, line)));
+    const names = [this.ends.start, this.ends.goal].map((end) => end?.name ?? end?.text ?? "");
+    this.byId("trip").textContent = route?.solved && names[0] ? t("trip", ...names) : "";
+    this.byId("words").replaceChildren(...(route?.words ?? []).map((line, at) => {
+      const button = element("button", { type: "button", onclick: () => this.goTo(at) }, line.text);
+      for (const [kind, lit] of [["mouseenter", at], ["focus", at], ["mouseleave", -1], ["blur", -1]]) button.addEventListener(kind, () => this.light(lit));
+      return element("li", {}, button);
+    }));
+  }
+
+  // --- a line of the words, and what it is about
+
+  get lines() {
+    return this.routes[this.chosen]?.words ?? [];
+  }
+
+  // What a line is about on the floor that is shown: its door, or the place where one follows it.
+  spotOf(line) {
+    if (line?.floor !== this.page.floors.at) return null;
+    const door = this.page.map.rooms.doors.find((each) => each.number === line.door);
+    return { at: door?.at ?? line.at, door: line.door };
+  }
+
+  // Light a line and its door on the map; -1 for none.
+  light(at) {
+    if (at === this.lit) return;
+    this.lit = at;
+    const items = this.byId("words").children;
+    for (const [number, item] of [...items].entries()) item.classList.toggle("lit", number === at);
+    this.page.canvas.dataset.lit = at < 0 ? "" : `${at} ${this.lines[at].door ?? ""}`;
+    this.page.scene.draw();
+  }
+
+  // Light the line that is about a point of the screen; return whether there is one.
+  lightAt(at) {
+    const { scene } = this.page;
+    const away = (line) => {
+      const spot = this.spotOf(line);
+      return spot ? Math.hypot(...scene.toScreen(spot.at).map((value, axis) => value - at[axis])) : Infinity;
+    };
+    const least = Math.min(...this.lines.map(away));
+    const found = least < 14 ? this.lines.findLastIndex((line) => away(line) === least) : -1;
+    this.light(found);
+    return found >= 0;
+  }
+
+  async goTo(at) {
+    await this.page.showFloor(this.lines[at].floor);
+    this.page.scene.reveal(this.spotOf(this.lines[at]).at);
+    this.light(at);
   }
 
   #showCards() {
@@ -273,8 +362,9 @@ export class Routes {
     const cards = this.routes.length < 2 ? [] : this.routes.map((route, at) => {
       const colour = ROUTE_COLOURS[this.page.scene.theme][at % 5];
       const isOther = at && !route.start && route.solved && shortest.solved; // between the same ends
-      const more = isOther ? `, ${metres(amountOf(route) - amountOf(shortest))} more` : "";
-      const text = route.solved ? metres(amountOf(route)) + more : `no route: ${route.status}`;
+      const more = isOther ? metres(amountOf(route) - amountOf(shortest)) : "";
+      const long = !route.solved ? "" : settings.face === "staff" ? shortly(route) : metres(amountOf(route));
+      const text = !route.solved ? t("no-route", said(route.status)) : more && settings.face === "robot" ? t("more", long, more) : long;
       const line = picture(`<path d="M2 4h22" stroke="${colour}" stroke-width="4" stroke-linecap="round"/>`);
       return element("button", { className: "route-card", ariaPressed: String(at === this.chosen), onclick: () => this.choose(at) },
         line, element("span", {}, text), element("small", {}, passagesOf(route)));

@@ -5,6 +5,7 @@ const TILE = 256;
 const MOST_TILES = 600;
 const LEAST_SCALE = 0.005;
 const MOST_SCALE = 64;
+const [ABOVE, BELOW] = [56, 52]; // pixels that the controls and the scale bar take
 
 export class Scene {
   middle = [0, 0];
@@ -58,10 +59,32 @@ export class Scene {
 
   fit() {
     const [left, right, bottom, top] = this.map.known;
-    this.middle = [(left + right) / 2, (bottom + top) / 2];
-    const room = Math.min(this.width / (right - left), this.height / (top - bottom));
-    this.#move({ scale: this.#clamped(0.94 * room) });
+    this.#fit(left, right, bottom, top);
     this.#isWhole = true;
+  }
+
+  // Fit a box between the controls above and the scale bar below.
+  #fit(left, right, bottom, top) {
+    const [wide, high] = [0.94 * this.width, Math.max(this.height - ABOVE - BELOW, 0.5 * this.height)];
+    const scale = this.#clamped(Math.min(wide / (right - left), high / (top - bottom)));
+    const down = (Math.min(ABOVE, this.height / 4) - Math.min(BELOW, this.height / 4)) / 2;
+    this.#move({ middle: [(left + right) / 2, (bottom + top) / 2 + down / scale], scale });
+  }
+
+  // Show all of a line, unless it can be seen as it is.
+  frame(points) {
+    const isIn = ([x, y]) => x > 20 && y > ABOVE && x < this.width - 20 && y < this.height - BELOW;
+    const [[left, right], [bottom, top]] = [0, 1].map((axis) => points.map((point) => point[axis])).map((values) => [Math.min(...values), Math.max(...values)]);
+    const least = 6 / this.map.resolution_m; // cells: a short way is seen with what lies round it
+    const isSmall = Math.max(right - left, top - bottom, least) * this.scale < 100;
+    if (points.every((point) => isIn(this.toScreen(point))) && !isSmall) return;
+    this.#fit(left - least / 2, right + least / 2, bottom - least / 2, top + least / 2);
+  }
+
+  // Move a point into view, unless it is.
+  reveal(point) {
+    const [x, y] = this.toScreen(point);
+    if (x < 20 || y < 20 || x > this.width - 20 || y > this.height - 40) this.#move({ middle: point });
   }
 
   #move(place) {
