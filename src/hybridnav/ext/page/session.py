@@ -6,6 +6,7 @@ import hashlib
 import json
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
@@ -13,7 +14,6 @@ from hybridnav.errors import HybridNavError, InvalidValueError, RoomsError
 from hybridnav.ext.page.drawing import PagePlanning, in_metres, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
-from hybridnav.maps import RoomLabels
 from hybridnav.topology.rooms.files import save_rooms
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.page.requests import Change, Edit, Save
     from hybridnav.ext.page.tiles import Layer
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Preset
     from hybridnav.planner.saved import Model
@@ -295,7 +295,7 @@ def _numbered(rooms: Rooms) -> RoomLabels:
     them."""
     labels = rooms.labels
     doors = {door.number: door.position for door in rooms.doors if not door.is_gap}
-    return RoomLabels(labels.names, labels.label_of, labels.points, {**labels.doors, **doors})
+    return replace(labels, doors={**labels.doors, **doors})
 
 
 # The file of rooms, and the journal that keeps changes until they are saved.

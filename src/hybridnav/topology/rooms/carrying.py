@@ -209,8 +209,9 @@ def carry_names(
         is_free = new_grid.measured[_inside(new_grid, np.array([at]))[0]] == CellClass.FREE
         if is_free.all() and is_free.size and (name not in old.names or room == name):
             kept[name] = at
+    uses = {name: use for name, use in old.uses.items() if rooms[name].status == "carried"}
     return CarriedNames(
-        RoomLabels(names, new.label_of, kept, door_points),
+        RoomLabels(names, new.label_of, kept, door_points, uses),
         transform_of(found.best, one, other),
         "",
         MappingProxyType(rooms),
