@@ -432,7 +432,7 @@ class Privacy:
         from scipy import ndimage  # noqa: PLC0415 - on demand
 
         grid = here.grid
-        box = ndimage.find_objects(here.rooms.label_of == label)[0]
+        box = ndimage.find_objects((here.rooms.label_of == label).astype(np.int8))[0]
         own = here.open_but(shut)[box] & (here.rooms.label_of[box] == label)
         radius = self.profile.turn_m / 2 / grid.resolution_m
         near = within_radius(grid.measured == CellClass.OCCUPIED, radius_cells=radius)[box]

@@ -129,6 +129,7 @@ class Tour:
         return parts[0] | {
             "status": str(self.status),
             "goal": parts[-1]["goal"],
+            "settings": parts[-1]["settings"],
             "length_m": self.length_m if self.solved else None,
             "duration_s": self.duration_s,
             "cost": self.cost if self.solved else None,

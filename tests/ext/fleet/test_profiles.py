@@ -101,6 +101,7 @@ class Oracle:
         return (1.0 if use.corridor else away) * (use.cost if self.profile.costs else 1.0)
 
     def node_of(self, floor: str, point: tuple[float, float]) -> Node:
+        """The cell of a point."""
         index = [each.name for each in self.floors].index(floor)
         row, col = self.grids[index].frame.cell_of(*point)
         return index, int(row), int(col)
@@ -136,7 +137,7 @@ class Oracle:
         own = {self.room_at(start), self.room_at(goal)}
         part_of, graph = self.parts()
         room = nx.get_node_attributes(graph, "room")
-        least, found = math.inf, set()
+        least, found = math.inf, set[tuple[int, int] | None]()
         ways = nx.all_simple_paths(graph, part_of[start], part_of[goal])
         for way in [[part_of[start]]] if part_of[start] == part_of[goal] else ways:
             text = "".join("u" if room[part] is None else "p" for part in way)
@@ -202,7 +203,7 @@ def test_costs_are_those_of_a_search_of_all_cells(seed: int) -> None:
                 for cell in result.path.cells.tolist()
             }
             assert passed - {None} <= oracle.opened(start, goal)
-            others = building.alternatives(*ends, 3, profile=profile)
+            others = building.alternatives(ends[0], ends[1], 3, profile=profile)
             assert others[0].cost == plan.cost
         else:
             assert math.isinf(plan.lower_bound)
@@ -214,7 +215,10 @@ def test_private_rooms_are_open_again_without_profile() -> None:
     building = random_house(rng)
     free = Profile(name="free", through_private=True, costs=False)
     for _ in range(20):
-        ends = [(f.name, somewhere(f, rng)) for f in rng.permutation(np.array(building.floors, dtype=object))]
+        ends = [
+            (f.name, somewhere(f, rng))
+            for f in rng.permutation(np.array(building.floors, dtype=object))
+        ]
         plain, under = building.plan(*ends), building.plan(*ends, profile=free)
         assert under.cost == plain.cost
         assert under.profile == "free"
