@@ -128,6 +128,7 @@ ProfileOption = Annotated[
         "private rooms, costs of rooms, widths and stairs.",
     ),
 ]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 FrameOption = Annotated[
     T, typer.Option("--frame", metavar="NAME", help="Name of the map's frame in the file.")
 ]

@@ -88,6 +88,7 @@ SpacingOption = Annotated[
 def export(
     map_file: options.MapOrBuildingArgument,
     out: options.OutOption[Path | None] = None,
+    force: options.ForceOption = False,
     bundle: BundleOption = None,
     costs: options.CostsOption = None,
     operations: OperationsOption = False,
@@ -121,7 +122,7 @@ def export(
     """
     others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
-    out = bundle or _checked_out(kind, out)
+    out = bundle or _checked_out(kind, out, force=force)
     _check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
@@ -218,6 +219,7 @@ def _export_over_floors(
     *,
     map_file: Path,
     out: Path | None,
+    force: bool,
     kind: str,
     style: str,
     nodes: int | None,
@@ -230,7 +232,7 @@ def _export_over_floors(
     reading: MapOptions,
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    out = _checked_out(kind, out)
+    out = _checked_out(kind, out, force=force)
     _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
@@ -292,13 +294,15 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _checked_out(kind: str, out: Path | None) -> Path:
-    """Refuse formats that are none, and files of other ones."""
+def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
+    """Refuse formats that are none, files of other ones, and files that exist."""
     if out is None:
         raise UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
+    if out.exists() and not force:
+        raise UsageError(f"{printable(out)} exists: add --force to write over it")
     return out
 
 
