@@ -59,14 +59,11 @@ def closed(
 
     def check(item: OutOfOrder) -> None:
         """Refuse what is not on the map."""
-        if item.link is not None or item.floor is not None:
-            raise UsageError(f"{item.what} is of a building, and this is one map: leave it out")
         settings = reading.settings(map_file)
         model = load_model(map_file, settings, {}, reading)
         beside = map_file.parent / "rooms.yaml"
         file = rooms_file or (beside if beside.is_file() else None)
-        topology = grow_topology(model, settings, {}, rooms_file=file, find_rooms=True)
-        item.blocked.cells_of(topology)
+        item.check_on(grow_topology(model, settings, {}, rooms_file=file, find_rooms=True))
 
     change_closed(map_file, close or (), open_again or (), why, check=check)
     list_closed(map_file, as_json=as_json)

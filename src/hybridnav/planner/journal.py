@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import PathLike
+    from hybridnav.topology import TopologicalMap
 
 _ENDING = ".closed.yaml"
 _WHAT = re.compile(
@@ -94,6 +95,18 @@ class OutOfOrder:
         """The closure of the door or the room."""
         door, room = self._parts["door"], self._parts["room"]
         return Blocked(doors=[int(door)] if door else [], rooms=[room] if room else [])
+
+    def check_on(self, topology: TopologicalMap) -> None:
+        """Refuse what is not on a map without floors.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such door or room, or it is of a building.
+        """
+        if self.link is not None or self.floor is not None:
+            raise InvalidValueError(f"{self.what} is of a building, and this is one map")
+        self.blocked.cells_of(topology)
 
 
 class Journal:

@@ -174,8 +174,8 @@ class HybridPlanner:
         >>> print(visitor.plan("hall", "ward").status)
         solved
         """
-        from hybridnav.planner.private_rooms import Privacy, ProfiledFloor  # noqa: PLC0415 - rare
-        from hybridnav.planner.profile import profile_of, under_profile  # noqa: PLC0415
+        from hybridnav.planner.private_rooms import Privacy  # noqa: PLC0415 - rare
+        from hybridnav.planner.profile import ProfiledFloor, profile_of, under_profile  # noqa: PLC0415
 
         chosen, now = profile_of(profile), self._now
         kept = self._profiled.get(chosen)
@@ -185,7 +185,7 @@ class HybridPlanner:
             found = under_profile(own, self.preset, given, chosen, by_costs=by_costs)
             if (found[0], found[2]) != (own, given):
                 made = HybridPlanner(found[0], preset=found[1], costs=found[2])
-            floor = ProfiledFloor(made.grid, own.rooms.labels, self.preset.planner.allow_unexplored)
+            floor = ProfiledFloor.of(found[0], chosen, found[1].planner)
             vars(made).update(_privacy=Privacy(chosen, [floor], whole=self), _profiled={})
             kept = self._profiled[chosen] = now, made
         return kept[1]

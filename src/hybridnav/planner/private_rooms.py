@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from hybridnav.maps import NO_ROOM, CellClass
 from hybridnav.maps.clearance import within_radius
 from hybridnav.planner.blocked import Blocked
-from hybridnav.planner.profile import forbidden, in_the_way
+from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planning import Planning
     from hybridnav.planner.profile import Profile
@@ -191,42 +190,6 @@ _KEPT = 32
 """Number of closures, and of grounds, that are kept."""
 
 
-@dataclass(frozen=True, eq=False)
-class ProfiledFloor:
-    """What decides about private rooms on a map."""
-
-    grid: OccupancyGrid
-    rooms: RoomLabels | None
-    allow_unexplored: bool
-
-    def label_at(self, waypoint: ArrayLike | str) -> int:
-        """Return the room that a point or a name lies in, -1 for none."""
-        if self.rooms is None:
-            return NO_ROOM
-        if isinstance(waypoint, str) and waypoint in self.rooms.names:
-            return self.rooms.names.index(waypoint)
-        row, col = self.cell_at(waypoint)
-        rows, cols = self.grid.shape
-        is_inside = 0 <= row < rows and 0 <= col < cols
-        return int(self.rooms.label_of[row, col]) if is_inside else NO_ROOM
-
-    def cell_at(self, waypoint: ArrayLike | str) -> tuple[int, int]:
-        """Return the cell of a point, or of a named one."""
-        if isinstance(waypoint, str):
-            assert self.rooms is not None  # noqa: S101 - names have been checked
-            waypoint = self.rooms.points[waypoint]
-        x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
-        return self.grid.frame.cell_of(x, y)
-
-    def open_but(self, shut: ClosedCells | None) -> BoolArray:
-        """Return the cells that may be entered, bool (rows, cols)."""
-        is_open = self.grid.enterable(allow_unexplored=self.allow_unexplored)
-        if shut is not None:
-            is_open = is_open.copy()
-            is_open.ravel()[shut.flat] = False
-        return is_open
-
-
 End = tuple[int, "ArrayLike | str"]
 """The index of a floor, and a point or a name on it."""
 
@@ -266,12 +229,14 @@ class Privacy:
         self._joined: dict[tuple[Any, ...], ClosedCells] = {}
 
     def rooms_closed(self, floor: int, opened: Collection[tuple[int, int]] = ()) -> Blocked | None:
-        """Return the private rooms of a floor but those that are opened; None for none."""
+        """Return the private rooms of a floor but those that are opened, and the doors that are
+        too narrow; None for none."""
         rooms = self._floors[floor].rooms
         labels = [one for one in sorted(self._private[floor]) if (floor, one) not in opened]
-        if rooms is None or not labels:
+        narrow = self._floors[floor].narrow
+        if rooms is None or not (labels or narrow):
             return None
-        return Blocked(rooms=[rooms.names[label] for label in labels])
+        return Blocked(rooms=[rooms.names[label] for label in labels], doors=narrow)
 
     def blocked(
         self,

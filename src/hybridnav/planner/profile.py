@@ -7,7 +7,7 @@ width. What is planned under it is proved for that problem.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -22,11 +22,17 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.planner import Preset
+    from hybridnav.planner import PlannerSettings, Preset
+    from hybridnav.search.found import ClosedCells
     from hybridnav.topology.rooms import Door
 
 _MOST_ELSEWHERE, _MOST_M = 10.0, 100.0
+_ROUNDING_M = 1e-6
+"""Metres by which widths are equal: a door as wide as a profile is passed."""
 _MOST_NAMED = 5
 """Rooms, and doors, that a message names."""
 _BY_COSTS = "grid-astar"
@@ -157,8 +163,9 @@ def under_profile(
         one method. Where the preset knows lengths only, the cells of the whole map are searched.
     """
     grid, built = topology.grid, topology.pyramid
-    if profile.width_m is not None and profile.width_m / 2 != grid.robot_radius_m:
-        grid = replace(grid, robot_radius_m=profile.width_m / 2, radius_is_default=False)
+    if profile.width_m is not None:
+        radius_m = max(profile.width_m / 2 - _ROUNDING_M, 0.0)
+        grid = replace(grid, robot_radius_m=radius_m, radius_is_default=False)
         topology = TopologicalMap(
             DualGraphPyramid.build(
                 grid,
@@ -176,6 +183,55 @@ def under_profile(
             section = planner_settings(_BY_COSTS, allow_unexplored=allowed)
             preset = preset.model_copy(update={"planner": section})
     return topology, preset, given
+
+
+@dataclass(frozen=True, eq=False)
+class ProfiledFloor:
+    """What decides about private rooms on a map."""
+
+    grid: OccupancyGrid
+    rooms: RoomLabels | None
+    allow_unexplored: bool
+    narrow: tuple[int, ...] = ()
+    """Numbers of doors that are closed because the profile is wider."""
+
+    @classmethod
+    def of(cls, topology: TopologicalMap, profile: Profile, settings: PlannerSettings) -> Self:
+        """Return that of a map for the width of a profile. A disc passes some doors that are less
+        than a cell narrower than it: these are closed."""
+        rooms, narrow = topology.pyramid.rooms, list[int]()
+        if rooms is not None and profile.width_m is not None:
+            least_m = profile.width_m - _ROUNDING_M
+            doors = [door for door in topology.rooms.listed_doors if door.passable]
+            narrow = [door.number for door in doors if door.width_m < least_m]
+        return cls(topology.grid, rooms, settings.allow_unexplored, tuple(narrow))
+
+    def label_at(self, waypoint: ArrayLike | str) -> int:
+        """Return the room that a point or a name lies in, -1 for none."""
+        if self.rooms is None:
+            return NO_ROOM
+        if isinstance(waypoint, str) and waypoint in self.rooms.names:
+            return self.rooms.names.index(waypoint)
+        row, col = self.cell_at(waypoint)
+        rows, cols = self.grid.shape
+        is_inside = 0 <= row < rows and 0 <= col < cols
+        return int(self.rooms.label_of[row, col]) if is_inside else NO_ROOM
+
+    def cell_at(self, waypoint: ArrayLike | str) -> tuple[int, int]:
+        """Return the cell of a point, or of a named one."""
+        if isinstance(waypoint, str):
+            assert self.rooms is not None  # noqa: S101 - names have been checked
+            waypoint = self.rooms.points[waypoint]
+        x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
+        return self.grid.frame.cell_of(x, y)
+
+    def open_but(self, shut: ClosedCells | None) -> BoolArray:
+        """Return the cells that may be entered, bool (rows, cols)."""
+        is_open = self.grid.enterable(allow_unexplored=self.allow_unexplored)
+        if shut is not None:
+            is_open = is_open.copy()
+            is_open.ravel()[shut.flat] = False
+        return is_open
 
 
 # Why there is no route.

@@ -20,7 +20,7 @@ from hybridnav.ext.fleet.checks import (
 from hybridnav.ext.fleet.floors import FloorTable, building_parts
 from hybridnav.ext.fleet.links import LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
-from hybridnav.ext.fleet.profiles import floors_under, links_under, reason_under
+from hybridnav.ext.fleet.profiles import floors_under, links_under, profiled, reason_under
 from hybridnav.ext.fleet.search import LinkSearch
 from hybridnav.maps.names import place_of_name
 from hybridnav.planner.blocked import as_blocked
@@ -362,7 +362,7 @@ class Building:
             floors = floors_under(self.floors, profile)
             links = links_under(self.links, {floor.name: floor for floor in floors}, profile)
             made = Building(floors, links, speed_m_s=self.speed_m_s)
-            own = Privacy(profile, [floor.profiled for floor in floors])
+            own = Privacy(profile, profiled(floors, profile))
             shut = [
                 table.closing(table.floor.planner.closed(own.rooms_closed(number)))
                 for number, table in enumerate(made._current())

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import LongArray
     from hybridnav.ext.fleet.links import LinkEnd
+    from hybridnav.planner import OutOfOrder
     from hybridnav.search.found import ClosedCells
 
 
@@ -127,6 +128,24 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
     else:
         why = f"lies in an {cell.name.lower()} cell"
     raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
+
+
+def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Link]) -> None:
+    """Refuse to close what is not in a building.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no such link, floor, door or room, or a door or a room lacks its floor.
+    """
+    names = tuple(floor.name for floor in floors)
+    if item.link is not None:
+        place_of_name(item.link, tuple(link.name for link in links), "link")
+    elif item.floor is None:
+        raise InvalidValueError(f"{item.what} needs its floor, as {names[0]}:{item.what}")
+    else:
+        floor = floors[place_of_name(item.floor, names, "floor")]
+        item.blocked.cells_of(floor.planner.topology)
 
 
 class FloorParts(NamedTuple):

@@ -12,7 +12,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
-from hybridnav.planner.private_rooms import ProfiledFloor
 from hybridnav.planner.profile import PROFILES, Profile
 from hybridnav.planner.saved.container import buffers_of
 from hybridnav.planner.saved.parts import plain
@@ -76,14 +75,6 @@ class Floor:
     def rooms(self) -> RoomLabels | None:
         """The rooms of its map; None without rooms, or while its places are stale."""
         return self.planner.pyramid_rooms
-
-    @property
-    def profiled(self) -> ProfiledFloor:
-        """What decides about its private rooms."""
-        planner = self.planner
-        return ProfiledFloor(
-            planner.grid, planner.pyramid_rooms, planner.preset.planner.allow_unexplored
-        )
 
 
 class Known(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.planner import HybridPlanner
-from hybridnav.planner.profile import forbidden, in_the_way, under_profile
+from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way, under_profile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -45,6 +45,12 @@ def floors_under(floors: Sequence[Floor], profile: Profile) -> list[Floor]:
                 before if is_same else HybridPlanner(topology, preset=preset, costs=costs)
             )
     return [replace(floor, planner=made[floor.planner]) for floor in floors]
+
+
+def profiled(floors: Sequence[Floor], profile: Profile) -> list[ProfiledFloor]:
+    """Return what decides about private rooms on floors with planners as wide as a profile."""
+    planners = [floor.planner for floor in floors]
+    return [ProfiledFloor.of(one.topology, profile, one.preset.planner) for one in planners]
 
 
 def links_under(links: Sequence[Link], floors: Mapping[str, Floor], profile: Profile) -> list[Link]:

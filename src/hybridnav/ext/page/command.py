@@ -138,6 +138,7 @@ class MapPage:
     file: RoomsFile
     rooms: hn.RoomLabels | None
     costs: hn.CostLayer | None
+    journal: hn.Journal
 
     @classmethod
     def read(cls, file: Path, rooms_file: Path | None, costs: Costs, reading: MapOptions) -> Self:
@@ -153,7 +154,7 @@ class MapPage:
         path = file.parent / _ROOMS if rooms_file is None else rooms_file
         kept = RoomsFile(path.parent, path.name)
         rooms = hn.load_rooms(path, model.grid) if path.exists() else model.rooms
-        return cls(model, settings, kept, rooms, costs.read(model.grid))
+        return cls(model, settings, kept, rooms, costs.read(model.grid), hn.Journal(file))
 
     @property
     def folder(self) -> Path:
@@ -179,7 +180,14 @@ class MapPage:
         tell("building places")
         topology = self.model.grown(self.settings.pyramid, rooms)
         return Site.of_map(
-            Session(self.model, topology, self.settings, costs=self.costs, file=self.file)
+            Session(
+                self.model,
+                topology,
+                self.settings,
+                costs=self.costs,
+                file=self.file,
+                journal=self.journal,
+            )
         )
 
 

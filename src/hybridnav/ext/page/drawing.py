@@ -11,7 +11,14 @@ import shapely
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.planner import Blocked, load_preset, plan_alternatives, plan_tour, preset_names
+from hybridnav.planner import (
+    Blocked,
+    PlanResult,
+    load_preset,
+    plan_alternatives,
+    plan_tour,
+    preset_names,
+)
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
@@ -30,7 +37,7 @@ if TYPE_CHECKING:
     )
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
+    from hybridnav.planner import HybridPlanner, Journal, Preset, Tour
     from hybridnav.planner.saved import Model
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -220,6 +227,8 @@ class PagePlanning:
         self._model, self._settings, self._costs = model, settings, costs
         self._planners: dict[str, HybridPlanner] = {}
         self._making = threading.Lock()
+        self.journal: Journal | None = None
+        """What is closed for all queries until it is opened again."""
 
     @property
     def presets(self) -> list[str]:
@@ -256,7 +265,7 @@ class PagePlanning:
 
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
-        planner, points = self.planner(query.preset), self._points(query)
+        planner, points = self._under(query), self._points(query)
         closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
@@ -266,7 +275,12 @@ class PagePlanning:
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
         points, closed = self._points(query), self._closed(query)
-        return self.planner(query.preset).plan(*points, blocked=closed)
+        return self._under(query).plan(*points, blocked=closed)
+
+    def _under(self, query: PathQuery) -> HybridPlanner:
+        """Return the planner of the preset of a query, under its profile."""
+        planner = self.planner(query.preset)
+        return planner if query.profile is None else planner.under(query.profile)
 
     def kept(self) -> HybridPlanner:
         """Return what a model of the map holds."""
@@ -280,7 +294,7 @@ class PagePlanning:
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by other doors."""
         start, goal = self._points(query)
-        planner, closed = self.planner(query.preset), self._closed(query)
+        planner, closed = self._under(query), self._closed(query)
         found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
@@ -300,7 +314,9 @@ class PagePlanning:
     def _closed(self, query: PathQuery) -> Blocked | None:
         if query.closed.links:
             raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
-        return next(map(self.blocked, query.closed.floors), None)
+        asked = next(map(self.blocked, query.closed.floors), None)
+        shut = None if self.journal is None else self.journal.closures()
+        return asked | shut if asked and shut else asked or shut
 
     def blocked(self, closed: FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
@@ -349,8 +365,12 @@ class PagePlanning:
 def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the figures of a plan, and its lines floor by floor; None stands for what is not
     finite."""
+    why = plan.note if not isinstance(plan, PlanResult) else ""
+    if isinstance(plan, PlanResult):
+        why = plan.settings.get("profile", {}).get("forbids", "")
     return {
         "status": str(plan.status),
+        "why": why,
         "solved": plan.solved,
         "metric": plan.metric,
         "parts": parts,

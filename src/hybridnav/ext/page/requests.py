@@ -71,6 +71,7 @@ class PathQuery(_Strict):
     preset: _PresetName
     closed: Closed = Closed()
     stairs: bool = True
+    profile: Name | None = None
 
 
 class PlanQuery(PathQuery):
@@ -89,6 +90,14 @@ class PartQuery(PathQuery):
     """The part of a route on one floor, to be written."""
 
     floor: FloorNumber
+
+
+class Closing(_Strict):
+    """A link, door or room to close until it is opened again, or to open; see `OutOfOrder`."""
+
+    what: Name
+    closed: bool
+    why: Annotated[str, Field(max_length=200)] = ""
 
 
 class At(_Strict):

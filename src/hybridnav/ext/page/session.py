@@ -6,7 +6,7 @@ import hashlib
 import json
 import threading
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
@@ -14,17 +14,18 @@ from hybridnav.errors import HybridNavError, InvalidValueError, RoomsError
 from hybridnav.ext.page.drawing import PagePlanning, in_metres, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
+from hybridnav.planner import OutOfOrder
 from hybridnav.topology.rooms.files import save_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from hybridnav.ext.page.requests import Change, Edit, Save
+    from hybridnav.ext.page.requests import Change, Closing, Edit, Save
     from hybridnav.ext.page.tiles import Layer
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Preset
+    from hybridnav.planner import Journal, Preset, Profile
     from hybridnav.planner.saved import Model
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
@@ -52,6 +53,8 @@ class Session:
         Costs beside the presets, None for none.
     file
         The file of its rooms; None for rooms that cannot be saved.
+    journal
+        What is out of order on one map; None for none, and for a floor, whose building has it.
 
     Examples
     --------
@@ -64,7 +67,7 @@ class Session:
     6
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the last three have defaults
         self,
         model: Model,
         topology: TopologicalMap,
@@ -72,8 +75,10 @@ class Session:
         *,
         costs: CostLayer | None = None,
         file: RoomsFile | None = None,
+        journal: Journal | None = None,
     ) -> None:
         self._model, self._settings, self._costs = model, settings, costs
+        self.journal = journal
         self.grid = topology.grid
         self._file = file
         self._lock = threading.RLock()
@@ -98,6 +103,7 @@ class Session:
     def _use(self, topology: TopologicalMap) -> None:
         self._facts: dict[str, Any] | None = None
         self.planning = PagePlanning(self._model, topology, self._settings, self._costs)
+        self.planning.journal = self.journal
         for name in [name for name in self._layers if not name.startswith("costs-")]:
             del self._layers[name]
 
@@ -296,6 +302,55 @@ def _numbered(rooms: Rooms) -> RoomLabels:
     labels = rooms.labels
     doors = {door.number: door.position for door in rooms.doors if not door.is_gap}
     return replace(labels, doors={**labels.doors, **doors})
+
+
+# The profiles, and what is out of order until it is opened again.
+
+
+@dataclass(frozen=True)
+class Closings:
+    """The profiles that queries may name, and the journal of what is closed for all.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.page.session import Closings
+    >>> Closings((), hn.Journal("hospital.yaml"), lambda item: None).describe()["closed"]
+    []
+    """
+
+    profiles: Sequence[Profile]
+    journal: Journal | None
+    """None where nothing keeps what is closed."""
+    check: Callable[[OutOfOrder], None]
+    """Refuses to close what is not there."""
+
+    def describe(self, change: Closing | None = None) -> dict[str, Any]:
+        """Return the profiles with what they ask for, and what is out of order, after a change.
+
+        Parameters
+        ----------
+        change
+            What to close or to open; None for nothing.
+
+        Raises
+        ------
+        HybridNavError
+            When it is not there, or the journal cannot be read or written, or there is none.
+        """
+        journal = self.journal
+        if change is not None:
+            if journal is None or journal.path.resolve().parent != journal.path.parent.resolve():
+                raise InvalidValueError("nothing here keeps what is closed, in the folder of a map")
+            if change.closed:
+                self.check(OutOfOrder(change.what))
+                journal.close(change.what, why=change.why)
+            else:
+                journal.open(change.what)
+        return {
+            "profiles": [{"name": one.name, "asks": one.described} for one in self.profiles],
+            "closed": [] if journal is None else [asdict(item) for item in journal.items()],
+            "can_close": journal is not None,
+        }
 
 
 # The file of rooms, and the journal that keeps changes until they are saved.
