@@ -122,7 +122,7 @@ def export(
     """
     others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
-    out = bundle or _checked_out(kind, out, force=force)
+    out = bundle or _checked_out(kind, out)
     _check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
@@ -143,6 +143,7 @@ def export(
         )
     of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
     _check_style(style, of_roadmaps, {"--keep": keep})
+    _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -232,13 +233,14 @@ def _export_over_floors(
     reading: MapOptions,
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    out = _checked_out(kind, out, force=force)
+    out = _checked_out(kind, out)
     _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
             f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
         )
+    _check_taken(out, force=force)
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
 
     seconds: dict[str, float] = {}
@@ -294,16 +296,20 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
-    """Refuse formats that are none, files of other ones, and files that exist."""
+def _checked_out(kind: str, out: Path | None) -> Path:
+    """Refuse formats that are none, and files of other ones."""
     if out is None:
         raise UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
-    if out.exists() and not force:
-        raise UsageError(f"{printable(out)} exists: add --force to write over it")
     return out
+
+
+def _check_taken(out: Path, *, force: bool) -> None:
+    """Refuse to write over a file."""
+    if out.is_file() and not force:
+        raise UsageError(f"{printable(out)} exists: add --force to write over it")
 
 
 def _check_polylines(kind: str, *, given: bool, straight: bool) -> None:
