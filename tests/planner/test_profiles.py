@@ -1,5 +1,7 @@
 """Plans on one map under profiles: rooms, widths, room to turn, and what forbids a route."""
 
+import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError, RoomsError
 from hybridnav.planner import Profile
 
+OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 PRIVATE = hn.RoomUse(private=True)
 # A hall h, wards a and b with a bath c behind a; b has a narrow door to the hall.
 INK = (
@@ -170,3 +173,40 @@ def test_uses_that_are_none_are_refused(line: str, message: str, tmp_path: Path)
     assert message in str(caught.value)
     with pytest.raises(InvalidValueError, match="uses: no room is called 'attic'"):
         hn.RoomLabels(("hall",), np.zeros((2, 4), dtype=int), uses={"attic": PRIVATE})
+
+
+def test_no_route_of_a_visitor_leads_through_private_rooms_of_the_office() -> None:
+    """docs/building.md quotes these figures."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    labels = hn.find_rooms(grid)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    kinds = dict(zip(labels.names, topology.rooms.kinds, strict=True))
+    private = {name for name in labels.names if kinds[name] is None}
+    labels = replace(labels, uses=dict.fromkeys(private, PRIVATE))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    shown = [
+        name for name, is_one in zip(labels.names, topology.rooms.is_listed, strict=True) if is_one
+    ]
+    points = {name: topology.rooms.point_of(name) for name in shown}
+    planner = hn.HybridPlanner(topology)
+    visitor = planner.under(Profile(name="visitor"))
+
+    def passed(one: str, other: str, path: Any) -> set[str]:
+        found = set(labels.label_of[tuple(path.cells.T)].tolist()) - {-1}
+        return ({labels.names[label] for label in found} & private) - {one, other}
+
+    longer, n_pairs = [], 0
+    for one, other in itertools.combinations(shown, 2):
+        plain = planner.plan(points[one], points[other])
+        if not plain.solved:
+            continue
+        n_pairs += 1
+        under = visitor.plan(points[one], points[other])
+        assert under.solved
+        assert under.gap == 0
+        assert not passed(one, other, under.path)
+        if passed(one, other, plain.path):
+            longer.append(under.cost - plain.cost)
+        else:
+            assert under.cost == pytest.approx(plain.cost, abs=1e-9)
+    assert (n_pairs, len(longer)) == (231, 20)
