@@ -88,9 +88,9 @@ def opened(
 ) -> set[Any]:
     """Return the private rooms that must be crossed to leave those of start and goal.
 
-    They are few: of all ways out of the start's room through private rooms, to a public part, on
-    through public parts, and by private rooms into that of the goal, those that pass the fewest
-    private parts beside their ends. Of several such ways all are open. A way that enters private
+    They are few: a way leads out of the start's room through private rooms to a public part, on
+    through public parts, and by private rooms into that of the goal. Those ways count that pass the
+    fewest private parts beside their ends, and their rooms are open. A way that enters private
     rooms in its middle, between public parts, does not count.
 
     Parameters
