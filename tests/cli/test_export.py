@@ -74,8 +74,8 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
 
 def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
     def nodes(*more):
-        given = ("export", FIGURE, "-o", tmp_path / f"g.{more[1] if more else 'json'}")
-        given = (*given, "--json", "--force")
+        out = tmp_path / f"g.{more[1] if more else 'json'}"
+        given = ("export", FIGURE, "-o", out, "--json", "--force")
         return cli(*given, *SMALL[:2], *SMALL[4:], *more[2:]).answer["nodes"]
 
     near, far = nodes(), nodes("", "json", "--spacing", 2)

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from tests.ext.page.server import building_site_of, served, session_of, write_building
+from tests.ext.page.server import building_site_of, query_of, served, session_of, write_building
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -256,11 +256,7 @@ def test_what_is_out_of_order_and_who_goes_are_told_and_changed(
 
 
 def test_a_map_has_them_too(client: Client, folder: Path) -> None:
-    query = {
-        "start": {"floor": 0, "point": [10.5, 40.5]},
-        "goal": {"floor": 0, "point": [70.5, 10.5]},
-    }
-    query |= {"preset": "shortest"}
+    query = query_of([10.5, 40.5], [70.5, 10.5])
     assert client.post("plan", query).value["solved"]
     client.post("closed", {"what": "room:a", "closed": True})
     assert (folder / "four.closed.yaml").is_file()
