@@ -197,8 +197,7 @@ def carry_names(
     if found.best is None:
         return _nothing(old, old_grid, new, found.reason)
     moving = _Moving.of(old, found.best, one, other)
-    overlap = _Overlap.of(old, new, moving, one, other)
-    heir_of = _heirs(overlap)
+    heir_of = _heirs(overlap := _Overlap.of(old, new, moving, one, other))
     names, new_rooms = _names(old, new, {heir: room for room, heir in heir_of.items()})
     rooms = _rooms(old, new, overlap, heir_of, names)
     doors, door_points, new_doors = _doors((old, old_grid), (new, new_grid), moving, heir_of)
