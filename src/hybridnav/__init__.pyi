@@ -5,6 +5,7 @@ from .maps import (
     Frame as Frame,
     OccupancyGrid as OccupancyGrid,
     RoomLabels as RoomLabels,
+    RoomUse as RoomUse,
     drop_islands as drop_islands,
 )
 from .maps.costs import (
@@ -23,11 +24,14 @@ from .planner import (
     Alternatives as Alternatives,
     Blocked as Blocked,
     HybridPlanner as HybridPlanner,
+    Journal as Journal,
+    OutOfOrder as OutOfOrder,
     Path as Path,
     PlanBatch as PlanBatch,
     PlanResult as PlanResult,
     PlanStatus as PlanStatus,
     Preset as Preset,
+    Profile as Profile,
     Tour as Tour,
     export_path as export_path,
     export_places as export_places,

@@ -1,6 +1,7 @@
 """`hybridnav` with buildings of several floors: `plan`, `build`, `check`, `evaluate`, `export`."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -250,7 +251,7 @@ def sideways(tmp_path):
 )
 def test_floors_and_links_are_read_back(cli, sideways, more, links, monkeypatch):
     monkeypatch.chdir(sideways.parent)
-    given = ("--robot-radius", "0", "--spacing", "1", "--format", *more)
+    given = ("--robot-radius", "0", "--spacing", "1", "--force", "--format", *more)
     done = cli("export", sideways, *given, "--json")
     assert (done.code, done.err) == (0, "")
     read = hn.ext.fleet.load_building_graph(more[2])
@@ -281,3 +282,127 @@ def test_a_link_that_the_robot_does_not_fit_in_is_left_out(sideways):
     sideways.write_text(text)
     building = hn.ext.fleet.load_building(sideways, robot_radius_m=0.1)
     assert [link.name for link in hn.ext.fleet.building_graph(building).links] == ["ladder"]
+
+
+USES = {
+    "rooms-1.yaml": (("{name: hall,", "{name: hall, use: private,"),),
+    "rooms-2.yaml": (),
+}
+
+
+@pytest.fixture(scope="module")
+def office(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demonstration, with a private hall, a profile of its own, and a file of figure 1."""
+    folder = tmp_path_factory.mktemp("maps")
+    shutil.copytree(FIGURE.parents[1], folder, dirs_exist_ok=True)
+    file = folder / "building" / "building.yaml"
+    for name, changes in USES.items():
+        text = (file.parent / name).read_text()
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after)
+        (file.parent / name).write_text(text)
+    profiles = "profiles:\n- {name: bed, stairs: false, width_m: 1.2}\n- {name: visitor}\n"
+    file.write_text(file.read_text() + profiles)
+    return file
+
+
+def test_a_profile_is_planned_and_what_it_forbids_is_told(cli: Any, office: Path) -> None:
+    ends = "--from", "reception", "--to", "2.04"
+    staff = cli("plan", office, *ends, "--profile", "staff")
+    assert staff.code == 0
+    assert "profile    staff: all rooms, links and doors" in staff.out
+    assert "the route is optimal" in staff.out
+    visitor = cli("plan", office, *ends, "--profile", "visitor")
+    assert visitor.code == 1
+    assert visitor.out.splitlines()[1:4] == [
+        "profile    visitor: no private rooms on the way",
+        "reason     profile visitor forbids every route: the way is by private rooms (hall)",
+        "status     no path",
+    ]
+    plan = cli("plan", office, *ends, "--profile", "bed", "--json").answer
+    assert (plan["status"], plan["profile"]) == ("no path", "bed")
+    assert "private rooms and" in plan["note"]
+    assert "less than 1.20 m wide" in plan["note"]
+    unknown = cli("plan", office, *ends, "--profile", "nurse")
+    assert unknown.refuses(2, "no profile is called 'nurse'", "bed")
+
+
+def test_a_map_is_planned_under_a_profile(cli: Any, office: Path) -> None:
+    floor = office.parents[1] / "office" / "office.yaml"
+    rooms = "--rooms", office.parent / "rooms-1.yaml"
+    query = "plan", floor, *rooms, "--from", "reception", "--to", "west corridor", "--profile"
+    refused = cli(*query, "visitor")
+    assert refused.code == 1
+    assert "reason     profile visitor forbids every route" in refused.out
+    plan = cli(*query, "cart", "--json").answer
+    assert plan["status"] == "solved"
+    assert plan["settings"]["profile"] == {"name": "cart", "asks": "no stairs, 0.80 m wide"}
+    assert plan["gap"] == 0
+
+
+def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
+    lift = "link:north lift"
+    assert cli("closed", office).out == "closed     0\n"
+    done = cli("closed", office, "--close", lift, "--close", "1:door:17", "--why", "repair")
+    assert (
+        done.out.splitlines()[0] == f"closed     2, in {office.with_name('building.closed.yaml')}"
+    )
+    assert [line.rpartition(", ")[2] for line in done.out.splitlines()[1:]] == ["repair"] * 2
+    plan = cli("plan", office, "--from", "office 5", "--to", "2.04", "--json").answer
+    assert plan["blocked"] == [lift, "1:door:17"]
+    assert [ride["link"] for ride in plan["rides"]] == ["east stairs"]
+    assert cli("closed", office, "--open", "link:lift").refuses(2, "is not closed", lift)
+    opened = cli("closed", office, "--open", lift, "--json").answer
+    assert [item["what"] for item in opened["closed"]] == ["1:door:17"]
+    assert cli("closed", office, "--open", "all").out == "closed     0\n"
+    for what, *words in (
+        ("link:north lft", "did you mean north lift?"),
+        ("door:7", "door:7 needs its floor, as 1:door:7"),
+        ("3:door:7", "no floor is called '3'"),
+        ("2:room:2.4", "no room is called '2.4'"),
+        ("lift", "must be link:NAME, door:N or room:NAME"),
+    ):
+        assert cli("closed", office, "--close", lift, "--close", what).refuses(2, *words)
+    assert cli("closed", office).out == "closed     0\n"
+    assert cli("closed", office, "--why", "a").refuses(2, "--why is for --close")
+    assert cli("closed", office.with_name("none.yaml")).refuses(2, "there is no file")
+
+
+def test_a_map_has_a_journal_too(cli: Any, tmp_path: Path) -> None:
+    shutil.copytree(FIGURE.parent, tmp_path, dirs_exist_ok=True)
+    file = tmp_path / FIGURE.name
+    assert cli("closed", file, "--close", "link:lift").refuses(2, "is of a building")
+    assert cli("closed", file, "--close", "room:room-1").code == 0
+    query = "plan", file, "--start", "0.5,0.5", "--goal", "2.0,2.5", "--robot-radius", 0
+    assert "blocked    room:room-1" in cli(*query).out
+    (tmp_path / "figure1.closed.yaml").write_text("closed: [{what: 'link:lift'}]\n")
+    assert cli(*query).refuses(3, "link:lift is of a building, and this is one map")
+    (tmp_path / "figure1.closed.yaml").write_text("closed: [3]\n")
+    assert cli(*query).refuses(3, "figure1.closed.yaml, line 1: expected what, since and why")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("{name: a, widt_m: 1}", "unknown key 'widt_m'; known are name, through_private"),
+        ("{name: a, width_m: wide}", "width_m must be a finite number, got 'wide'"),
+        ("{name: a, width_m: -1}", "profile a: width_m is -1.0, expected a number from 0 to 100"),
+        ("{name: a, stairs: 1}", "profile a: stairs must be true or false, got 1"),
+        ("{width_m: 1}", "name must be a name, got None"),
+        ("{name: a}, {name: a}", "profile a: the name is given twice"),
+        ("3", "expected a mapping"),
+    ],
+)
+def test_profiles_of_a_file_are_checked(cli: Any, file: Path, line: str, message: str) -> None:
+    file.write_text(f"{file.read_text()}profiles: [{line}]\n")
+    assert cli("plan", file, *QUERY).refuses(3, "house.yaml, line ", message)
+
+
+def test_profiles_go_into_the_model(cli: Any, file: Path, tmp_path: Path) -> None:
+    file.write_text(f"{file.read_text()}profiles: [{{name: bed, stairs: false}}]\n")
+    model = tmp_path / "house.hnm"
+    assert cli("build", file, "-o", model, "--robot-radius", 0).code == 0
+    plan = cli("plan", model, *QUERY[:4], "--profile", "bed", "--json").answer
+    assert [ride["link"] for ride in plan["rides"]] == ["lift"]
+    assert plan["profile"] == "bed"

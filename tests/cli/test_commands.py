@@ -577,3 +577,35 @@ def test_help_of_what_takes_buildings_says_so(cli, command):
 def test_a_building_where_a_map_is_meant_is_named(cli, command):
     assert cli(command, BUILDING).refuses(3, "a building, expected one map: name that of a floor")
     assert "of several floors" not in cli(command, "--help").out
+
+
+def test_rooms_beside_the_map_are_listed_and_found_anew_on_demand(cli, rooms, tmp_path):
+    square = "[[1, 2], [4, 2], [4, 6], [1, 6]]"
+    beside = tmp_path / "rooms.yaml"
+    beside.write_text(f"rooms:\n- name: kitchen\n  polygon: {square}\n")
+    radius = ("--robot-radius", 0)
+    assert [one["name"] for one in cli("rooms", rooms, *radius, "--json").answer["rooms"]] == [
+        "kitchen"
+    ]
+    for option in (("--find",), ("--method", "walls"), ("--least-area", 0.5)):
+        found = cli("rooms", rooms, *radius, *option, "--json").answer["rooms"]
+        assert "kitchen" not in [one["name"] for one in found]
+    before = beside.read_text()
+    for out in ("rooms.yaml", "m.yaml"):
+        done = cli("rooms", rooms, *radius, "--find", "-o", tmp_path / out)
+        assert done.refuses(2, f"{out} exists", "add --force")
+    assert beside.read_text() == before
+    assert cli("rooms", rooms, "--find", "--rooms", beside).refuses(2, "--find is for rooms")
+    assert cli("rooms", rooms, *radius, "--find", "-o", beside, "--force").code == 0
+    assert "kitchen" not in hn.load_rooms(beside, hn.load_map(rooms)).names
+
+
+@pytest.mark.parametrize("kind", ["nav2", "rooms", "places"])
+def test_export_writes_over_nothing_without_force(cli, rooms, tmp_path, kind):
+    out = tmp_path / "graph.geojson"
+    out.write_text("mine")
+    query = ("export", rooms, "--robot-radius", 0, "--format", kind, "-o", out)
+    assert cli(*query).refuses(2, "graph.geojson exists: add --force to write over it")
+    assert out.read_text() == "mine"
+    assert cli(*query, "--force").code == 0
+    assert out.read_text() != "mine"

@@ -43,7 +43,9 @@ def test_lanes_for_robots_that_pass_each_other(cli, tmp_path):
     assert done.answer["kinds"]["lane"] > 0
     facts = read_nav2(out).edge_facts.values()
     assert {one.get("lane") for one in facts} == {None, "right"}
-    assert cli("export", FIGURE, "-o", out, *SMALL, "--lanes", "-1").refuses(2, "apart_m")
+    assert cli("export", FIGURE, "-o", out, "--force", *SMALL, "--lanes", "-1").refuses(
+        2, "apart_m"
+    )
 
 
 def test_edges_that_bend(cli, tmp_path):
@@ -72,7 +74,8 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
 
 def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
     def nodes(*more):
-        given = ("export", FIGURE, "-o", tmp_path / f"g.{more[1] if more else 'json'}", "--json")
+        out = tmp_path / f"g.{more[1] if more else 'json'}"
+        given = ("export", FIGURE, "-o", out, "--json", "--force")
         return cli(*given, *SMALL[:2], *SMALL[4:], *more[2:]).answer["nodes"]
 
     near, far = nodes(), nodes("", "json", "--spacing", 2)
@@ -91,11 +94,11 @@ def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
     assert few < cli("export", FIGURE, "-o", second, *SMALL, "--json").answer["nodes"]
     facts = read_nav2(first).node_facts
     assert {one["class"] for one in facts.values()} == set(done.answer["kinds"])
-    done = cli("export", FIGURE, "-o", second, *SMALL[:2], "--keep", first, "--json")
+    done = cli("export", FIGURE, "-o", second, "--force", *SMALL[:2], "--keep", first, "--json")
     assert (done.code, first.read_bytes()) == (0, second.read_bytes())
-    done = cli("export", FIGURE, "-o", second, *SMALL[:4], "--style", "lanes", "--json")
+    done = cli("export", FIGURE, "-o", second, "--force", *SMALL[:4], "--style", "lanes", "--json")
     assert done.answer["nodes"] >= few
-    given = ("export", FIGURE, "-o", second, *SMALL[:2])
+    given = ("export", FIGURE, "-o", second, "--force", *SMALL[:2])
     assert cli(*given, "--style", "dense").refuses(2, "--style", "lanes, roadmap")
     assert cli(*given, "--nodes", 5).refuses(2, "--nodes is for --style roadmap")
     assert cli(*given, "--stretch", 2).refuses(2, "--stretch is for --style roadmap")
@@ -153,7 +156,7 @@ def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):
     gone = next(f for f in whole["features"] if f["geometry"]["type"] == "LineString")
     whole["features"].remove(gone)
     first.write_text(json.dumps(whole))
-    given = ("export", FIGURE, "-o", second, *SMALL[:2], "--keep", first)
+    given = ("export", FIGURE, "-o", second, "--force", *SMALL[:2], "--keep", first)
     changes = cli(*given, "--json").answer["changes"]
     assert (len(changes["edges"]["added"]), changes["edges"]["gone"]) == (1, [])
     assert changes["nodes"] == {"added": [], "gone": [], "moved": []}
@@ -162,7 +165,7 @@ def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):
 
 
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
-    given = ("export", FIGURE, "-o", tmp_path / "g.geojson", *SMALL)
+    given = ("export", FIGURE, "-o", tmp_path / "g.geojson", "--force", *SMALL)
     assert "ids  " not in cli(*given).out
     monkeypatch.setattr("hybridnav._base.messages.MOST_ID", 20)
     (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("ids  ")]

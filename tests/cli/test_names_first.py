@@ -81,7 +81,7 @@ def test_what_is_closed_is_found_once_for_named_ends(monkeypatch):
 
 @pytest.mark.parametrize(
     ("command", "reads"),
-    [("plan", True), ("view", True), ("rooms", False), ("export", False), ("check", False)],
+    [("plan", True), ("view", True), ("rooms", True), ("export", False), ("check", False)],
 )
 def test_help_says_whether_rooms_beside_the_map_are_read(cli, command, reads):
     said = " ".join(cli(command, "--help").out.replace("│", " ").split())
@@ -89,14 +89,15 @@ def test_help_says_whether_rooms_beside_the_map_are_read(cli, command, reads):
     assert "in place of a model's or of those that are found" in said
 
 
-def test_rooms_are_found_anew_beside_a_file_of_rooms(cli, tmp_path):
+def test_rooms_are_found_anew_beside_a_file_of_rooms_on_demand(cli, tmp_path):
     hn.write_ros_map(hn.example_map("office"), tmp_path / "map.yaml")
     before = cli("rooms", tmp_path / "map.yaml", "--json").answer
     out = tmp_path / "rooms.yaml"
     assert cli("rooms", tmp_path / "map.yaml", "-o", out).code == 0
     out.write_text(out.read_text().replace("name: room-1\n", "name: kitchen\n"))
-    assert cli("rooms", tmp_path / "map.yaml", "--json").answer["rooms"] == before["rooms"]
-    named = cli("rooms", tmp_path / "map.yaml", "--rooms", out, "--json").answer["rooms"]
+    found = cli("rooms", tmp_path / "map.yaml", "--find", "--json").answer
+    assert found["rooms"] == before["rooms"]
+    named = cli("rooms", tmp_path / "map.yaml", "--json").answer["rooms"]
     assert "kitchen" in [room["name"] for room in named]
 
 

@@ -76,6 +76,7 @@ OTHERS = [
     "CostLayer.keepout_mask",
     "CostLayer.speed_mask",
     "Frame.moved",
+    "HybridPlanner.under",
     "HybridPlanner.update",
     "OccupancyGrid.from_message",
     "Path.profile",

@@ -55,6 +55,24 @@ def test_each_floor_has_a_panel_and_the_highest_is_on_top() -> None:
     assert {"goal"} <= set(gids(high))
 
 
+def test_floors_that_no_route_visits_are_strips() -> None:
+    building = office()
+    plan = building.plan(("1", (1.5, 3.5)), ("1", (1.5, 4.5)))
+    assert plan.floors == ("1",)
+    low, high = plot_building(building, plan)
+    assert low.get_position().height > 5 * high.get_position().height
+    assert high.get_title() == "floor 2  ·  map 2  ·  not visited"
+    assert {"link-west lift", "link-B"} <= set(gids(high))
+    assert not {"cells", "route-1"} & set(gids(high))
+    (mark,) = [line for line in high.lines if line.get_gid() == "link-B"]
+    end = building.link("B").end_on("2")
+    assert end is not None
+    assert mark.get_xdata() == [end.position_m[0]]
+    assert high.get_ylim()[0] < float(np.ravel(mark.get_ydata())[0]) < high.get_ylim()[1]
+    low, high = plot_building(building)
+    assert low.get_position().height == pytest.approx(high.get_position().height, rel=0.2)
+
+
 def test_alternatives_have_a_line_each_and_none_is_needed() -> None:
     building = office()
     found = building.alternatives(("1", (1.5, 3.5)), ("2", (1.5, 4.5)), 2, max_stretch=9.0)

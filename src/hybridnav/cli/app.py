@@ -28,6 +28,7 @@ _HOME_OF = {
     "build": "build",
     "show": "show",
     "rooms": "rooms",
+    "closed": "closed",
     "evaluate": "evaluate",
     "compare": "evaluate",
     "preset": "show",

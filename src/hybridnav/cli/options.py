@@ -15,7 +15,7 @@ import typer
 
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, MapError
 
 if TYPE_CHECKING:
     import hybridnav as hn
@@ -119,6 +119,16 @@ GraphFloorOption = Annotated[
 NoStairsOption = Annotated[
     bool, typer.Option("--no-stairs", help="For a building: the robot takes no stairs.")
 ]
+ProfileOption = Annotated[
+    str | None,
+    typer.Option(
+        "--profile",
+        metavar="NAME",
+        help="Who goes: visitor, staff, wheelchair, cart, or one of the building's file; heeds "
+        "private rooms, costs of rooms, widths and stairs.",
+    ),
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 FrameOption = Annotated[
     T, typer.Option("--frame", metavar="NAME", help="Name of the map's frame in the file.")
 ]
@@ -240,6 +250,26 @@ BlockedOption = Annotated[
 _KINDS = frozenset({"door", "room", "keepout"})
 
 
+def out_of_order(map_file: Path) -> list[str]:
+    """Return what the journal beside a map closes, as `--blocked` takes it.
+
+    Raises
+    ------
+    MapError
+        When the journal cannot be read, or is that of a building.
+    """
+    if not map_file.with_name(f"{map_file.stem}.closed.yaml").exists():
+        return []
+    from hybridnav.planner import Journal  # noqa: PLC0415 - loads shapely
+
+    journal = Journal(map_file)
+    for item in journal.items():
+        if item.link is not None or item.floor is not None:
+            where = f"closed {printable(journal.path)}"
+            raise MapError(f"{where}: {item.what} is of a building, and this is one map: open it")
+    return [item.what for item in journal.items()]
+
+
 @dataclass(frozen=True)
 class Closing:
     """The closures of a command line."""
@@ -280,6 +310,17 @@ def closing_lines(figures: dict[str, Any]) -> list[str]:
     """Return the line of a summary about closures, if there are any."""
     closed = figures.get("blocked")
     return [f"blocked    {', '.join(closed)}"] if closed else []
+
+
+def profile_lines(stated: dict[str, str] | None) -> list[str]:
+    """Return the lines of a summary about a profile, and about what it forbids."""
+    if stated is None:
+        return []
+    why = stated.get("forbids")
+    return [
+        f"profile    {stated['name']}: {stated['asks']}",
+        *([f"reason     {why}"] if why else []),
+    ]
 
 
 def parsed_closing(texts: list[str] | None) -> Closing:

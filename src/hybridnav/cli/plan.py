@@ -146,6 +146,7 @@ def plan(
     max_stretch: StretchOption = None,
     blocked: options.BlockedOption = None,
     no_stairs: options.NoStairsOption = False,
+    profile: options.ProfileOption = None,
     costs: options.CostsOption = None,
     smooth: options.SmoothOption = None,
     keep: KeepOption = False,
@@ -162,7 +163,8 @@ def plan(
 ) -> None:
     """Plan a route on MAP, or over the floors of a building, from a point or room to another.
 
-    Without --rooms, rooms are those of rooms.yaml beside the map, if there.
+    Without --rooms, rooms are those of rooms.yaml beside the map, if there. What hybridnav closed
+    has closed stays closed.
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
@@ -177,7 +179,7 @@ def plan(
         overrides=given.overrides,
         smooth=smooth,
     )
-    closing = options.parsed_closing(blocked)
+    closing = options.parsed_closing([*(blocked or ()), *options.out_of_order(map_file)])
     first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
@@ -186,6 +188,7 @@ def plan(
         source=Source(map_file, settings, reading, keep, keep_in),
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
         closing=closing,
+        profile=profile,
         costs=given,
         rooms_file=rooms_file,
         at=where,

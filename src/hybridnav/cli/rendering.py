@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
-from hybridnav.cli.options import closing_lines
+from hybridnav.cli.options import closing_lines, profile_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,6 +80,7 @@ def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict
     lines = [
         f"query      {printable(grid.name)}, {query_of(waypoints)}, {radius}",
         *closing_lines(figures),
+        *profile_lines(figures["settings"].get("profile")),
         f"status     {figures['status']}",
         *islands_line(grid),
     ]

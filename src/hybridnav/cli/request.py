@@ -39,6 +39,7 @@ class Request:
     waypoints: list[Waypoint]
     """The start, what lies between, the goal."""
     closing: Closing
+    profile: str | None
     costs: Costs
     rooms_file: Path | None
     at: At
@@ -57,6 +58,7 @@ class Request:
         names_rooms = (
             any(isinstance(waypoint, str) for waypoint in self.waypoints)
             or self.closing.needs_rooms
+            or self.profile is not None
         )
         has_more = len(self.waypoints) > 2 or self.wanted.count > 1  # noqa: PLR2004 - start and goal
         return names_rooms or has_more or self.rooms_file is not None
@@ -78,8 +80,12 @@ class Request:
         topology = self._grown(model, rooms_file, seconds)
         with stage("preparing the planner", seconds, "prepare"):
             planner = model.planner(settings, topology=topology, costs=costs)
+            given = planner
+            if self.profile is not None:
+                planner = planner.under(self.profile)
+                topology, grid = planner.topology, planner.grid
         outcome = self._planned(planner, closed, seconds)
-        self.source.keep(planner, key)
+        self.source.keep(given, key)
         found = self._alternatives(planner, closed, seconds)
         beside: dict[str, Any] = {}
         if found is not None:

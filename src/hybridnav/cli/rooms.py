@@ -23,7 +23,14 @@ from hybridnav.cli.common import (
     timings,
 )
 from hybridnav.cli.older import Older, older_files
-from hybridnav.cli.options import JsonOption, MapArgument, OutOption, PlotOption, RoomsOption
+from hybridnav.cli.options import (
+    ForceOption,
+    JsonOption,
+    MapArgument,
+    OutOption,
+    PlotOption,
+    RoomsOption,
+)
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import Segmentation, read_point
@@ -91,7 +98,10 @@ NamesMapOption = Annotated[
         show_default="the only map in the folder of that file",
     ),
 ]
-ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
+FindOption = Annotated[
+    bool,
+    typer.Option("--find", help="Find rooms anew, although the map has some, or its folder."),
+]
 
 
 @with_map(before="at")
@@ -101,6 +111,7 @@ def rooms(
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
+    find: FindOption = False,
     names_from: NamesFromOption = None,
     names_map: NamesMapOption = None,
     at: AtOption = None,
@@ -114,14 +125,16 @@ def rooms(
 ) -> None:
     """Find the rooms of MAP, or read them from a file, and list them with their doors.
 
-    --out writes them as YAML, to be edited.
+    Without --rooms, rooms are those of the model, or of rooms.yaml beside the map, if there; --find
+    finds them anew. --out writes them as YAML, to be edited.
     """
     asked = _asked_point(at, out, plot)
     _check_files(out, plot, tolerance_m, force=force)
-    finds = method is not None or least_area_m2 is not None
-    if rooms_file is not None and finds:
-        option = "--least-area" if method is None else "--method"
-        raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
+    finding = {"--method": method, "--least-area": least_area_m2, "--find": find or None}
+    asked_for = [option for option, value in finding.items() if value is not None]
+    if rooms_file is not None and asked_for:
+        raise UsageError(f"{asked_for[0]} is for rooms that are found, --rooms reads them")
+    finds = bool(asked_for)
     checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
     older = older_files(names_from, names_map)
@@ -132,6 +145,11 @@ def rooms(
     check_room_to_be(grid)
     with stage("finding rooms", seconds, "rooms"):
         labels = None if finds else model.rooms
+        beside = map_file.parent / "rooms.yaml"
+        # Names of an older map are carried to what is found on this one.
+        reads = not finds and older is None and labels is None
+        if rooms_file is None and reads and beside.is_file():
+            rooms_file = beside
         if rooms_file is not None:
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:

@@ -7,7 +7,12 @@ from .cells import (
 from .islands import DroppedIslands as DroppedIslands
 from .frame import Frame as Frame
 from .occupancy import OccupancyGrid as OccupancyGrid, drop_islands as drop_islands
-from .room_labels import MAX_ROOMS as MAX_ROOMS, NO_ROOM as NO_ROOM, RoomLabels as RoomLabels
+from .room_labels import (
+    MAX_ROOMS as MAX_ROOMS,
+    NO_ROOM as NO_ROOM,
+    RoomLabels as RoomLabels,
+    RoomUse as RoomUse,
+)
 from .widest import Bottleneck as Bottleneck, WidestPaths as WidestPaths
 
 __all__: list[str]

@@ -28,6 +28,39 @@ NO_ROOM = -1
 
 Point = tuple[float, float]
 
+MOST_COST = 100.0
+"""Most that a metre in a room may cost, as a factor."""
+
+
+@dataclass(frozen=True)
+class RoomUse:
+    """What routes may do in a room, and what a metre in it costs them; profiles heed it.
+
+    Raises
+    ------
+    InvalidValueError
+        When the cost is no number from 1 to 100.
+
+    Examples
+    --------
+    >>> hn.RoomUse(private=True).cost
+    1.0
+    """
+
+    private: bool = False
+    """Whether routes only start or end in it."""
+    corridor: bool = False
+    """Whether it is there to walk through: a profile may let a metre elsewhere cost more."""
+    cost: float = 1.0
+    """Factor by which a metre in it costs more than a metre."""
+
+    def __post_init__(self) -> None:
+        """Refuse costs that are out of range."""
+        if not 1 <= self.cost <= MOST_COST:
+            raise InvalidValueError(
+                f"the cost of a room is a factor from 1 to {MOST_COST:g}, got {self.cost!r:.40}"
+            )
+
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
@@ -46,13 +79,15 @@ class RoomLabels:
     doors
         Known numbers of doors, each with a point of its boundary, `(x, y)` in metres: a door keeps
         its number when rooms are written, read, or planned on for another robot.
+    uses
+        What routes may do in some rooms, by their names; others have no limits.
 
     Raises
     ------
     InvalidValueError
         When a name is given twice, empty, too long, not one printable line or reads as a point
-        (`1,2`), a label has no name, a point is not finite, or the number of a door is not a
-        positive whole one.
+        (`1,2`), a label has no name, a point is not finite, the number of a door is not a
+        positive whole one, or a use is that of no room.
 
     Examples
     --------
@@ -66,6 +101,7 @@ class RoomLabels:
     label_of: IntArray = field(repr=False)
     points: Mapping[str, Point] = field(default_factory=dict)
     doors: Mapping[int, Point] = field(default_factory=dict, repr=False)
+    uses: Mapping[str, RoomUse] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         names = tuple(self.names)
@@ -84,11 +120,15 @@ class RoomLabels:
         check_names(tuple(self.points))
         points = {name: _point(f"point {name!r:.80}", at) for name, at in self.points.items()}
         doors = {check_number(n): _point(f"door {n!r:.80}", at) for n, at in self.doors.items()}
+        if unknown := [name for name in self.uses if name not in names]:
+            raise InvalidValueError(f"uses: no room is called {unknown[0]!r:.80}")
+        uses = {name: use for name, use in self.uses.items() if use != RoomUse()}
         for name, value in (
             ("names", names),
             ("label_of", label_of),
             ("points", MappingProxyType(points)),
             ("doors", MappingProxyType(doors)),
+            ("uses", MappingProxyType(uses)),
         ):
             object.__setattr__(self, name, value)
 

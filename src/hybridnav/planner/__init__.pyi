@@ -11,6 +11,7 @@ from .export import (
     export_places as export_places,
     export_rooms as export_rooms,
 )
+from .journal import Journal as Journal, OutOfOrder as OutOfOrder
 from .path import Path as Path
 from .planner import HybridPlanner as HybridPlanner
 from .preset import (
@@ -20,6 +21,7 @@ from .preset import (
     planner_settings as planner_settings,
     preset_names as preset_names,
 )
+from .profile import PROFILES as PROFILES, Profile as Profile
 from .result import (
     COST_METRICS as COST_METRICS,
     Metric as Metric,

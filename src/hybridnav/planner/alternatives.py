@@ -202,14 +202,14 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     [10.0, 10.0]
     """
     limits = limits_of(count, max_overlap, max_stretch)
-    closed = planner.closed(blocked)
     waypoints = [start, goal]
-    first = plan_tour(planner, waypoints, at=at, blocked=closed)
+    first = plan_tour(planner, waypoints, at=at, blocked=blocked)
     if not first.solved:
         return unplanned(first.status)
     search = None
     if planner.topology.pyramid.rooms is not None:
-        search = DoorTours(planner, first, waypoints, planner.closed_for_all(closed))
+        closed = planner.closed_for_all(planner.closed(blocked, waypoints))
+        search = DoorTours(planner, first, waypoints, closed)
     return _by_doors(search, first, limits, by_costs=planner.costs is not None)
 
 

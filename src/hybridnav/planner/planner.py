@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
@@ -12,13 +13,15 @@ from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset
+from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import PlannerCosts
-from hybridnav.planner.distances import Distances
 from hybridnav.planner.endpoints import no_places, read_points
 from hybridnav.planner.follow import begun, update_of
 from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
+from hybridnav.planner.preset import check_radius
+from hybridnav.planner.questions import Questions, explained
 from hybridnav.planner.settings import OmplPlannerSettings
 
 if TYPE_CHECKING:
@@ -38,14 +41,15 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.planning import Smooth
+    from hybridnav.planner.private_rooms import Privacy
+    from hybridnav.planner.profile import Profile
     from hybridnav.planner.result import PlanDraft
-    from hybridnav.planner.why import Explanation
     from hybridnav.search.found import ClosedCells, Method, Prepared
     from hybridnav.topology import TopologicalMap
 
 
 @copies_alike
-class HybridPlanner(Distances):
+class HybridPlanner(Questions):
     """Planner of paths between points of one map by a preset.
 
     Threads may share a planner; queries with OMPL run one after the other. The structures of a
@@ -105,6 +109,8 @@ class HybridPlanner(Distances):
             ompl = ompl_planner(known, method, settings)
         self._now = Planning(self.preset, grid, topology, method, by, ompl)
         self._turns, self._preparing = Turns(), Turns()
+        self._profiled: dict[Profile, tuple[Planning, HybridPlanner]] = {}
+        self._privacy: Privacy | None = None
         self._begun: Callable[[], Planning] | None = None
         """The update that has begun and not ended; an interrupt leaves it here."""
 
@@ -128,8 +134,8 @@ class HybridPlanner(Distances):
     @property
     def pyramid_rooms(self) -> RoomLabels | None:
         """The rooms of the map; None without rooms, or while its places are not built."""
-        topology = self._now.topology
-        return None if topology is None else topology.pyramid.rooms
+        own = self._now.topology
+        return None if own is None else own.pyramid.rooms
 
     @property
     def costs(self) -> CostLayer | None:
@@ -140,6 +146,53 @@ class HybridPlanner(Distances):
     def method(self) -> Method:
         """The search that its preset names, on the map now."""
         return self._now.method
+
+    def under(self, profile: Profile | str) -> HybridPlanner:
+        """Return a planner of the same map under a profile, also for tours and alternatives.
+
+        Results are proved for its problem. It is made once, and again after an `update`.
+
+        Parameters
+        ----------
+        profile
+            A `Profile`, or the name of one of `PROFILES`: visitor, staff, wheelchair, cart.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is none of the name, or the map has no rooms.
+
+        Examples
+        --------
+        >>> grid, uses = hn.example_map("figure1"), {"ward": hn.RoomUse(private=True)}
+        >>> rooms = hn.RoomLabels(("hall", "ward"), np.indices(grid.shape)[1] // 20, uses=uses)
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+        >>> visitor = hn.HybridPlanner(topology).under("visitor")
+        >>> print(visitor.plan("hall", "ward").status)
+        solved
+        """
+        from hybridnav.planner.private_rooms import Privacy  # noqa: PLC0415 - rare
+        from hybridnav.planner.profile import ProfiledFloor, profile_of, under_profile  # noqa: PLC0415
+
+        chosen, now = profile_of(profile), self._now
+        kept = self._profiled.get(chosen)
+        if kept is None or kept[0] is not now:
+            own, given = self.topology, self.given_costs
+            by_costs, made = chosen.by_costs(own.rooms.labels), copy(self)
+            found = under_profile(own, self.preset, given, chosen, by_costs=by_costs)
+            if (found[0], found[2]) != (own, given):
+                made = HybridPlanner(found[0], preset=found[1], costs=found[2])
+            floor = ProfiledFloor.of(found[0], chosen, found[1].planner)
+            vars(made).update(_privacy=Privacy(chosen, [floor], whole=self), _profiled={})
+            kept = self._profiled[chosen] = now, made
+        return kept[1]
+
+    def _closing(
+        self, waypoints: Sequence[ArrayLike | str], blocked: Closable | ClosedCells | None
+    ) -> Closable | ClosedCells | None:
+        """Return what is closed for a query, with the private rooms of the profile."""
+        own = self._privacy
+        return blocked if own is None else own.closed(self._now, waypoints, blocked)
 
     @property
     def prepared(self) -> Prepared | None:
@@ -208,49 +261,12 @@ class HybridPlanner(Distances):
             given to another method than `cheapest`.
         """
         with self._query():
-            now = self._now
-            result = now.plan(now.read(start, goal, smooth, blocked, at, keep))
-            if result.path is not None:
-                return result
+            now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
+            result = now.plan(now.read(start, goal, smooth, closed, at, keep))
+        if result.path is None:
             ends = result.start, result.goal
-            return replace(result, why_source=partial(_explained, now, ends, blocked))
-
-    def explain(
-        self,
-        start: ArrayLike | str,
-        goal: ArrayLike | str,
-        *,
-        blocked: Closable | ClosedCells | None = None,
-        radius_m: float | None = None,
-    ) -> Explanation:
-        """Explain why there is a path between two points or none, and what would have to change.
-
-        It finds the widest path, the fewest closures to open, and whether unexplored cells could
-        help: exactly, for a disc on the cells of the map. Dropped islands count as free.
-
-        Parameters
-        ----------
-        start, goal, blocked
-            As in `plan`; a room stands for its point.
-        radius_m
-            The robot's radius in metres, >= 0; None for the map's.
-
-        Raises
-        ------
-        InvalidValueError
-            As in `plan`, and when the radius is no number >= 0.
-
-        Examples
-        --------
-        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-        >>> planner = hn.HybridPlanner(topology)
-        >>> print(planner.explain((0.5, 0.5), (-2.0, 2.5)).words("de")[0])
-        Das Ziel liegt außerhalb der Karte.
-        """
-        with self._query():
-            now = self._now
-            poses = now.read(start, goal, None, blocked, "point").poses
-            return _explained(now, poses, blocked, radius_m)
+            result = replace(result, why_source=partial(explained, now, ends, closed))
+        return result if own is None else own.stated(result, (start, goal), blocked)
 
     def _query(self) -> AbstractContextManager[bool]:
         """Return the lock to hold while the map and the costs must stay as they are."""
@@ -266,9 +282,7 @@ class HybridPlanner(Distances):
         blocked: Closable | ClosedCells | None = None,
         at: At = "anywhere",
     ) -> PlanDraft:
-        """Plan a path as `plan` does, and make its result only if it is wanted.
-
-        With `shortest` that saves half of the time, for a caller who compares many plans.
+        """Plan a path as `plan` does, and make its result only if it is wanted: of many plans.
 
         Parameters
         ----------
@@ -276,8 +290,8 @@ class HybridPlanner(Distances):
             As in `plan`.
         """
         with self._query():
-            now = self._now
-            return now.draft(now.read(start, goal, None, blocked, at))
+            now, closed = self._now, self._closing([start, goal], blocked)
+            return now.draft(now.read(start, goal, None, closed, at))
 
     def plan_many(
         self,
@@ -313,6 +327,9 @@ class HybridPlanner(Distances):
                 f"there are {len(first)} starts and {len(last)} goals, expected as many of both: "
                 "give each start its goal"
             )
+        if self._privacy is not None:  # each has private rooms of its own
+            alone = partial(self.plan, smooth=smooth, blocked=blocked)
+            return plan_many(self.grid, None, (first, last), None, alone)
         with self._query():
             return self._now.plan_many((first, last), smooth, blocked)
 
@@ -391,6 +408,8 @@ class HybridPlanner(Distances):
     def _update(self, update: PlannerUpdate) -> None:
         """Check all of an update, then make it."""
         self._turns.alone(self._complete)
+        if self._privacy is not None:
+            raise InvalidValueError("a planner under a profile follows its own: update that one")
         self._begun = begun(self._now, update)
         self._turns.alone(self._complete)
 
@@ -405,9 +424,13 @@ class HybridPlanner(Distances):
         if self._now.ompl is not None:
             self._now.ompl.close()
 
-    def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
-        """Return the cells of a closure, None for none."""
-        return self._now.closed(blocked)
+    def closed(
+        self,
+        blocked: Closable | ClosedCells | None,
+        waypoints: Sequence[ArrayLike | str] | None = None,
+    ) -> ClosedCells | None:
+        """Return the cells of a closure and, with waypoints, of the profile; None for none."""
+        return self._now.closed(self._closing(waypoints, blocked) if waypoints else blocked)
 
     def points_of(
         self,
@@ -417,35 +440,8 @@ class HybridPlanner(Distances):
         blocked: Closable | ClosedCells | None = None,
     ) -> list[ArrayLike]:
         """Return a point for each waypoint, so that the path through all of them is cheapest."""
-        return self._now.points_of(waypoints, at, blocked)
+        return self._now.points_of(waypoints, at, self._closing(waypoints, blocked))
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
-        """Return the closed cells of a query with those that the costs close for all queries."""
+        """Return closed cells with those that the costs close for all queries."""
         return self._now.closed_for_all(closed)
-
-
-def _explained(
-    now: Planning, ends: Any, blocked: Any, radius_m: float | None = None
-) -> Explanation:
-    from hybridnav.planner.why import explain  # noqa: PLC0415 - plans do not need shapely
-
-    return explain(now, ends, blocked, radius_m=radius_m)
-
-
-def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
-    """Refuse a map of the default radius with a preset for another radius.
-
-    A radius that the caller chose for the map wins over the preset's, and results record it.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map has the default radius, not chosen by the caller, and the preset names another.
-    """
-    wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
-    if grid.radius_is_default and wanted_m != radius_m:
-        raise InvalidValueError(
-            f"preset {preset.name} is for a robot radius of {wanted_m} m, the map was made with "
-            f"the default of {radius_m} m: make it with robot_radius_m={wanted_m}, or with "
-            f"robot_radius_m={radius_m} if that is meant"
-        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
@@ -386,7 +387,7 @@ class Planning:
     def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         start, goal = (tuple(pose.tolist()) for pose in request.poses)
-        own: Any = partial(_of_its_own, self._settings)
+        own: Any = partial(deepcopy, self._settings)
         return PlanResult(status, settings=own, start=start, goal=goal, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
@@ -445,8 +446,3 @@ class Planning:
             return self.plan(self.read(start, goal, finish, closed, "anywhere"))
 
         return plan_many(self.grid, at_once, pairs, closed, alone)
-
-
-def _of_its_own(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return settings for one result, so that a change of them does not affect the next one."""
-    return {k: dict(each) if isinstance(each, dict) else each for k, each in settings.items()}

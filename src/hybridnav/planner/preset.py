@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import parse_value, read_yaml
-from hybridnav.errors import PresetError, PresetNotFoundError, brief
+from hybridnav.errors import InvalidValueError, PresetError, PresetNotFoundError, brief
 from hybridnav.planner.settings import (
     METHODS,
     SECTIONS,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from hybridnav._base.typing import PathLike
+    from hybridnav.maps import OccupancyGrid
 
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
@@ -283,3 +284,25 @@ def _known_keys(section: tuple[int | str, ...], key: str) -> str:
     with_it = ", ".join(method for method in METHODS if key in SECTIONS[method].model_fields)
     wrong = f"no key of method {section[1]}, but of {with_it}" if with_it else "unknown key"
     return f"{wrong}; {section[1]} has {names}"
+
+
+# Check of the robot's radius, which map and preset both state.
+
+
+def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
+    """Refuse a map of the default radius with a preset for another radius.
+
+    A radius that the caller chose for the map wins over the preset's, and results record it.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map has the default radius, not chosen by the caller, and the preset names another.
+    """
+    wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
+    if grid.radius_is_default and wanted_m != radius_m:
+        raise InvalidValueError(
+            f"preset {preset.name} is for a robot radius of {wanted_m} m, the map was made with "
+            f"the default of {radius_m} m: make it with robot_radius_m={wanted_m}, or with "
+            f"robot_radius_m={radius_m} if that is meant"
+        )

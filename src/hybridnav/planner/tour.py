@@ -129,6 +129,7 @@ class Tour:
         return parts[0] | {
             "status": str(self.status),
             "goal": parts[-1]["goal"],
+            "settings": parts[-1]["settings"],
             "length_m": self.length_m if self.solved else None,
             "duration_s": self.duration_s,
             "cost": self.cost if self.solved else None,
@@ -250,10 +251,10 @@ def plan_tour(
     """
     if len(waypoints) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a tour needs at least two waypoints, got {len(waypoints)}")
-    points, closed = planner.points_of(waypoints, at=at, blocked=blocked), planner.closed(blocked)
+    points = planner.points_of(waypoints, at=at, blocked=blocked)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
-        results.append(planner.plan(*pair, smooth=smooth, blocked=closed))
+        results.append(planner.plan(*pair, smooth=smooth, blocked=blocked))
         if not results[-1].solved:
             break
     return tour_of(planner, results, waypoints)

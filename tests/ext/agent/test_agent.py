@@ -18,7 +18,7 @@ import pytest
 import hybridnav as hn
 from hybridnav.ext.agent import TOOLS, Answers, serving
 from hybridnav.ext.page import Session, Site
-from hybridnav.ext.page.session import RoomsFile
+from hybridnav.ext.page.kept import RoomsFile
 from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
 from tests.ext.page.server import served
 

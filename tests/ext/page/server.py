@@ -17,7 +17,7 @@ from hybridnav.cli.reading import MapOptions
 from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.app import make_app, make_server
 from hybridnav.ext.page.command import BuildingPage
-from hybridnav.ext.page.session import RoomsFile
+from hybridnav.ext.page.kept import RoomsFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -107,7 +107,8 @@ def session_of(file: Path) -> Session:
     rooms_path = file.parent / "rooms.yaml"
     rooms = hn.load_rooms(rooms_path, model.grid) if rooms_path.exists() else None
     topology = model.grown(settings.pyramid, rooms or hn.find_rooms(model.grid))
-    return Session(model, topology, settings, file=RoomsFile(file.parent, "rooms.yaml"))
+    rooms_file, journal = RoomsFile(file.parent, "rooms.yaml"), hn.Journal(file)
+    return Session(model, topology, settings, file=rooms_file, journal=journal)
 
 
 def site_of(file: Path) -> Site:

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from tests.ext.page.server import building_site_of, served, session_of, write_building
+from tests.ext.page.server import building_site_of, query_of, served, session_of, write_building
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -226,3 +226,46 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
     rooms = hn.ext.fleet.load_building(out).floors[1].rooms
     assert rooms is not None
     assert set(rooms.names) == {"attic", "f", "g", "h"}
+
+
+def test_what_is_out_of_order_and_who_goes_are_told_and_changed(
+    building: Client, folder: Path
+) -> None:
+    found = building.get("closed.json").value
+    assert [one["name"] for one in found["profiles"]] == ["visitor", "staff", "wheelchair", "cart"]
+    assert (found["closed"], found["can_close"]) == ([], True)
+    first = building.post("plan", QUERY).value["rides"][0]["link"]
+    change = {"what": f"link:{first}", "closed": True, "why": "repair"}
+    (item,) = building.post("closed", change).value["closed"]
+    assert (item["what"], item["why"]) == (f"link:{first}", "repair")
+    assert [one.what for one in hn.Journal(folder / "building.yaml").items()] == [item["what"]]
+    assert building.post("plan", QUERY).value["rides"][0]["link"] != first
+    for what in ("link:none", "3:door:1", "2: upper:room:none", "door:1", "nothing"):
+        refused = building.post("closed", change | {"what": what})
+        assert refused.code == 422, what
+    hn.Journal(folder / "building.yaml").open(item["what"])
+    assert building.get("closed.json").value["closed"] == []
+    assert building.post("plan", QUERY).value["rides"][0]["link"] == first
+    by_lift = building.post("plan", QUERY | {"profile": "cart"}).value
+    assert [ride["kind"] for ride in by_lift["rides"]] == ["lift"]
+    assert building.post("plan", QUERY | {"profile": "nobody"}).code == 422
+    door = building.post("closed", {"what": "2: upper:room:e", "closed": True}).value["closed"]
+    assert [one["what"] for one in door] == ["2: upper:room:e"]
+    assert (
+        building.post("closed", {"what": "2: upper:room:e", "closed": False}).value["closed"] == []
+    )
+
+
+def test_a_map_has_them_too(client: Client, folder: Path) -> None:
+    query = query_of([10.5, 40.5], [70.5, 10.5])
+    assert client.post("plan", query).value["solved"]
+    client.post("closed", {"what": "room:a", "closed": True})
+    assert (folder / "four.closed.yaml").is_file()
+    assert not client.post("plan", query).value["solved"]
+    client.post("closed", {"what": "room:a", "closed": False})
+    assert client.post("plan", query | {"profile": "visitor"}).value["solved"]
+    assert client.post("closed", {"what": "link:lift", "closed": True}).code == 422
+    (folder / "four.closed.yaml").unlink()
+    (folder / "four.closed.yaml").symlink_to(folder.parent / "elsewhere.yaml")
+    assert client.post("closed", {"what": "room:a", "closed": True}).code == 422
+    assert not (folder.parent / "elsewhere.yaml").exists()

@@ -17,8 +17,8 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.ext.page import Session
+from hybridnav.ext.page.kept import RoomsFile
 from hybridnav.ext.page.requests import Edit
-from hybridnav.ext.page.session import RoomsFile
 from tests.ext.page.server import session_of
 
 if TYPE_CHECKING:

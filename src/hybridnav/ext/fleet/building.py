@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, TypeAlias
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from hybridnav._base.progress import no_progress
-from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet.checks import check_floors, check_links, check_speed
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.ext.fleet.checks import (
+    check_floors,
+    check_links,
+    check_speed,
+    endpoint_of,
+    refusal_of,
+)
 from hybridnav.ext.fleet.floors import FloorTable, building_parts
 from hybridnav.ext.fleet.links import LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
-from hybridnav.ext.fleet.search import Endpoint, LinkSearch
-from hybridnav.maps.names import did_you_mean, place_of_name
-from hybridnav.planner import PlanStatus
-from hybridnav.planner.endpoints import cells_of_endpoints, read_point, refusal
-from hybridnav.planner.named import check_names
+from hybridnav.ext.fleet.profiles import floors_under, links_under, profiled, reason_under
+from hybridnav.ext.fleet.search import LinkSearch
+from hybridnav.maps.names import place_of_name
+from hybridnav.planner.blocked import as_blocked
+from hybridnav.planner.private_rooms import Privacy
+from hybridnav.planner.profile import PROFILES, profile_of
+from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -28,11 +37,26 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.floors import Floor, Known
     from hybridnav.ext.fleet.links import Link
     from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.planner import HybridPlanner
+    from hybridnav.ext.fleet.search import Endpoint
+    from hybridnav.planner import HybridPlanner, Journal, Profile
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.named import At
     from hybridnav.planner.saved.container import Part
-    from hybridnav.search.found import ClosedCells
+
+FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
+"""A floor and a point or name on it, or a name that only one floor has."""
+
+_MOST_PROFILED = 7
+"""Profiles beside the last one whose planners are kept."""
+
+
+class _Asked(NamedTuple):
+    """The conditions of a query; see `Building.plan`."""
+
+    blocked: Mapping[str, Closable]
+    closed_links: Collection[str]
+    stairs: bool
+    at: At
 
 
 class Building:
@@ -49,6 +73,10 @@ class Building:
         The links between them.
     speed_m_s
         Metres per second that the robot drives: a second of a ride costs as many metres.
+    profiles
+        Profiles beside those of `hybridnav.planner.PROFILES`, or in place of one of their names.
+    journal
+        What is out of order: it is closed for all queries until it is opened again. None for none.
 
     Raises
     ------
@@ -71,13 +99,24 @@ class Building:
     """
 
     def __init__(
-        self, floors: Sequence[Floor], links: Sequence[Link] = (), *, speed_m_s: float = 0.5
+        self,
+        floors: Sequence[Floor],
+        links: Sequence[Link] = (),
+        *,
+        speed_m_s: float = 0.5,
+        profiles: Sequence[Profile] = (),
+        journal: Journal | None = None,
     ) -> None:
         check_floors(floors)
         check_links(links, floors)
         self.floors = tuple(floors)
         self.links = tuple(links)
         self.speed_m_s = check_speed(speed_m_s)
+        self.profiles = tuple({one.name: one for one in (*PROFILES, *profiles)}.values())
+        """The profiles that `plan` knows by name."""
+        self.journal = journal
+        self._privacy: Privacy | None = None
+        self._profiled: dict[Profile, tuple[list[FloorTable], Building]] = {}
         self._index_of = {floor.name: number for number, floor in enumerate(floors)}
         ends: dict[str, list[tuple[str, tuple[float, float]]]] = {f.name: [] for f in floors}
         for link in links:
@@ -134,6 +173,7 @@ class Building:
         closed_links: Collection[str] = (),
         stairs: bool = True,
         at: At = "anywhere",
+        profile: Profile | str | None = None,
     ) -> BuildingPlan:
         """Plan a route between two points, or rooms, of any floors.
 
@@ -151,6 +191,9 @@ class Building:
             Whether the robot takes stairs.
         at
             Position in a named room, as in `HybridPlanner.plan`.
+        profile
+            A `Profile`, or the name of one of `profiles`, whose costs, width, links and closed
+            rooms hold, also for the bound; None for the robot of the maps, which passes all rooms.
 
         Returns
         -------
@@ -160,10 +203,13 @@ class Building:
         Raises
         ------
         InvalidValueError
-            When a floor, link or name is not known, a name is that of rooms on several floors, a
-            point is not two finite numbers, or a closed item is not on its floor.
+            When a floor, link, profile or name is not known, a name is that of rooms on several
+            floors, a point is not two finite numbers, or a closed item is not on its floor.
+        MapError
+            When the journal cannot be read, or closes what is not in the building.
         """
-        return self._plans(start, goal, blocked, (closed_links, stairs), at, (1, 1.0))[0]
+        asked = _Asked(blocked or {}, closed_links, stairs, at)
+        return self._under_profile(start, goal, asked, profile, (1, 1.0))[0]
 
     def alternatives(  # noqa: PLR0913 - start, goal, count, and conditions with defaults
         self,
@@ -176,6 +222,7 @@ class Building:
         closed_links: Collection[str] = (),
         stairs: bool = True,
         at: At = "anywhere",
+        profile: Profile | str | None = None,
     ) -> BuildingAlternatives:
         """Plan routes by different links, the cheapest first.
 
@@ -185,7 +232,7 @@ class Building:
 
         Parameters
         ----------
-        start, goal, blocked, closed_links, stairs, at
+        start, goal, blocked, closed_links, stairs, at, profile
             As in `plan`.
         count
             Most routes.
@@ -207,8 +254,8 @@ class Building:
             raise InvalidValueError(f"count must be a whole number from 1 on, got {count!r:.40}")
         if not max_stretch >= 1:
             raise InvalidValueError(f"max_stretch must be 1 or more, got {max_stretch!r:.40}")
-        limits = count, max_stretch
-        return self._plans(start, goal, blocked, (closed_links, stairs), at, limits)
+        asked = _Asked(blocked or {}, closed_links, stairs, at)
+        return self._under_profile(start, goal, asked, profile, (count, max_stretch))
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures of all planners, and the costs between the ends of links, now.
@@ -248,8 +295,9 @@ class Building:
         self, parts_of: Callable[[HybridPlanner], list[Part]], *, compress: bool
     ) -> list[Part]:
         """Return the parts of the file of its model, for `save`."""
+        facts = {"speed_m_s": self.speed_m_s, "profiles": self.profiles}
         return building_parts(
-            self.floors, self.links, self.known, self.speed_m_s, parts_of, compress=compress
+            self.floors, self.links, self.known, facts, parts_of, compress=compress
         )
 
     def _floor_index(self, name: str) -> int:
@@ -264,12 +312,7 @@ class Building:
 
     def _network(self, closed_links: Collection[str], stairs: bool) -> LinkNetwork:  # noqa: FBT001
         """Return the links that may be used."""
-        if isinstance(closed_links, str):
-            raise InvalidValueError(
-                f"closed_links must be names of links, got the text {closed_links!r:.80}: put it "
-                "into a list"
-            )
-        key = frozenset(self.link(name).name for name in closed_links), bool(stairs)
+        key = frozenset(closed_links), bool(stairs)
         found = self._networks.get(key)
         if found is None:
             radius_m = self.robot_radius_m
@@ -282,18 +325,86 @@ class Building:
             self._networks = {**dict(list(self._networks.items())[-15:]), key: found}
         return found
 
-    def _plans(  # noqa: PLR0913, PLR0917 - what both public methods were given
+    def _under_profile(
         self,
         start: FloorWaypoint,
         goal: FloorWaypoint,
-        blocked: Mapping[str, Closable] | None,
-        usable: tuple[Collection[str], bool],
-        at: At,
+        asked: _Asked,
+        profile: Profile | str | None,
+        limits: tuple[int, float],
+    ) -> BuildingAlternatives:
+        """Plan as many routes as are wanted, under a profile, without what is out of order."""
+        asked = self._in_order(asked)
+        if profile is None:
+            return self._plans(start, goal, asked, limits)
+        chosen = profile_of(profile, self.profiles)
+
+        def plans(one: Profile, most: tuple[int, float]) -> BuildingAlternatives:
+            under = self._under(one)
+            known = {link.name for link in under.links}
+            links = [name for name in asked.closed_links if name in known]
+            own = asked._replace(closed_links=links, stairs=asked.stairs and one.stairs)
+            return under._plans(start, goal, own, most)  # noqa: SLF001 - a building like this one
+
+        def wider(one: Profile) -> tuple[BuildingPlan, Sequence[Floor]]:
+            return plans(one, (1, 1.0))[0], self._under(one).floors
+
+        found = plans(chosen, limits)
+        note = "" if found[0].solved else reason_under(chosen, wider)
+        of: dict[str, Any] = {"profile": chosen.name, "note": note}
+        return replace(found, found=tuple(replace(plan, **of) for plan in found))
+
+    def _under(self, profile: Profile) -> Building:
+        """Return the building under a profile, made anew where a map or costs have changed."""
+        tables = self._current()
+        kept = self._profiled.get(profile)
+        if kept is None or any(a is not b for a, b in zip(kept[0], tables, strict=True)):
+            floors = floors_under(self.floors, profile)
+            links = links_under(self.links, {floor.name: floor for floor in floors}, profile)
+            made = Building(floors, links, speed_m_s=self.speed_m_s)
+            own = Privacy(profile, profiled(floors, profile))
+            shut = [
+                table.closing(table.floor.planner.closed(own.rooms_closed(number)))
+                for number, table in enumerate(made._current())
+            ]
+            vars(made).update(_privacy=own, _tables=shut)
+            last = list(self._profiled.items())[-_MOST_PROFILED:]
+            self._profiled = {**dict(last), profile: (tables, made)}
+            return made
+        return kept[1]
+
+    def _in_order(self, asked: _Asked) -> _Asked:
+        """Return the conditions of a query with what the journal closes."""
+        if isinstance(asked.closed_links, str):
+            raise InvalidValueError(
+                f"closed_links must be names of links, got the text {asked.closed_links!r:.80}: "
+                "put it into a list"
+            )
+        blocked, links = dict(asked.blocked), [self.link(name).name for name in asked.closed_links]
+        for item in () if self.journal is None else self.journal.items():
+            try:
+                if item.link is not None:
+                    links.append(self.link(item.link).name)
+                    continue
+                floor = self.floor(item.floor or "")
+                floor.planner.closed(item.blocked)
+            except InvalidValueError as error:
+                raise MapError(f"closed {item.what}: {error}; open it by its name") from None
+            given = blocked.get(floor.name)
+            own = item.blocked if given is None else as_blocked(given) | item.blocked
+            blocked[floor.name] = own
+        return asked._replace(blocked=blocked, closed_links=links)
+
+    def _plans(
+        self,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
+        asked: _Asked,
         limits: tuple[int, float],
     ) -> BuildingAlternatives:
         """Plan as many routes as are wanted; again where a map changes meanwhile."""
         began = time.perf_counter()
-        network = self._network(*usable)
+        network = self._network(asked.closed_links, asked.stairs)
         answers = Answers(self.floors, network, self.speed_m_s)
         while True:
             tables = self._current()
@@ -301,8 +412,8 @@ class Building:
                 endpoint_of("start", start, self.floors),
                 endpoint_of("goal", goal, self.floors),
             )
-            closed = self._closed(blocked)
-            search = LinkSearch(network, tables, endpoints, closed, at)
+            closed = self._closed(asked.blocked, endpoints, network)
+            search = LinkSearch(network, tables, endpoints, closed, asked.at)
             found = answers.found(search, endpoints, limits, began)
             if not found[0].solved:
                 refused = refusal_of(endpoints, self.floors, closed)
@@ -310,92 +421,30 @@ class Building:
             if all(table.is_current for table in tables):
                 return BuildingAlternatives.of(found, limits, complete=search.is_complete)
 
-    def _closed(self, blocked: Mapping[str, Closable] | None) -> dict[int, ClosedCells]:
-        """Return the closed cells of floors, by index."""
+    def _closed(
+        self,
+        blocked: Mapping[str, Closable],
+        endpoints: tuple[Endpoint, Endpoint],
+        network: LinkNetwork,
+    ) -> dict[int, ClosedCells]:
+        """Return the closed cells of floors, by index, where they are others than always."""
         closed = {}
-        for name, closure in (blocked or {}).items():
+        for name, closure in blocked.items():
             index = self._floor_index(name)
             cells = self.floors[index].planner.closed(closure)
             if cells is not None:
                 closed[index] = cells
+        if self._privacy is None:
+            return closed
+        ends = [(end.floor, end.waypoint) for end in endpoints]
+        links = [
+            [(self._index_of[end.floor], end.position_m) for end in link.ends]
+            for link in network.links
+        ]
+        more = self._privacy.blocked(ends, closed, links)
+        for index, table in enumerate(self._tables):
+            cells_of, shut = table.floor.planner.closed, closed.get(index)
+            found = self._privacy.joined(cells_of, more.get(index), shut)
+            if found is not table.closed:
+                closed[index] = found or ClosedCells(np.empty(0, dtype=np.int64))
         return closed
-
-
-# Starts and goals in buildings: a floor, and a point or a name on it.
-
-FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
-"""A floor and a point or name on it, or a name that only one floor has."""
-
-
-def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
-    """Return the floor of a start or goal, and the point or name on it.
-
-    Parameters
-    ----------
-    what
-        "start" or "goal".
-    given
-        What the caller gave.
-    floors
-        The floors of the building.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is neither, the floor or the name is not known, the name is on several floors, or
-        the point is not two finite numbers.
-    """
-    if isinstance(given, str):
-        index, waypoint = _floor_of_name(given, floors), given
-    elif isinstance(given, tuple | list) and len(given) == 2 and isinstance(given[0], str):  # noqa: PLR2004
-        names = tuple(floor.name for floor in floors)
-        index, waypoint = place_of_name(given[0], names, "floor"), given[1]
-    else:
-        raise InvalidValueError(
-            f"{what} must be a floor and a point or name on it, such as ('3', (1.5, 2.0)), or a "
-            f"name alone, got {given!r:.80}"
-        )
-    if isinstance(waypoint, str):
-        check_names(floors[index].planner.topology, [waypoint])
-        return Endpoint(index, waypoint)
-    return Endpoint(index, read_point(what, waypoint))
-
-
-def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
-    """Return the index of the only floor that has a name."""
-    names_of = [
-        () if floor.rooms is None else (*floor.rooms.names, *floor.rooms.points) for floor in floors
-    ]
-    found = [number for number, names in enumerate(names_of) if name in names]
-    if len(found) == 1:
-        return found[0]
-    if not found:
-        known = tuple(dict.fromkeys(each for names in names_of for each in names))
-        hint = did_you_mean(name, known) if known else ": no floor has rooms"
-        raise InvalidValueError(f"no room or point of the building is called {name!r:.80}{hint}")
-    on = " and ".join(floors[number].name for number in found[:3])
-    raise InvalidValueError(
-        f"{name!r:.80} is a name on floors {on}: give the floor too, as in "
-        f"{floors[found[0]].name}:{name:.80}, or in Python the pair of floor and name"
-    )
-
-
-def refusal_of(
-    endpoints: tuple[Endpoint, Endpoint], floors: Sequence[Floor], closed: dict[int, ClosedCells]
-) -> PlanStatus | None:
-    """Return the status of a query whose start or goal point cannot be entered; None if both can,
-    and for names."""
-    for end, kind in zip(endpoints, ("START", "GOAL"), strict=True):
-        if isinstance(end.waypoint, str):
-            continue
-        planner = floors[end.floor].planner
-        grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
-        point = read_point(kind, end.waypoint)
-        cells = cells_of_endpoints(grid, (point, point), allow_unexplored=allowed)
-        status = cells if isinstance(cells, PlanStatus) else None
-        shut = planner.closed_for_all(closed.get(end.floor))
-        if status is None and shut is not None and not isinstance(cells, PlanStatus):
-            status = refusal(shut, cells, grid.shape)
-        if status is not None:
-            return PlanStatus[status.name.replace("START", kind)]
-    return None

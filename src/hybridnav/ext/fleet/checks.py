@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.links import Link
+from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
-from hybridnav.maps.names import did_you_mean
+from hybridnav.maps.names import did_you_mean, place_of_name
+from hybridnav.planner import PlanStatus
+from hybridnav.planner.endpoints import cells_of_endpoints, read_point, refusal
+from hybridnav.planner.named import check_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from hybridnav._base.typing import LongArray
     from hybridnav.ext.fleet.links import LinkEnd
+    from hybridnav.planner import OutOfOrder
+    from hybridnav.search.found import ClosedCells
 
 
 _LEAST_PART = 0.05
@@ -124,6 +130,24 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
     raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
 
 
+def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Link]) -> None:
+    """Refuse to close what is not in a building.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no such link, floor, door or room, or a door or a room lacks its floor.
+    """
+    names = tuple(floor.name for floor in floors)
+    if item.link is not None:
+        place_of_name(item.link, tuple(link.name for link in links), "link")
+    elif item.floor is None:
+        raise InvalidValueError(f"{item.what} needs its floor, as {names[0]}:{item.what}")
+    else:
+        floor = floors[place_of_name(item.floor, names, "floor")]
+        item.blocked.cells_of(floor.planner.topology)
+
+
 class FloorParts(NamedTuple):
     """The connected parts of a floor that the robot may be in."""
 
@@ -215,3 +239,80 @@ def check_speed(speed_m_s: float) -> float:
             f"speed_m_s is {speed_m_s!r:.40}, expected a finite number of metres per second above 0"
         )
     return float(speed_m_s)
+
+
+# Starts and goals in buildings: a floor, and a point or a name on it.
+
+
+def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
+    """Return the floor of a start or goal, and the point or name on it.
+
+    Parameters
+    ----------
+    what
+        "start" or "goal".
+    given
+        What the caller gave.
+    floors
+        The floors of the building.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is neither, the floor or the name is not known, the name is on several floors, or
+        the point is not two finite numbers.
+    """
+    if isinstance(given, str):
+        index, waypoint = _floor_of_name(given, floors), given
+    elif isinstance(given, tuple | list) and len(given) == 2 and isinstance(given[0], str):  # noqa: PLR2004
+        names = tuple(floor.name for floor in floors)
+        index, waypoint = place_of_name(given[0], names, "floor"), given[1]
+    else:
+        raise InvalidValueError(
+            f"{what} must be a floor and a point or name on it, such as ('3', (1.5, 2.0)), or a "
+            f"name alone, got {given!r:.80}"
+        )
+    if isinstance(waypoint, str):
+        check_names(floors[index].planner.topology, [waypoint])
+        return Endpoint(index, waypoint)
+    return Endpoint(index, read_point(what, waypoint))
+
+
+def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
+    """Return the index of the only floor that has a name."""
+    names_of = [
+        () if floor.rooms is None else (*floor.rooms.names, *floor.rooms.points) for floor in floors
+    ]
+    found = [number for number, names in enumerate(names_of) if name in names]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        known = tuple(dict.fromkeys(each for names in names_of for each in names))
+        hint = did_you_mean(name, known) if known else ": no floor has rooms"
+        raise InvalidValueError(f"no room or point of the building is called {name!r:.80}{hint}")
+    on = " and ".join(floors[number].name for number in found[:3])
+    raise InvalidValueError(
+        f"{name!r:.80} is a name on floors {on}: give the floor too, as in "
+        f"{floors[found[0]].name}:{name:.80}, or in Python the pair of floor and name"
+    )
+
+
+def refusal_of(
+    endpoints: tuple[Endpoint, Endpoint], floors: Sequence[Floor], closed: dict[int, ClosedCells]
+) -> PlanStatus | None:
+    """Return the status of a query whose start or goal point cannot be entered; None if both can,
+    and for names."""
+    for end, kind in zip(endpoints, ("START", "GOAL"), strict=True):
+        if isinstance(end.waypoint, str):
+            continue
+        planner = floors[end.floor].planner
+        grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
+        point = read_point(kind, end.waypoint)
+        cells = cells_of_endpoints(grid, (point, point), allow_unexplored=allowed)
+        status = cells if isinstance(cells, PlanStatus) else None
+        shut = planner.closed_for_all(closed.get(end.floor))
+        if status is None and shut is not None and not isinstance(cells, PlanStatus):
+            status = refusal(shut, cells, grid.shape)
+        if status is not None:
+            return PlanStatus[status.name.replace("START", kind)]
+    return None

@@ -11,6 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli.closed import change_closed, list_closed
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     UsageError,
@@ -20,10 +21,11 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.options import closing_lines, parsed_closing
+from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import check_model, load_numba, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
+from hybridnav.ext.fleet.checks import check_closing
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
@@ -76,6 +78,7 @@ def plan_over_floors(
     max_stretch: float | None,
     blocked: Sequence[str] | None,
     no_stairs: bool,
+    profile: str | None,
     plot: Path | None,
     language: str,
     as_json: bool,
@@ -83,7 +86,7 @@ def plan_over_floors(
 ) -> None:
     """Plan a route over floors, print the answer, and draw it; see `hybridnav plan`."""
     check_picture(plot)
-    how: dict[str, Any] = {"stairs": not no_stairs, "at": checked_at(at)}
+    how: dict[str, Any] = {"stairs": not no_stairs, "at": checked_at(at), "profile": profile}
     check_language(language)
     if max_stretch is not None and alternatives == 1:
         raise UsageError("--max-stretch is for alternatives: add --alternatives N, or leave it out")
@@ -92,6 +95,7 @@ def plan_over_floors(
     building = load_floors(map_file, reading, seconds)
     first, last = (_endpoint(text, building) for text in typed)
     how["closed_links"], how["blocked"] = _closures(building, blocked or ())
+    shut = [item.what for item in building.journal.items()] if building.journal else []
     others: BuildingAlternatives | None = None
     with stage("planning", {}, "plan"):
         if alternatives == 1:
@@ -103,8 +107,11 @@ def plan_over_floors(
         "building": str(map_file),
         "words": plans[0].words(language),
         "query": f"{typed[0]} to {typed[1]}",
-        "blocked": [printable(text) for text in blocked or ()] or None,
+        "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
     }
+    if profile is not None:
+        asks = next(one.described for one in building.profiles if one.name == profile)
+        figures["asks"] = asks
     if others is not None:
         solved = [other for other in others if other.solved]
         figures["alternatives"] = [
@@ -162,7 +169,11 @@ def _summary(file: Path, building: hn.ext.fleet.Building, figures: dict[str, Any
     radius = f"robot radius {building.robot_radius_m:g} m"
     name = printable(file.name)
     lines = [f"query      {name}, {figures['query']}, {radius}"]
-    lines += [*closing_lines(figures), f"status     {figures['status']}"]
+    lines += closing_lines(figures)
+    if "profile" in figures:
+        stated = {"name": figures["profile"], "asks": figures["asks"], "forbids": figures["note"]}
+        lines += profile_lines(stated)
+    lines.append(f"status     {figures['status']}")
     if figures["cost"] is not None:
         lines += _route_lines(figures)
     for number, line in enumerate(figures["words"]):
@@ -214,6 +225,27 @@ def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:
     if colon:
         place_of_name(floor, floors, "floor")
     return text
+
+
+def close_over_floors(
+    *,
+    map_file: Path,
+    close: Sequence[str] | None,
+    open_again: Sequence[str] | None,
+    why: str | None,
+    as_json: bool,
+    reading: MapOptions,
+) -> None:
+    """Close and open links, doors and rooms of a building; see `hybridnav closed`."""
+    loaded: list[hn.ext.fleet.Building] = []
+
+    def check(item: hn.OutOfOrder) -> None:
+        """Refuse what is not in the building, which is read once."""
+        loaded.append(loaded[0] if loaded else load_floors(map_file, reading, {}))
+        check_closing(item, loaded[0].floors, loaded[0].links)
+
+    change_closed(map_file, close or (), open_again or (), why, check=check)
+    list_closed(map_file, as_json=as_json)
 
 
 def build_over_floors(

@@ -12,12 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
+from hybridnav.planner.profile import PROFILES, Profile
 from hybridnav.planner.saved.container import buffers_of
 from hybridnav.planner.saved.parts import plain
 from hybridnav.planner.saved.structures import BUILDING, FLOOR
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import RoomLabels
     from hybridnav.planner import HybridPlanner, PlanResult
     from hybridnav.planner.saved.container import Part
+    from hybridnav.search.found import ClosedCells
 
 ROUNDED = 1.0 - 1e-12
 """Factor on sums and differences of lengths that serve as bounds, because they are rounded."""
@@ -99,10 +101,19 @@ class FloorTable:
         float64 (n, 2), the ends of links on it, `(x, y)` in metres.
     known
         Costs and bounds that were computed before, of the same map; None for none.
+    closed
+        Cells that are closed for all plans between the ends; None for none.
     """
 
-    def __init__(self, floor: Floor, positions_m: FloatArray, known: Known | None = None) -> None:
-        self.floor = floor
+    def __init__(
+        self,
+        floor: Floor,
+        positions_m: FloatArray,
+        known: Known | None = None,
+        *,
+        closed: ClosedCells | None = None,
+    ) -> None:
+        self.floor, self.closed = floor, closed
         self.positions_m = positions_m
         self._positions: list[tuple[float, float]] = positions_m.tolist()
         planner = floor.planner
@@ -143,12 +154,18 @@ class FloorTable:
         """Return the table itself while it is current, else an empty one of the map now."""
         return self if self.is_current else FloorTable(self.floor, self.positions_m)
 
+    def closing(self, closed: ClosedCells | None) -> FloorTable:
+        """Return an empty table of plans for which some cells are closed."""
+        return FloorTable(self.floor, self.positions_m, closed=closed)
+
     def between(self, start: int, goal: int) -> tuple[PlanResult, bool]:
         """Return the plan from one end of a link to another one, and whether it was kept."""
         kept = self._results.get((start, goal))
         if kept is not None:
             return kept, True
-        found = self.floor.planner.plan(self.positions_m[start], self.positions_m[goal])
+        found = self.floor.planner.plan(
+            self.positions_m[start], self.positions_m[goal], blocked=self.closed
+        )
         self._learn(start, goal, found.cost, found.lower_bound)
         self._results[start, goal] = found
         for old in list(self._results)[:-_KEPT]:
@@ -162,7 +179,7 @@ class FloorTable:
         is_missing = np.isnan(self.cost) & ~np.eye(len(self.cost), dtype=np.bool_)
         missing = np.argwhere(is_missing)
         if len(missing):
-            found = self.floor.planner.plan_many(*self.positions_m[missing.T])
+            found = self.floor.planner.plan_many(*self.positions_m[missing.T], blocked=self.closed)
             source, costs = found.bound_source, found.cost.tolist()
             # Bounds that take a search of their own are left to the pairs of a route.
             bounds = np.zeros(len(costs)) if callable(source) else source
@@ -261,13 +278,14 @@ class BuildingValues(_Values):
     speed_m_s: float
     floors: Annotated[list[_FloorValues], Field(min_length=1, max_length=10_000)]
     links: Annotated[list[Link], Field(max_length=10_000)]
+    profiles: Annotated[list[Profile], Field(max_length=1000)] = []
 
 
 def building_parts(  # noqa: PLR0913 - a building, taken apart
     floors: Sequence[Floor],
     links: Sequence[Link],
     known: Sequence[Known],
-    speed_m_s: float,
+    facts: Mapping[str, Any],
     parts_of: Callable[[HybridPlanner], Iterable[Part]],
     *,
     compress: bool,
@@ -276,8 +294,10 @@ def building_parts(  # noqa: PLR0913 - a building, taken apart
 
     Parameters
     ----------
-    floors, links, known, speed_m_s
+    floors, links, known
         Of the building; what is known of the costs between links, floor by floor.
+    facts
+        Its `speed_m_s` and its `profiles`.
     parts_of
         Returns the parts of the model of a planner.
     compress
@@ -293,8 +313,8 @@ def building_parts(  # noqa: PLR0913 - a building, taken apart
         raise InvalidValueError(
             f"a model holds a building of at most {_MOST_MAPS} maps, this one has {len(planners)}"
         )
-    values = {
-        "speed_m_s": speed_m_s,
+    values: dict[str, Any] = {
+        "speed_m_s": facts["speed_m_s"],
         "floors": [
             {
                 "name": floor.name,
@@ -305,6 +325,9 @@ def building_parts(  # noqa: PLR0913 - a building, taken apart
         ],
         "links": [plain(asdict(link)) for link in links],
     }
+    profiles = [plain(asdict(one)) for one in facts["profiles"] if one not in PROFILES]
+    if profiles:  # models without are read by earlier versions too
+        values["profiles"] = profiles
     written = [
         # A model has no costs of cells, and what is known by them does not hold without.
         one if floor.planner.costs is None else Known(np.zeros_like(one.lower), one.cost * np.nan)

@@ -66,6 +66,10 @@ class BuildingPlan:
     """Effort of the query, with that for plans which are not on the route."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
+    profile: str | None = None
+    """Name of the profile that it was planned under; None for none."""
+    note: str = ""
+    """What the profile forbids, one line, where that leaves no route."""
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
@@ -174,6 +178,7 @@ class BuildingPlan:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "instructions": [instruction.to_dict() for instruction in self.instructions],
             "words": self.words(),
+            **({} if self.profile is None else {"profile": self.profile, "note": self.note}),
         }
 
 

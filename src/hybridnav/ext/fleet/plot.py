@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import BuildingPlan
 from hybridnav.maps import CellClass
 from hybridnav.viz import style
-from hybridnav.viz.canvas import PAD_IN, Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import PAD_IN, Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, frame_axes, text_width
 from hybridnav.viz.maps import ground_entries
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
-    from hybridnav.viz.canvas import View
     from hybridnav.viz.layout import Entry
 
 _MARKS = {"lift": "s", "stairs": "^", "ramp": "D"}
@@ -33,6 +33,8 @@ _POINTS = 6.0
 """Side of the mark of a link, in points."""
 _LINE = 1.8
 _GAP_IN = 0.12
+_STRIP = 0.045
+"""Height of a floor that no route visits, in widths of its map."""
 _LEGEND_LINES = 4.5
 """Height of what stands below the lowest panel, in font sizes."""
 
@@ -48,7 +50,7 @@ def plot_building(
 
     Every end of a link has a mark by its kind, and its name. Each route is a line on the floors
     that it visits; where the first route takes a link, the mark is filled, and the name says which
-    floor it leads to.
+    floor it leads to. A floor that no route visits is a narrow strip with its links.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def plot_building(
     """
     shown = (plans,) if isinstance(plans, BuildingPlan) else tuple(plans)
     shown = tuple(plan for plan in shown if plan.solved)
-    views = [known_view(floor.planner.grid) for floor in building.floors]
+    views = [_view(floor, shown) for floor in building.floors]
     heights = [floor.elevation_m for floor in building.floors]
     order = sorted(range(len(views)), key=lambda number: (-heights[number], -number))
     if axes is None:
@@ -108,6 +110,20 @@ def plot_building(
     ground: list[Entry] = [(handle, text) for text, handle in entries.items()]
     add_legend(lowest, lines + ground, bar=bar, below=0.35 * lowest.sizes.font)
     return tuple(axes)
+
+
+def _is_strip(floor: Floor, plans: Sequence[BuildingPlan]) -> bool:
+    """Return whether there are routes, and none visits a floor."""
+    return bool(plans) and not any(floor.name in plan.floors for plan in plans)
+
+
+def _view(floor: Floor, plans: Sequence[BuildingPlan]) -> View:
+    """Return what is shown of a floor: a strip as wide as its map where no route visits it."""
+    view = known_view(floor.planner.grid)
+    if not _is_strip(floor, plans):
+        return view
+    middle, half = view.low[1] + view.size[1] / 2, min(_STRIP * view.size[0], view.size[1]) / 2
+    return View(np.array([view.low[0], middle - half]), np.array([view.high[0], middle + half]))
 
 
 def _panels(views: Sequence[View], order: Sequence[int], width_in: float) -> list[Axes]:
@@ -158,7 +174,20 @@ def _colours(plans: Sequence[BuildingPlan]) -> list[str]:
 def _draw_floor(
     canvas: Canvas, building: Building, floor: Floor, plans: Sequence[BuildingPlan]
 ) -> list[Entry]:
-    """Draw the ground, the routes and the links of a floor, and return the legend's entries."""
+    """Draw the ground, the routes and the links of a floor, and return the legend's entries.
+
+    A strip has the links alone, above where they are.
+    """
+    ends = [(link, end) for link in building.links if (end := link.end_on(floor.name))]
+    if _is_strip(floor, plans):
+        middle = float(canvas.view.low[1] + canvas.view.size[1] / 2)
+        labels = LabelPlacer(canvas)
+        held = [(end.position_m[0], middle) for _, end in ends]
+        labels.keep_free(held, 0.8 * _POINTS * canvas.sizes.line)
+        for link, end in ends:
+            at = replace(end, position_m=(end.position_m[0], middle))
+            _draw_end(canvas, labels, link, at, plans[:1])
+        return [(_mark(link, canvas, is_taken=False), link.kind) for link, _ in ends]
     lines = [
         (number, result.path.points)
         for number, plan in enumerate(plans)
@@ -171,7 +200,6 @@ def _draw_floor(
         line.set_gid(f"route-{number + 1}")
         canvas.ax.add_line(line)
     drawn = [points for _, points in lines]
-    ends = [(link, end) for link in building.links if (end := link.end_on(floor.name))]
     markers = _markers(floor, plans)
     entries, labels = _draw_ground(canvas, floor, drawn, [end.position_m for _, end in ends])
     labels.keep_free([marker.point for marker in markers], 5.0 * canvas.sizes.line)

@@ -83,7 +83,7 @@ class LinkSearch:
     endpoints
         Start and goal.
     closed
-        Closed cells of floors, by index.
+        Closed cells of floors, by index, in place of those of their tables.
     at
         Where in a room a path starts or ends.
 
@@ -191,8 +191,8 @@ class LinkSearch:
         """Plan one part, and take over its cost and its bound."""
         start, goal = part
         floor = self._floor_of(part)
-        table, closed = self._tables[floor], self._closed.get(floor)
-        if start != START and goal != GOAL and closed is None:
+        table, closed = self._tables[floor], self._closed_on(floor)
+        if start != START and goal != GOAL and floor not in self._closed:
             rows = self._network.ends[start].at, self._network.ends[goal].at
             result, was_kept = table.between(*rows)
             found = PlanDraft.of(result)
@@ -201,11 +201,15 @@ class LinkSearch:
             costs, key = self._slot(part)
             costs.known[key] = found.cost
             costs.lower[key] = max(costs.lower[key], found.lower_bound)
-            if closed is None and (start == START) != (goal == GOAL):
+            if floor not in self._closed and (start == START) != (goal == GOAL):
                 self._compare(table, part, found)
         self.drafts[part] = found
         if not was_kept:
             self.planned.append(found)
+
+    def _closed_on(self, floor: int) -> ClosedCells | None:
+        """Return the closed cells of a floor: those of the query, or those of its table."""
+        return self._closed.get(floor, self._tables[floor].closed)
 
     def _floor_of(self, part: Part) -> int:
         """Return the floor that a part lies on."""
@@ -217,8 +221,8 @@ class LinkSearch:
         if floor in self._divided:
             return
         self._divided.add(floor)
-        table, closed = self._tables[floor], self._closed.get(floor)
-        part_of = _parts(table.floor.planner, closed)
+        table = self._tables[floor]
+        part_of = _parts(table.floor.planner, self._closed_on(floor))
         frame = table.floor.planner.grid.frame
         own = part_of[tuple(frame.cells_of(table.positions_m).T)]
         costs = self._costs_on(floor)

@@ -88,6 +88,7 @@ SpacingOption = Annotated[
 def export(
     map_file: options.MapOrBuildingArgument,
     out: options.OutOption[Path | None] = None,
+    force: options.ForceOption = False,
     bundle: BundleOption = None,
     costs: options.CostsOption = None,
     operations: OperationsOption = False,
@@ -142,6 +143,7 @@ def export(
         )
     of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
     _check_style(style, of_roadmaps, {"--keep": keep})
+    _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -218,6 +220,7 @@ def _export_over_floors(
     *,
     map_file: Path,
     out: Path | None,
+    force: bool,
     kind: str,
     style: str,
     nodes: int | None,
@@ -237,6 +240,7 @@ def _export_over_floors(
         raise UsageError(
             f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
         )
+    _check_taken(out, force=force)
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
 
     seconds: dict[str, float] = {}
@@ -300,6 +304,12 @@ def _checked_out(kind: str, out: Path | None) -> Path:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
     return out
+
+
+def _check_taken(out: Path, *, force: bool) -> None:
+    """Refuse to write over a file."""
+    if out.is_file() and not force:
+        raise UsageError(f"{printable(out)} exists: add --force to write over it")
 
 
 def _check_polylines(kind: str, *, given: bool, straight: bool) -> None:

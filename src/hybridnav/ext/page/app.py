@@ -25,6 +25,7 @@ from hybridnav.ext.page.page import ASSETS, POLICY, asset, exported, exported_fl
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
+    Closing,
     Edit,
     Favour,
     Find,
@@ -156,6 +157,7 @@ class _Answers:
         gets: dict[str, Callable[[Request], Any]] = {
             f"{at}/map.json": lambda _: self._shown.describe(),
             f"{at}/state.json": lambda _: self._shown.state(),
+            f"{at}/closed.json": lambda _: self._shown.site.closings.describe(),
             f"{floor}/map.json": lambda request: self._floor(request).describe(),
             f"{floor}/rooms.json": lambda request: self._session(request).describe_rooms(),
             f"{floor}/outlines.json": lambda request: self._session(request).outlines(),
@@ -174,6 +176,7 @@ class _Answers:
                     query.model_copy(update={"preset": GRID, "brief": True})
                 ),
             ),
+            f"{at}/closed": (Closing, lambda _, change: self._shown.site.closings.describe(change)),
             f"{at}/alternatives": (
                 AlternativesQuery,
                 lambda _, query: self._shown.site.routes(query).alternatives(query),

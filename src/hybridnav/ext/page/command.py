@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.options import Costs
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
-    from hybridnav.ext.page.session import RoomsFile
+    from hybridnav.ext.page.kept import RoomsFile
 
 
 _ROOMS = "rooms.yaml"
@@ -150,13 +150,14 @@ class MapPage:
     file: RoomsFile
     rooms: hn.RoomLabels | None
     costs: hn.CostLayer | None
+    journal: hn.Journal
 
     @classmethod
     def read(cls, file: Path, rooms_file: Path | None, costs: Costs, reading: MapOptions) -> Self:
         """Read a map, and its rooms."""
         # These load numba, which help and wrong usage can do without.
         import hybridnav as hn  # noqa: PLC0415
-        from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415
+        from hybridnav.ext.page.kept import RoomsFile  # noqa: PLC0415
 
         preset = options.PRESET if costs else None
         settings = reading.settings(file, preset=preset, overrides=costs.overrides)
@@ -165,7 +166,7 @@ class MapPage:
         path = file.parent / _ROOMS if rooms_file is None else rooms_file
         kept = RoomsFile(path.parent, path.name)
         rooms = hn.load_rooms(path, model.grid) if path.exists() else model.rooms
-        return cls(model, settings, kept, rooms, costs.read(model.grid))
+        return cls(model, settings, kept, rooms, costs.read(model.grid), hn.Journal(file))
 
     @property
     def folder(self) -> Path:
@@ -191,7 +192,14 @@ class MapPage:
         tell("building places")
         topology = self.model.grown(self.settings.pyramid, rooms)
         return Site.of_map(
-            Session(self.model, topology, self.settings, costs=self.costs, file=self.file)
+            Session(
+                self.model,
+                topology,
+                self.settings,
+                costs=self.costs,
+                file=self.file,
+                journal=self.journal,
+            )
         )
 
 
@@ -250,7 +258,7 @@ class BuildingPage:
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
     """Return the files of rooms that a description names in its folder, by floor."""
-    from hybridnav.ext.page.session import RoomsFile  # noqa: PLC0415 - loads numpy
+    from hybridnav.ext.page.kept import RoomsFile  # noqa: PLC0415 - loads numpy
 
     found = {}
     for entry in floors:

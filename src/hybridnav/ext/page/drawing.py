@@ -10,21 +10,16 @@ import numpy as np
 import shapely
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of, named_ends
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import natural_key
-from hybridnav.planner import Blocked, load_preset, plan_alternatives, preset_names
-from hybridnav.planner.guide import sentences
+from hybridnav.planner import Blocked, PlanResult, load_preset, plan_alternatives, preset_names
 from hybridnav.planner.tour import tour_of
 from hybridnav.topology.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
     from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.page.requests import (
         AlternativesQuery,
         FloorClosed,
@@ -34,8 +29,7 @@ if TYPE_CHECKING:
     )
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import HybridPlanner, PlanResult, Preset, Tour
-    from hybridnav.planner.guide import Instruction
+    from hybridnav.planner import HybridPlanner, Journal, Preset, Tour
     from hybridnav.planner.saved import Model
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -49,24 +43,6 @@ _WHOLE = 0.75
 """Share of free cells from which a block belongs to that place."""
 _FLAT = 3
 """Width of a line of text by its height, about."""
-_DECIMALS = 3
-_METRE_DECIMALS = 6
-"""Decimals of points in metres: the page converts them there and back."""
-
-
-def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
-    """Return points `(x, y)` in metres as `[column, row]` in grid units."""
-    points = np.asarray(points_m, dtype=np.float64)
-    if not points.size:
-        return []
-    found: list[Any] = np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
-    return found
-
-
-def in_metres(point: Sequence[float], grid: OccupancyGrid) -> tuple[float, float]:
-    """Return a point `[column, row]` in grid units as `(x, y)` in metres."""
-    x, y = grid.frame.points_of_grid([point[1], point[0]]).round(_METRE_DECIMALS).tolist()
-    return x, y
 
 
 def known_box(grid: OccupancyGrid) -> list[int]:
@@ -261,6 +237,8 @@ class PagePlanning:
         self._model, self._settings, self._costs = model, settings, costs
         self._planners: dict[str, HybridPlanner] = {}
         self._making = threading.Lock()
+        self.journal: Journal | None = None
+        """What is closed for all queries until it is opened again."""
 
     @property
     def presets(self) -> list[str]:
@@ -297,7 +275,7 @@ class PagePlanning:
 
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
-        planner, points = self.planner(query.preset), self._points(query)
+        planner, points = self._under(query), self._points(query)
         closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
@@ -308,7 +286,12 @@ class PagePlanning:
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
         points, closed = self._points(query), self._closed(query)
-        return self.planner(query.preset).plan(*points, blocked=closed)
+        return self._under(query).plan(*points, blocked=closed)
+
+    def _under(self, query: PathQuery) -> HybridPlanner:
+        """Return the planner of the preset of a query, under its profile."""
+        planner = self.planner(query.preset)
+        return planner if query.profile is None else planner.under(query.profile)
 
     def kept(self) -> HybridPlanner:
         """Return what a model of the map holds."""
@@ -322,7 +305,7 @@ class PagePlanning:
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by other doors."""
         start, goal = self._points(query)
-        planner, closed = self.planner(query.preset), self._closed(query)
+        planner, closed = self._under(query), self._closed(query)
         found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
@@ -344,7 +327,9 @@ class PagePlanning:
     def _closed(self, query: PathQuery) -> Blocked | None:
         if query.closed.links:
             raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
-        return next(map(self.blocked, query.closed.floors), None)
+        asked = next(map(self.blocked, query.closed.floors), None)
+        shut = None if self.journal is None else self.journal.closures()
+        return asked | shut if asked and shut else asked or shut
 
     def blocked(self, closed: FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
@@ -389,60 +374,3 @@ class PagePlanning:
             "words": lines_of(tour.instructions, language, [(0, self.grid)]),
             "places": list(route.places) if route is not None else [],
         }
-
-
-def named_ends(query: PathQuery, points: Sequence[Any]) -> list[Any]:
-    """Return what words call the ends of a query: their names, or their points."""
-    ends = (query.start, query.goal)
-    return [end.name or point for end, point in zip(ends, points, strict=True)]
-
-
-def lines_of(
-    instructions: Sequence[Instruction], language: str, floors: Sequence[tuple[int, OccupancyGrid]]
-) -> list[dict[str, Any]]:
-    """Return the lines of instructions, each with the place and the door that it is about.
-
-    Parameters
-    ----------
-    instructions
-        What a person does on a route.
-    language
-        Code of the language.
-    floors
-        Number and map of each floor that is visited, in order.
-
-    Raises
-    ------
-    InvalidValueError
-        When there are no sentences in this language.
-    """
-    lines: list[dict[str, Any]] = []
-    visited = 0
-    for n_told, each in enumerate(instructions, 1):
-        # Two instructions may make one line: it is about the first of them.
-        while len(sentences(instructions[:n_told], language)) > len(lines):
-            floor, grid = floors[min(visited, len(floors) - 1)]
-            crossed = each.doorway or each.landmark
-            door = None if crossed is None else crossed.door
-            at = in_grid(each.position, grid)
-            lines.append({"floor": floor, "at": at, "door": door})
-        visited += each.kind == "ride"
-    texts = sentences(instructions, language)
-    return [line | {"text": text} for line, text in zip(lines, texts, strict=False)]
-
-
-def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the figures of a plan, and its lines floor by floor; None stands for what is not
-    finite."""
-    return {
-        "status": str(plan.status),
-        "solved": plan.solved,
-        "metric": plan.metric,
-        "parts": parts,
-        "seconds": round(sum(plan.stats.seconds.values()), 6),
-    } | {name: finite(getattr(plan, name)) for name in ("cost", "lower_bound", "gap")}
-
-
-def finite(value: float | None) -> float | None:
-    """Return a number, None for what JSON cannot hold."""
-    return value if value is not None and math.isfinite(value) else None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, RoomUse
 from hybridnav.topology.rooms.files.outlines import Outlines
 from hybridnav.topology.rooms.files.paint import cells_inside
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps import OccupancyGrid, RoomLabels
 
 
 _FAR = 1e7
@@ -73,6 +74,7 @@ class PathQuery(_Strict):
     stairs: bool = True
     language: Annotated[str, StringConstraints(max_length=10)] = "en"
     """The language of the words."""
+    profile: Name | None = None
 
 
 class PlanQuery(PathQuery):
@@ -91,6 +93,14 @@ class PartQuery(PathQuery):
     """The part of a route on one floor, to be written."""
 
     floor: FloorNumber
+
+
+class Closing(_Strict):
+    """A link, door or room to close until it is opened again, or to open; see `OutOfOrder`."""
+
+    what: Name
+    closed: bool
+    why: Annotated[str, Field(max_length=200)] = ""
 
 
 class At(_Strict):
@@ -268,7 +278,8 @@ def _renamed(rooms: RoomLabels, change: Rename) -> RoomLabels:
         raise InvalidValueError(f"another room is called {change.name!r:.80}: merge the two")
     names = tuple(change.name if at == label else name for at, name in enumerate(rooms.names))
     points = {change.name if name == change.room else name: p for name, p in rooms.points.items()}
-    return RoomLabels(names, rooms.label_of, points, rooms.doors)
+    uses = {change.name if name == change.room else name: u for name, u in rooms.uses.items()}
+    return replace(rooms, names=names, points=points, uses=uses)
 
 
 def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
@@ -284,7 +295,12 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
     renumbered = np.where(renumbered > gone, renumbered - 1, renumbered)
     names = tuple(name for at, name in enumerate(rooms.names) if at != gone)
     points = {name: at for name, at in rooms.points.items() if name != change.other}
-    return RoomLabels(names, renumbered, points, rooms.doors)
+    uses = {name: use for name, use in rooms.uses.items() if name != change.other}
+    one, other = (rooms.uses.get(name, RoomUse()) for name in (change.room, change.other))
+    uses[change.room] = replace(  # the stricter of both
+        one, private=one.private or other.private, cost=max(one.cost, other.cost)
+    )
+    return replace(rooms, names=names, label_of=renumbered, points=points, uses=uses)
 
 
 def _touch(one: BoolArray, other: BoolArray) -> bool:
@@ -310,7 +326,10 @@ def _split(rooms: RoomLabels, change: Split, grid: OccupancyGrid) -> RoomLabels:
     label_of = rooms.label_of.copy()
     label_of[row[right], col[right]] = len(rooms.names)
     points = {name: at for name, at in rooms.points.items() if name != change.room}
-    return RoomLabels((*rooms.names, change.name), label_of, points, rooms.doors)
+    names, uses = (*rooms.names, change.name), dict(rooms.uses)
+    if change.room in uses:  # a part of a private room is private
+        uses[change.name] = uses[change.room]
+    return replace(rooms, names=names, label_of=label_of, points=points, uses=uses)
 
 
 def _moved(rooms: RoomLabels, change: Move, grid: OccupancyGrid) -> RoomLabels:
@@ -328,7 +347,7 @@ def _moved(rooms: RoomLabels, change: Move, grid: OccupancyGrid) -> RoomLabels:
     if not counts.all():
         empty = rooms.names[int(counts.argmin())]
         raise InvalidValueError(f"{empty!r:.80} would have no free cell left")
-    return RoomLabels(rooms.names, label_of, rooms.points, rooms.doors)
+    return replace(rooms, label_of=label_of)
 
 
 def _with_corner(

@@ -2,40 +2,30 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import threading
-from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._base.files import printable, replace_file
-from hybridnav.errors import HybridNavError, InvalidValueError, RoomsError
-from hybridnav.ext.page.drawing import (
-    PagePlanning,
-    in_grid,
-    in_metres,
-    level_graph,
-    map_facts,
-    room_facts,
-)
+from hybridnav.errors import HybridNavError, InvalidValueError
+from hybridnav.ext.page.answers import in_grid, in_metres
+from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps import RoomLabels
 from hybridnav.maps.names import natural_key
 from hybridnav.planner.named import check_names
 from hybridnav.topology.rooms.choices import free_point, room_near
-from hybridnav.topology.rooms.files import save_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
+    from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import Change, Edit, Save, Stand
     from hybridnav.ext.page.tiles import Layer
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Preset
+    from hybridnav.planner import Journal, Preset
     from hybridnav.planner.saved import Model
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
@@ -63,6 +53,8 @@ class Session:
         Costs beside the presets, None for none.
     file
         The file of its rooms; None for rooms that cannot be saved.
+    journal
+        What is out of order on one map; None for none, and for a floor, whose building has it.
 
     Examples
     --------
@@ -75,7 +67,7 @@ class Session:
     6
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the last three have defaults
         self,
         model: Model,
         topology: TopologicalMap,
@@ -83,8 +75,10 @@ class Session:
         *,
         costs: CostLayer | None = None,
         file: RoomsFile | None = None,
+        journal: Journal | None = None,
     ) -> None:
         self._model, self._settings, self._costs = model, settings, costs
+        self.journal = journal
         self.grid = topology.grid
         self._file = file
         self._lock = threading.RLock()
@@ -109,6 +103,7 @@ class Session:
     def _use(self, topology: TopologicalMap) -> None:
         self._facts: dict[str, Any] | None = None
         self.planning = PagePlanning(self._model, topology, self._settings, self._costs)
+        self.planning.journal = self.journal
         for name in [name for name in self._layers if not name.startswith("costs-")]:
             del self._layers[name]
 
@@ -335,100 +330,4 @@ def _numbered(rooms: Rooms) -> RoomLabels:
     them."""
     labels = rooms.labels
     doors = {door.number: door.position for door in rooms.doors if not door.is_gap}
-    return RoomLabels(labels.names, labels.label_of, labels.points, {**labels.doors, **doors})
-
-
-# The file of rooms, and the journal that keeps changes until they are saved.
-
-_MOST_BYTES = 10_000_000
-"""Size of a journal that is read."""
-
-
-class RoomsFile:
-    """A file of rooms inside one folder, and its journal `.NAME.edits` beside it.
-
-    Parameters
-    ----------
-    folder
-        The folder outside of which nothing is written.
-    name
-        Name of the file in it.
-
-    Raises
-    ------
-    RoomsError
-        When the file is a link that leads out of the folder.
-    """
-
-    def __init__(self, folder: Path, name: str) -> None:
-        self.folder = folder.resolve()
-        self.path = self.folder / name
-        self.journal = self.folder / f".{name}.edits"
-        self._check_inside(self.path)
-        self._seen = self._digest()
-        self._told = self._seen
-
-    def _check_inside(self, path: Path) -> None:
-        if path.resolve().parent != self.folder:
-            raise RoomsError(
-                f"rooms {printable(path)}: a link that leads out of {printable(self.folder)}; "
-                "the page writes nothing outside the folder of the map"
-            )
-
-    def _digest(self) -> str:
-        """Return a digest of the file as it is, empty if there is none."""
-        try:
-            return hashlib.sha256(self.path.read_bytes()).hexdigest()
-        except OSError:
-            return ""
-
-    def is_changed(self, *, since_told: bool = False) -> bool:
-        """Return whether somebody else has changed the file since it was read or written here.
-
-        Parameters
-        ----------
-        since_told
-            Whether to overlook the change that the last call returned.
-        """
-        now = self._digest()
-        known = {self._seen, self._told} if since_told else {self._seen}
-        self._told = now
-        return now not in known
-
-    def save(self, rooms: RoomLabels, grid: OccupancyGrid) -> None:
-        """Write rooms whole or not at all, and end the journal.
-
-        Raises
-        ------
-        RoomsError
-            When the file cannot be written; the old one and the journal stay.
-        """
-        self._check_inside(self.path)
-        save_rooms(self.path, rooms, grid)
-        self._seen = self._digest()
-        with suppress(OSError):
-            self.journal.unlink(missing_ok=True)
-
-    def keep(self, changes: Sequence[dict[str, Any]]) -> str | None:
-        """Write changes into the journal; return why it could not be written, None if it was."""
-        self._check_inside(self.journal)
-        try:
-            if not changes:
-                self.journal.unlink(missing_ok=True)
-            else:
-                text = json.dumps({"rooms": self._seen, "changes": list(changes)})
-                replace_file(self.journal, [text.encode()])
-        except OSError as error:
-            return str(error.strerror)
-        return None
-
-    def kept(self) -> list[Any]:
-        """Return the changes of a journal, none where there is none that can be read."""
-        with suppress(OSError, ValueError, RecursionError, RoomsError):
-            self._check_inside(self.journal)
-            if self.journal.stat().st_size > _MOST_BYTES:
-                return []
-            found = json.loads(self.journal.read_text(encoding="utf-8"))
-            changes = found.get("changes") if isinstance(found, dict) else None
-            return changes if isinstance(changes, list) else []
-        return []
+    return replace(labels, doors={**labels.doors, **doors})

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
+from hybridnav.ext.fleet.checks import check_closing
 from hybridnav.ext.fleet.plan import GuidedRoute
-from hybridnav.ext.page.drawing import facts_of, finite, in_grid, in_metres, lines_of
+from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of
+from hybridnav.ext.page.kept import Closings
 from hybridnav.ext.page.session import Session
-from hybridnav.planner import Tour, load_preset, preset_names
+from hybridnav.planner import PROFILES, Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
 from hybridnav.topology.rooms import find_rooms
 
@@ -21,14 +23,14 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
+    from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import (
         AlternativesQuery,
         PartQuery,
         PathQuery,
         PlanQuery,
     )
-    from hybridnav.ext.page.session import RoomsFile
-    from hybridnav.planner import Blocked, HybridPlanner, PlanResult
+    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder, PlanResult
     from hybridnav.topology.rooms import Rooms
 
 _MOST_DIGITS = 3
@@ -97,16 +99,25 @@ class Site:
     """
 
     def __init__(
-        self, name: str, floors: Mapping[str, Session], routes: Callable[[], Routes]
+        self,
+        name: str,
+        floors: Mapping[str, Session],
+        routes: Callable[[], Routes],
+        closings: Closings,
     ) -> None:
         self.name = name
         self.names, self.sessions = tuple(floors), tuple(floors.values())
         self._routes = routes
+        self.closings = closings
+        """The profiles, and what is out of order."""
 
     @classmethod
     def of_map(cls, session: Session) -> Self:
         """Return the site of one map."""
-        return cls(session.grid.name, {"": session}, lambda: session.planning)
+        closings = Closings(
+            PROFILES, session.journal, lambda item: item.check_on(session.planning.topology)
+        )
+        return cls(session.grid.name, {"": session}, lambda: session.planning, closings)
 
     @classmethod
     def of_building(
@@ -136,7 +147,8 @@ class Site:
         """
         routes = _OverFloors(building, files, links)
         names = [floor.name for floor in building.floors]
-        return cls(name, dict(zip(names, routes.sessions, strict=True)), lambda: routes)
+        closings = Closings(building.profiles, building.journal, routes.check_closing)
+        return cls(name, dict(zip(names, routes.sessions, strict=True)), lambda: routes, closings)
 
     @property
     def site(self) -> Site:
@@ -276,6 +288,10 @@ class _OverFloors:
             for link in building.links
         ]
 
+    def check_closing(self, item: OutOfOrder) -> None:
+        """Refuse to close what is not in the building, with the rooms as they are now."""
+        check_closing(item, self._with(self._first).floors, self._building.links)
+
     @property
     def _number_of(self) -> dict[str, int]:
         return {floor.name: number for number, floor in enumerate(self._building.floors)}
@@ -303,8 +319,13 @@ class _OverFloors:
                     Floor(floor.name, planner, floor.elevation_m)
                     for floor, planner in zip(self._building.floors, planners, strict=True)
                 ]
-                speed_m_s = self._building.speed_m_s
-                made = Building(floors, self._building.links, speed_m_s=speed_m_s)
+                made = Building(
+                    floors,
+                    self._building.links,
+                    speed_m_s=self._building.speed_m_s,
+                    profiles=self._building.profiles,
+                    journal=self._building.journal,
+                )
                 self._made[preset] = made
             return made
 
@@ -372,7 +393,8 @@ class _OverFloors:
             if closed is not None:
                 blocked[self._building.floors[each.floor].name] = closed
         links, stairs = query.closed.links, query.stairs
-        return {"blocked": blocked, "closed_links": links, "stairs": stairs}
+        how = {"blocked": blocked, "closed_links": links, "stairs": stairs}
+        return how | {"profile": query.profile}
 
     def _facts(self, plan: BuildingPlan) -> dict[str, Any]:
         """Return the figures and lines of a plan, and its rides."""

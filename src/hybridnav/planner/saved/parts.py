@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import Frame, OccupancyGrid, RoomLabels
+from hybridnav.maps import Frame, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.files.movingai import check_size
 from hybridnav.maps.islands import DroppedIslands
 from hybridnav.planner import Preset
@@ -49,6 +49,7 @@ class _RoomsValues(_Values):
     names: list[str]
     points: dict[str, tuple[float, float]]
     doors: list[tuple[int, float, float]]
+    uses: dict[str, RoomUse] = {}
 
 
 class _PyramidValues(_Values):
@@ -187,11 +188,13 @@ def pyramid_settings(filed: FiledPart) -> dict[str, Any]:
 
 def rooms_part(rooms: RoomLabels) -> Part:
     """Describe rooms."""
-    values = {
+    values: dict[str, Any] = {
         "names": list(rooms.names),
         "points": {name: list(at) for name, at in rooms.points.items()},
         "doors": [[number, *at] for number, at in rooms.doors.items()],
     }
+    if rooms.uses:  # models without are read by earlier versions too
+        values["uses"] = {name: asdict(use) for name, use in rooms.uses.items()}
     return ROOMS.part(rooms, {}, values)
 
 
@@ -207,7 +210,7 @@ def rooms_of(filed: FiledPart, known: dict[str, int]) -> RoomLabels:
     label_of = ROOMS.read(filed, known)["label_of"]
     try:
         doors = {number: (x, y) for number, x, y in values.doors}
-        return RoomLabels(tuple(values.names), label_of, values.points, doors)
+        return RoomLabels(tuple(values.names), label_of, values.points, doors, values.uses)
     except InvalidValueError as error:
         raise refusal(filed, str(error)) from None
 

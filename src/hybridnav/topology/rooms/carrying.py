@@ -197,8 +197,7 @@ def carry_names(
     if found.best is None:
         return _nothing(old, old_grid, new, found.reason)
     moving = _Moving.of(old, found.best, one, other)
-    overlap = _Overlap.of(old, new, moving, one, other)
-    heir_of = _heirs(overlap)
+    heir_of = _heirs(overlap := _Overlap.of(old, new, moving, one, other))
     names, new_rooms = _names(old, new, {heir: room for room, heir in heir_of.items()})
     rooms = _rooms(old, new, overlap, heir_of, names)
     doors, door_points, new_doors = _doors((old, old_grid), (new, new_grid), moving, heir_of)
@@ -209,8 +208,9 @@ def carry_names(
         is_free = new_grid.measured[_inside(new_grid, np.array([at]))[0]] == CellClass.FREE
         if is_free.all() and is_free.size and (name not in old.names or room == name):
             kept[name] = at
+    uses = {name: use for name, use in old.uses.items() if rooms[name].status == "carried"}
     return CarriedNames(
-        RoomLabels(names, new.label_of, kept, door_points),
+        RoomLabels(names, new.label_of, kept, door_points, uses),
         transform_of(found.best, one, other),
         "",
         MappingProxyType(rooms),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -236,7 +236,7 @@ class Rooms:
         """The rooms in lists and pictures; cells of the others are in no room."""
         of = self.labels.label_of
         shown = np.where(np.append(self.is_listed, False)[of], of, np.int32(NO_ROOM))
-        return RoomLabels(self.names, shown, self.labels.points, self.labels.doors)
+        return replace(self.labels, label_of=shown)
 
     @cached_property
     def listed_doors(self) -> tuple[Door, ...]:

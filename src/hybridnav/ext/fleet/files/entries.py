@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, get_args
 
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import Limits, Marked, read_marked
-from hybridnav.errors import MapError, MapNotFoundError, brief
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.ext.fleet import LinkKind
+from hybridnav.planner import Profile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +21,8 @@ MOST_FLOORS = 99
 """Most floors of a building."""
 _MOST_LINKS = 1000
 _LIMITS = Limits(max_bytes=2**20, max_values=30_000)
-_FILE_KEYS = ("floors", "links", "speed_m_s")
+_FILE_KEYS = ("floors", "links", "speed_m_s", "profiles")
+_MOST_PROFILES = 100
 _FLOOR_KEYS = ("name", "map", "elevation_m", "rooms", "find_rooms")
 _LINK_KEYS = ("name", "kind", "ends", "wait_s", "ride_s", "cost_m", "max_radius_m")
 _END_KEYS = ("floor", "at", "room", "door", "yaw_rad")
@@ -72,6 +74,7 @@ class Entries:
     floors: tuple[FloorEntry, ...]
     links: tuple[LinkEntry, ...]
     speed_m_s: float | None
+    profiles: tuple[Profile, ...] = ()
 
 
 def read_building_entries(path: PathLike) -> Entries:
@@ -104,10 +107,35 @@ def read_building_entries(path: PathLike) -> Entries:
         tuple(_floor(item, _at(marked, where, "floors", i)) for i, item in enumerate(floors)),
         tuple(_link(marked, where, item, i) for i, item in enumerate(links)),
         values.number("speed_m_s"),
+        _profiles(marked, where, values.list_of("profiles", _MOST_PROFILES)),
     )
     _check_names("floor", found.floors)
     _check_names("link", found.links)
     return found
+
+
+def _profiles(marked: Marked, where: str, items: list[Any]) -> tuple[Profile, ...]:
+    """Return the profiles of the file."""
+    found: dict[str, Profile] = {}
+    keys = {one.name: one for one in fields(Profile)}
+    for number, item in enumerate(items):
+        at = _at(marked, where, "profiles", number)
+        values = _Values(item, at, tuple(keys))
+        name = values.name("name", needed=True) or ""
+        given: dict[str, Any] = {}
+        for key in values.given.keys() - {"name"}:
+            is_flag = isinstance(keys[key].default, bool)
+            if is_flag and not isinstance(values.given[key], bool):
+                shown = brief(values.given[key])
+                raise MapError(f"{at}: profile {name}: {key} must be true or false, got {shown}")
+            given[key] = values.given[key] if is_flag else values.number(key)
+        if name in found:
+            raise MapError(f"{at}: profile {name}: the name is given twice")
+        try:
+            found[name] = Profile(name=name, **given)
+        except InvalidValueError as error:
+            raise MapError(f"{at}: {error}") from None
+    return tuple(found.values())
 
 
 def _check_names(what: str, entries: Sequence[FloorEntry | LinkEntry]) -> None:

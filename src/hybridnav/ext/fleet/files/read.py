@@ -6,7 +6,7 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.checks import checked_radius
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner import load_preset
+from hybridnav.planner import Journal, load_preset
 from hybridnav.planner.guide.landmarks import Landmarks
 from hybridnav.planner.saved import is_model, load
 from hybridnav.planner.saved.container import parts_within, read_parts
@@ -65,8 +65,9 @@ def load_building(
         relative to the file), and optionally `elevation_m`, a file of `rooms`, or `find_rooms:
         true`; a list `links`, each with its `name`, its `kind` (lift, stairs or ramp), two or more
         `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`; and optionally
-        `speed_m_s`. An end has its `floor` and a place: `at: [x, y]`, a `room`, or the number of a
-        `door`, with the `room` on whose side of it the robot stands; and optionally `yaw_rad`.
+        `speed_m_s`, and `profiles`, each with its `name` and what differs from a plain `Profile`.
+        An end has its `floor` and a place: `at: [x, y]`, a `room`, or the number of a `door`, with
+        the `room` on whose side of it the robot stands; and optionally `yaw_rad`.
     robot_radius_m
         Radius of the robot in metres on all floors; None for that of the models, or of the preset.
     preset
@@ -78,7 +79,7 @@ def load_building(
     -------
     Building
         The building, whose links have been checked: the robot can stand at each end, and drive from
-        it to the rest of the floor.
+        it to the rest of the floor. Its journal is `NAME.closed.yaml` beside the file.
 
     Raises
     ------
@@ -124,7 +125,7 @@ def load_building(
             planners[key] = _planner(entry, folder, robot_radius_m, preset, max_cells)
         with _at(entry.at):
             floors.append(Floor(entry.name, planners[key], entry.elevation_m))
-    return _joined(entries, floors)
+    return _joined(entries, floors, Journal(path))
 
 
 def load_floor(
@@ -193,7 +194,7 @@ def _at(where: str) -> Iterator[None]:
         raise MapError(f"{where}: {error}") from None
 
 
-def _joined(entries: Entries, floors: list[Floor]) -> Building:
+def _joined(entries: Entries, floors: list[Floor], journal: Journal) -> Building:
     """Return the building of floors and links."""
     by_name = {floor.name: floor for floor in floors}
     links = [_link(entry, by_name) for entry in entries.links]
@@ -203,9 +204,9 @@ def _joined(entries: Entries, floors: list[Floor]) -> Building:
         with _at(entry.at):
             check_ends(link, by_name)
             check_reach(link, by_name, parts)
-    speed = {} if entries.speed_m_s is None else {"speed_m_s": entries.speed_m_s}
+    speed: dict[str, Any] = {} if entries.speed_m_s is None else {"speed_m_s": entries.speed_m_s}
     with _at(entries.where):
-        return Building(floors, links, **speed)
+        return Building(floors, links, profiles=entries.profiles, journal=journal, **speed)
 
 
 def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
@@ -304,7 +305,13 @@ def open_building(
     planners, are_same = [planner for planner, _ in made], all(is_same for _, is_same in made)
     try:
         floors = [Floor(one.name, planners[one.map], one.elevation_m) for one in values.floors]
-        building = Building(floors, values.links, speed_m_s=values.speed_m_s)
+        building = Building(
+            floors,
+            values.links,
+            speed_m_s=values.speed_m_s,
+            profiles=values.profiles,
+            journal=Journal(path),
+        )
     except InvalidValueError as error:
         raise MapError(f"{where}: {error}") from None
     if are_same:

@@ -17,7 +17,7 @@ import shapely
 
 from hybridnav._base.yaml_file import Limits, Marked
 from hybridnav.errors import InvalidValueError, RoomsError, brief
-from hybridnav.maps import NO_ROOM, OccupancyGrid
+from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomUse
 from hybridnav.maps.names import check_number
 from hybridnav.maps.occupancy import extent
 
@@ -190,7 +190,8 @@ def _varints(content: bytes) -> Iterator[int]:
 
 # --- entries --------------------------------------------------------------------------------------
 
-ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point")
+USE_KEYS = ("use", "prefer", "cost")
+ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point", *USE_KEYS)
 SHAPE_KEYS = ("polygon", "polygons", "seed")
 FILE_KEYS = ("rooms", "points", "doors", "cells", "map")
 _OUTSIDE_CELLS = 1.0
@@ -231,6 +232,7 @@ class Read:
     seeds: dict[int, tuple[float, float]] = field(default_factory=dict)
     points: dict[str, tuple[float, float]] = field(default_factory=dict)
     doors: dict[int, tuple[float, float]] = field(default_factory=dict)
+    uses: dict[str, RoomUse] = field(default_factory=dict)
     cells: list[str] = field(default_factory=list)
     label_of: IntArray | None = None
 
@@ -294,6 +296,10 @@ def _read_room(read: Read, entry: dict[str, Any], line: int, grid: OccupancyGrid
         if name in read.points:
             raise RoomsError(f"{at}: the room has a point in line {read.lines[room]}, keep one")
         read.points[name] = xy_of(entry["point"], f"{at}: point")
+    if any(key in entry for key in USE_KEYS):
+        if name in read.uses:
+            raise RoomsError(f"{at}: the room has a use in line {read.lines[room]}, keep one")
+        read.uses[name] = _use(entry, at)
     if "seed" in entry:
         if not is_new:
             raise RoomsError(
@@ -311,6 +317,18 @@ def _read_room(read: Read, entry: dict[str, Any], line: int, grid: OccupancyGrid
     outlines = [_ring(ring, f"{at}: polygon") for ring in list_of(rings, f"{at}: polygons")]
     checked = checked_rings([in_cells(ring, grid) for ring in outlines], at, grid)
     read.outlines.append(Outline(room, checked, fingerprint(outlines), line))
+
+
+def _use(entry: dict[str, Any], at: str) -> RoomUse:
+    """Return what an entry says of the use of its room."""
+    for key, word in (("use", "private"), ("prefer", "corridor")):
+        if entry.get(key, word) != word:
+            raise RoomsError(f"{at}: {key} must be {word}, got {brief(entry[key])}")
+    try:
+        cost = number_of(entry.get("cost", 1.0), f"{at}: cost")
+        return RoomUse("use" in entry, "prefer" in entry, cost)
+    except InvalidValueError as error:
+        raise RoomsError(f"{at}: {error}") from None
 
 
 def _check_beside(read: Read, grid: OccupancyGrid) -> None:

@@ -114,7 +114,7 @@ def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
             label_of = labels_of(read, grid)
         check_rooms(read, label_of, grid)
         check_points(read.points, read.where, grid)
-        return RoomLabels(tuple(read.names), label_of, read.points, read.doors)
+        return RoomLabels(tuple(read.names), label_of, read.points, read.doors, read.uses)
     except InvalidValueError as error:
         raise RoomsError(f"{read.where}: {error}") from None
 

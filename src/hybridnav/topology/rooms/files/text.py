@@ -278,6 +278,7 @@ def _held(
         if holds:
             now = rooms.names[heir_of[old]]
             holds = before.points.get(name) == rooms.points.get(now)
+            holds = holds and before.uses.get(name) == rooms.uses.get(now)
             holds = holds and (now == name or text.rename(at, now))
         held.append((name, holds))
     return held

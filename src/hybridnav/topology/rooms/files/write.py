@@ -12,7 +12,7 @@ import yaml
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
-from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.checks import checked_type
 from hybridnav.topology.rooms.files.entries import (
     LIMITS,
@@ -238,7 +238,9 @@ class _Writer:
         points, name = self._rooms.points, self._rooms.names[room]
         if name in points:
             lines.append(f"  point: {_corner(*points[name])}")
-        return lines
+        use = self._rooms.uses.get(name, RoomUse())
+        lines += ["  use: private"] * use.private + ["  prefer: corridor"] * use.corridor
+        return [*lines, f"  cost: {_number(use.cost)}"] if use.cost > 1 else lines
 
 
 def _n_values(text: str) -> int:

@@ -1,4 +1,4 @@
-"""Distances without paths: of one pair, and tables of many."""
+"""What a planner says beside its paths: distances of pairs and tables, and reasons."""
 
 from __future__ import annotations
 
@@ -21,21 +21,34 @@ if TYPE_CHECKING:
 
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.maps.costs import CostLayer
+    from hybridnav.planner import PlanBatch
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planning import Planning
+    from hybridnav.planner.private_rooms import Privacy
+    from hybridnav.planner.why import Explanation
     from hybridnav.search.found import ClosedCells
 
     Block = tuple[slice, slice, FloatArray]
+    Planned = Callable[[tuple[FloatArray, FloatArray]], PlanBatch]
 
 _PAIRS = 4096
 """Pairs that are planned at a time where there are no labels."""
 
 
-class Distances:
-    """What a planner says of distances; a part of `HybridPlanner`."""
+class Questions:
+    """What a planner says beside its paths; a part of `HybridPlanner`."""
 
     _now: Planning
+    _privacy: Privacy | None
     _query: Callable[[], AbstractContextManager[bool]]
+    _closing: Callable[..., Closable | ClosedCells | None]
+    plan_many: Callable[..., PlanBatch]
+
+    @property
+    def given_costs(self) -> CostLayer | None:
+        """The costs that were given to the planner, beside those of its preset."""
+        return self._now.costs.given
 
     def distance(
         self,
@@ -64,8 +77,45 @@ class Distances:
         2.546
         """
         with self._query():
-            now = self._now
-            return _distance(now, now.read(start, goal, None, blocked, "anywhere"))
+            now, closed = self._now, self._closing([start, goal], blocked)
+            return _distance(now, now.read(start, goal, None, closed, "anywhere"))
+
+    def explain(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        *,
+        blocked: Closable | ClosedCells | None = None,
+        radius_m: float | None = None,
+    ) -> Explanation:
+        """Explain why there is a path between two points or none, and what would have to change.
+
+        It finds the widest path, the fewest closures to open, and whether unexplored cells could
+        help: exactly, for a disc on the cells of the map. Dropped islands count as free.
+
+        Parameters
+        ----------
+        start, goal, blocked
+            As in `plan`; a room stands for its point.
+        radius_m
+            The robot's radius in metres, >= 0; None for the map's.
+
+        Raises
+        ------
+        InvalidValueError
+            As in `plan`, and when the radius is no number >= 0.
+
+        Examples
+        --------
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> planner = hn.HybridPlanner(topology)
+        >>> print(planner.explain((0.5, 0.5), (-2.0, 2.5)).words("de")[0])
+        Das Ziel liegt außerhalb der Karte.
+        """
+        with self._query():
+            now, closed = self._now, self._closing([start, goal], blocked)
+            poses = now.read(start, goal, None, closed, "point").poses
+            return explained(now, poses, closed, radius_m)
 
     def distances(
         self,
@@ -112,9 +162,15 @@ class Distances:
         array([[0.   , 2.546],
                [1.   , 2.096]])
         """
+        wanted = nearest, progress
+        if self._privacy is not None:  # each pair has private rooms of its own
+
+            def planned(pairs: tuple[FloatArray, FloatArray]) -> PlanBatch:
+                return self.plan_many(*pairs, blocked=blocked)
+
+            return _distances(self._now, (starts, goals), None, wanted, planned)
         with self._query():
-            now = self._now
-            return _distances(now, (starts, goals), now.closed(blocked), nearest, progress)
+            return _distances(self._now, (starts, goals), self._now.closed(blocked), wanted)
 
 
 def _distance(now: Planning, request: Any) -> float:
@@ -132,10 +188,14 @@ def _distances(
     now: Planning,
     ends: tuple[Any, Any],
     closed: ClosedCells | None,
-    nearest: int | None,
-    progress: Progress = no_progress,
+    wanted: tuple[int | None, Progress],
+    planned: Planned | None = None,
 ) -> FloatArray | sparse.csr_array[Any, Any]:
-    """Return the costs of shortest paths between many ends; see `HybridPlanner.distances`."""
+    """Return the costs of shortest paths between many ends; see `HybridPlanner.distances`.
+
+    With `planned` each pair is planned by it.
+    """
+    nearest, progress = wanted
     if nearest is not None and (
         isinstance(nearest, bool) or nearest < 1 or nearest != int(nearest)
     ):
@@ -151,7 +211,7 @@ def _distances(
     table = None if nearest else np.full(shape, np.nan)
     kept = _Nearest(shape, min(nearest or 1, max(shape[1], 1)))
     n_blocks, total = 0, max(1, len(starts) * len(goals))
-    for rows, columns, lengths in _blocks(now, (starts, goals), closed):
+    for rows, columns, lengths in _blocks(now, (starts, goals), closed, planned):
         at, to = start_at[rows], goal_at[columns]
         if table is None:
             kept.add(at, to, lengths)
@@ -177,14 +237,19 @@ def _usable(
 
 
 def _blocks(
-    now: Planning, ends: tuple[FloatArray, FloatArray], closed: ClosedCells | None
+    now: Planning,
+    ends: tuple[FloatArray, FloatArray],
+    closed: ClosedCells | None,
+    planned: Planned | None,
 ) -> Iterator[Block]:
     """Yield blocks of the table, in metres: by labels, or pair by pair."""
     labels = None
-    if closed is None and now.ompl is None and now.costs.layer is None:
+    if planned is None and closed is None and now.ompl is None and now.costs.layer is None:
         labels = now.method.labels()
     if labels is None:
-        yield from _pair_by_pair(now, ends, closed)
+        yield from _pair_by_pair(
+            ends, planned or (lambda pairs: now.plan_many(pairs, None, closed))
+        )
         return
     from hybridnav.search.distance_table import distance_blocks  # noqa: PLC0415 - loads kernels
 
@@ -194,16 +259,14 @@ def _blocks(
         yield rows, columns, lengths * frame.resolution_m
 
 
-def _pair_by_pair(
-    now: Planning, ends: tuple[FloatArray, FloatArray], closed: ClosedCells | None
-) -> Iterator[Block]:
+def _pair_by_pair(ends: tuple[FloatArray, FloatArray], planned: Planned) -> Iterator[Block]:
     """Yield rows of the table by plans of their pairs."""
     starts, goals = ends
     step = max(1, _PAIRS // max(len(goals), 1))
     for first in range(0, len(starts), step):
         some = starts[first : first + step]
         pairs = some.repeat(len(goals), axis=0), np.tile(goals, (len(some), 1))
-        cost = now.plan_many(pairs, None, closed).cost.reshape(len(some), len(goals))
+        cost = planned(pairs).cost.reshape(len(some), len(goals))
         yield slice(first, first + len(some)), slice(0, len(goals)), cost
 
 
@@ -230,3 +293,10 @@ class _Nearest:
         kept = np.isfinite(self._cost)
         begin = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
         return sparse.csr_array((self._cost[kept], self._to[kept], begin), shape=self._shape)
+
+
+def explained(now: Planning, ends: Any, blocked: Any, radius_m: float | None = None) -> Explanation:
+    """Explain a query; see `Questions.explain`."""
+    from hybridnav.planner.why import explain  # noqa: PLC0415 - plans do not need shapely
+
+    return explain(now, ends, blocked, radius_m=radius_m)
