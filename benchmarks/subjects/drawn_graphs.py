@@ -1,19 +1,24 @@
 """The table of graphs that people have drawn: what is wrong with them, and how long routes are.
 
-Seven graphs of Nav2 and STRANDS on their maps, and beside each two that hybridnav builds from the
-map: lanes, and a roadmap. Pairs are random free cells
-with a path between them. `at a wall` are routes over an edge that the robot cannot follow, in the
-graph as it is; `solved` and the losses, over the shortest any-angle path, are those without such
-edges, and the losses are those of the pairs that all three graphs solve (`common`). Every route is
-judged anew; a wrong one ends the command.
+Seven graphs of Nav2 and STRANDS on their maps and three of AMRL on their walls, and beside each two
+that hybridnav builds from the map: lanes, and a roadmap. Pairs are random free cells with a path
+between them. `edges in walls` are those that the robot cannot follow, `out of reach` is the share
+of free points that see no node. `at a wall` are routes over an edge that the robot cannot follow,
+in the graph as it is; `solved` and the losses, over the shortest any-angle path, are those without
+such edges, and the losses are those of the pairs that all three graphs solve (`common`). Every
+route is judged anew; a wrong one ends the command.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from typing import TYPE_CHECKING
 
+import networkx as nx
 import numpy as np
+from PIL import Image, ImageDraw
+from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option, read
@@ -26,6 +31,7 @@ from hybridnav.harness.tables import to_markdown
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable
+    from pathlib import Path
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.graphs import RouteGraph
@@ -41,6 +47,10 @@ GRAPHS = {
     "strands/tsc_y3/tsc_y3_final.tplg": "strands/tsc_y3/tsc20160523.yaml",
     "strands/tsc_y4/tsc_y4_final.tplg.tpl": "strands/tsc_y4/tsc_1701.yaml",
 }
+WALLS = "GDC3", "AHG2", "AHG_Apartment"
+"""Graphs of AMRL, which come with segments of walls; those of GDC2 leave its outside open."""
+_CELL_M, _RIM_M, _GAP_M = 0.05, 4.0, 3.0
+"""Cells of walls, the free rim round them, and the widest gap that lets no outside in."""
 BUILDERS: dict[str, Callable[[hn.TopologicalMap], RouteGraph]] = {
     "lanes": hn.ext.graphs.build_lane_graph,
     "roadmap": hn.ext.graphs.build_route_graph,
@@ -48,11 +58,40 @@ BUILDERS: dict[str, Callable[[hn.TopologicalMap], RouteGraph]] = {
 """What hybridnav builds, by the names of the styles of `hybridnav export`."""
 
 
+def drawn_on_walls(
+    data: Path, name: str, radius_m: float
+) -> tuple[hn.ext.graphs.WaypointGraph, hn.OccupancyGrid]:
+    """Return a graph of AMRL, and a grid of its walls, unexplored outside."""
+    stated, walls = (
+        json.loads((data / f"amrl_maps/{name}.{kind}.json").read_text(encoding="utf-8"))
+        for kind in ("navigation", "vectormap")
+    )
+    ends = np.array([[(wall[end]["x"], wall[end]["y"]) for end in ("p0", "p1")] for wall in walls])
+    origin = ends.min(axis=(0, 1)) - _RIM_M
+    cells = (ends - origin) / _CELL_M
+    cols, rows = np.ceil(cells.max(axis=(0, 1)) + _RIM_M / _CELL_M).astype(int).tolist()
+    image = Image.new("1", (cols, rows))
+    pen = ImageDraw.Draw(image)
+    for line in cells.reshape(-1, 4).tolist():
+        pen.line(line, fill=1)
+    is_wall = np.array(image)
+    half = _GAP_M / 2 / _CELL_M
+    wide, _ = ndimage.label(ndimage.distance_transform_edt(~is_wall) > half)
+    is_outside = ndimage.distance_transform_edt(wide != wide[0, 0]) <= half
+    values = np.select([is_wall, is_outside], [1.0, 0.5], 0.0)
+    frame = hn.Frame(_CELL_M, origin_m=(float(origin[0]), float(origin[1])))
+    grid = hn.OccupancyGrid(values, frame, robot_radius_m=radius_m, name=name)
+    drawn: nx.Graph[str] = nx.Graph()
+    drawn.add_nodes_from((node["id"], node["loc"]) for node in stated["nodes"])
+    drawn.add_edges_from((edge["s0_id"], edge["s1_id"]) for edge in stated["edges"])
+    return hn.ext.graphs.WaypointGraph.from_networkx(drawn, name="amrl"), grid
+
+
 def rows_of(
     graph: hn.ext.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
 ) -> list[Row]:
     """Return the rows of a drawn graph, and of those that are built."""
-    graphs = {graph.format: graph}
+    graphs = {graph.name if graph.format == "networkx" else graph.format: graph}
     for name, build in BUILDERS.items():
         built = build(topology)
         graphs[name] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name=name)
@@ -90,8 +129,8 @@ def _checked(
     return {
         "nodes": graph.n_nodes,
         "edges": graph.n_edges,
-        "clear edges %": 100 * float(check.is_clear.mean()),
-        "points in sight %": 100 * check.in_sight,
+        "edges in walls": int((~check.is_clear).sum()),
+        "out of reach %": 100 * (1 - check.in_sight),
         "doors": "{} of {}".format(*check.doors),
         "at a wall %": 100 * at_wall / len(pairs),
     }
@@ -122,9 +161,13 @@ OPTIONS = [
 def main(given: Namespace) -> None:
     """Print the table."""
     rows: list[Row] = []
-    for file, map_file in GRAPHS.items():
-        graph = hn.ext.graphs.load_graph(given.data / file)
-        grid = read(given.data / map_file, given.radius)
+    data = given.data
+    drawn = [
+        (hn.ext.graphs.load_graph(data / file), read(data / map_file, given.radius))
+        for file, map_file in GRAPHS.items()
+    ]
+    drawn += [drawn_on_walls(data, name, given.radius) for name in WALLS]
+    for graph, grid in drawn:
         rooms = hn.find_rooms(grid)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
         optimum = AnyAngleOptimum(grid)

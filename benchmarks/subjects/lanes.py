@@ -2,7 +2,9 @@
 
 The office of `maps/office`, 12 buildings, three maps that nothing was chosen on, and seven drawn
 graphs, robot radius 0.25 m, with rooms. Pairs are random free points with a path between them, the
-same for all graphs of a map. `nearest` are routes by the nearest node in sight, as
+same for all graphs of a map. `parts` of the loss: `own` is that of the best route from any
+point of an edge (one in 0.5 m) to any other, which the graph itself costs; `best` is that from the
+best nodes, `nearest` that from the nearest. `nearest` are routes by the nearest node in sight, as
 `judge_route_graph` has them; `Nav2` are routes as its route server joins them: by the nearest node
 if it is in sight, else by that of the five nearest to which the path is shortest, first and last
 edges left out where the robot has passed their node, and shortest paths to the first node and from
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import sys
 import time
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +37,7 @@ from hybridnav.ext.graphs.attach import (
 )
 from hybridnav.ext.graphs.judge import FreeSpace, excess_of
 from hybridnav.ext.graphs.kernels import least_along
+from hybridnav.ext.graphs.sketch import settled
 from hybridnav.harness.tables import to_markdown
 from hybridnav.topology.rooms.doors import measured_clearance_m
 
@@ -51,6 +55,7 @@ _UNSEEN = (
 )
 _CANDIDATES = 5
 """Nearest nodes that Nav2's route server looks at (`num_nearest_nodes`)."""
+_PART_M = 0.5
 _PASSED_M = 0.1, 0.15
 """Distances from the first and the last node above which it leaves out their edge."""
 
@@ -81,6 +86,8 @@ class Floor:
         network = Network.of(space.sight, at, usable, np.flatnonzero(is_free))
         joined = network.with_candidates(MANY_CANDIDATES).join(self.starts, self.goals)
         nearest = excess_of(joined.nearest(), self.optimum)
+        best = excess_of(joined.best(), self.optimum)
+        own = excess_of(self.own_lengths(at, usable), self.optimum)
         nav2 = excess_of(self.nav2_lengths(at, is_free, usable), self.optimum)
         least, _ = least_along(space.free, self.clearance_m, at, usable)
         return {
@@ -95,6 +102,8 @@ class Floor:
             "not free": int((~clear).sum()),
             "clearance m": float(least.min()) if len(least) else None,
             "clearance p5 m": float(np.percentile(least, 5)) if len(least) else None,
+            "own mean %": 100 * own.mean,
+            "best mean %": 100 * best.mean,
             "nearest mean %": 100 * nearest.mean,
             "nearest p95 %": 100 * nearest.p95,
             "in sight %": 100 * nearest.solved,
@@ -103,6 +112,24 @@ class Floor:
             "Nav2 solved %": 100 * nav2.solved,
             "seconds": seconds,
         }
+
+    def own_lengths(self, at: FloatArray, edges: LongArray) -> FloatArray:
+        """Return the lengths of the best routes of all pairs that join edges at points of 0.5 m,
+        in cells, infinite for none."""
+        tails, heads = at[edges[:, 0]], at[edges[:, 1]]
+        parts = np.hypot(*(heads - tails).T) * self.grid.resolution_m // _PART_M
+        parts = np.maximum(parts, 1).astype(np.int64)
+        which = np.repeat(np.arange(len(edges)), parts - 1)
+        first = len(at) + np.concatenate([[0], np.cumsum(parts - 1)])
+        along = (np.arange(len(which)) - (first[which] - len(at)) + 1) / parts[which]
+        inner = settled(tails[which] + (heads - tails)[which] * along[:, None])
+        chains = [
+            [tail, *range(first[k], first[k + 1]), head]
+            for k, (tail, head) in enumerate(edges.tolist())
+        ]
+        steps = np.array([step for chain in chains for step in pairwise(chain)], dtype=np.int64)
+        network = Network.of(self.space.sight, np.concatenate([at, inner]), steps.reshape(-1, 2))
+        return network.with_candidates(MANY_CANDIDATES).join(self.starts, self.goals).best()
 
     def nav2_lengths(self, at: FloatArray, is_free: Any, edges: LongArray) -> FloatArray:
         """Return the lengths of the routes of all pairs as Nav2 joins them, in cells, infinite for
@@ -159,7 +186,7 @@ class Floor:
         far = np.hypot(*(point - first)) * self.grid.resolution_m > least_m
         return nodes[1:] if is_passed and far else nodes
 
-    def kept(self, graph: hn.ext.graphs.RouteGraph, spacing_m: float) -> float:
+    def kept(self, graph: hn.ext.graphs.RouteGraph, spacing_m: float | None) -> float:
         """Return the share of nodes that keep their ids on a map with boxes, in percent."""
         grid, rng = self.grid, np.random.default_rng(0)
         classes = np.array(grid.measured)
@@ -193,16 +220,19 @@ def crossings(points: FloatArray, edges: LongArray) -> int:
     return int(apart.sum() + along.sum())
 
 
-def rows_of(floor: Floor, drawn: Path | None, spacings: list[float], *, steady: bool) -> list[Row]:
+def rows_of(
+    floor: Floor, drawn: Path | None, spacings: list[float | None], *, steady: bool
+) -> list[Row]:
     """Return the rows of the graphs of a floor."""
     graphs = hn.ext.graphs
     rows = []
     if drawn is not None:
         rows.append(floor.row("drawn", graphs.load_graph(drawn), float("nan")))
     for spacing_m in spacings:
-        began = time.perf_counter()
+        began = time.process_time()
         built = graphs.build_lane_graph(floor.topology, spacing_m=spacing_m)
-        row = floor.row(f"lanes, {spacing_m:g} m", built, time.perf_counter() - began)
+        name = "lanes" if spacing_m is None else f"lanes, {spacing_m:g} m"
+        row = floor.row(name, built, time.process_time() - began)
         if steady:
             row["kept %"] = floor.kept(built, spacing_m)
         if row["crossings"] or row["not free"]:
@@ -214,7 +244,7 @@ def rows_of(floor: Floor, drawn: Path | None, spacings: list[float], *, steady: 
 OPTIONS = [
     DATA,
     option("--maps", action="append", default=[]),
-    option("--spacing", default="4", help="distances between lanes in metres, with commas"),
+    option("--spacing", default="", help="distances between lanes in metres, with commas"),
     option("--nodes", default="", help="numbers of nodes of roadmaps beside, with commas"),
     option("--pairs", type=int, default=1000),
     option("--steady", action="store_true", help="state how many nodes keep their ids"),
@@ -223,7 +253,7 @@ OPTIONS = [
 
 def main(given: Namespace) -> None:
     """Print the tables."""
-    spacings = [float(word) for word in given.spacing.split(",")]
+    spacings = [float(word) if word else None for word in given.spacing.split(",")]
     roadmaps = [int(word) for word in given.nodes.split(",") if word]
     names = [*BUILDINGS, *_UNSEEN] if given.data else []
     files: dict[Path, Path | None] = {OFFICE: None}
@@ -238,9 +268,9 @@ def main(given: Namespace) -> None:
         floor = Floor(file, given.pairs)
         found = rows_of(floor, drawn, spacings, steady=given.steady)
         for nodes in roadmaps:
-            began = time.perf_counter()
+            began = time.process_time()
             built = hn.ext.graphs.build_route_graph(floor.topology, nodes=nodes or None)
-            seconds = time.perf_counter() - began
+            seconds = time.process_time() - began
             found.append(floor.row(f"roadmap, {nodes or 'all'}", built, seconds))
         rows += found
         sys.stderr.write("".join(f"{row}\n" for row in found))

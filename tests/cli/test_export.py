@@ -275,12 +275,25 @@ def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
     for kind, (name, more) in formats.items():
         out = tmp_path / name
         done = cli("export", FIGURE, "-o", out, "--format", kind, *SMALL, *more, "--json")
-        assert (done.code, done.err) == (0, "")
+        assert done.code == 0
+        loss = done.answer["report"]["nearest"]["mean"]
+        assert ("warning: routes on the graph of figure1" in done.err) == (loss > 0.1)
         graph = hn.ext.graphs.load_graph(out)
         assert (graph.n_nodes, graph.n_edges) == (done.answer["nodes"], done.answer["edges"])
         assert [floor.name for floor in hn.ext.fleet.load_building_graph(out).floors] == ["0"]
         done = cli("check", FIGURE, out, *SMALL[:2], "--floor", "0", "--json")
         assert (done.code, done.answer["findings"]) == (0, {})
+
+
+def test_the_loss_of_few_nodes_is_printed_and_a_warning(cli, tmp_path):
+    given = ("export", OFFICE, "-o", tmp_path / "a.geojson", "--style", "roadmap", "--nodes")
+    few = cli(*given, 60, "--json")
+    loss = few.answer["report"]["nearest"]["mean"]
+    assert (few.code, loss > 0.1) == (0, True)
+    assert f"are {loss:.0%} longer on average than shortest paths, above 10%" in few.err
+    many = cli(*given, 2000)
+    assert (many.code, many.err) == (0, "")
+    assert "nearest    routes longer by" in many.out
 
 
 def test_what_a_format_does_not_hold_is_printed(cli, tmp_path):

@@ -106,6 +106,13 @@ def test_a_hall_has_a_net_of_lanes():
     assert (steps.min(axis=1) <= 0.05 * steps.max(axis=1)).mean() >= 0.7
 
 
+def test_a_small_hall_has_a_finer_net_and_a_large_one_that_of_4_m():
+    small, large = floor(hall(50, 50)), floor(hall(160, 200))
+    assert checked(small).n_edges >= 2 * checked(small).n_nodes  # rings, where 4 m leaves none
+    assert checked(small, spacing_m=4.0).n_edges < 2 * checked(small, spacing_m=4.0).n_nodes
+    assert np.array_equal(checked(large).positions, checked(large, spacing_m=4.0).positions)
+
+
 def test_rooms_and_doors_have_nodes_and_edges_have_names():
     topology = topology_of(HOUSE)
     graph = checked(topology)

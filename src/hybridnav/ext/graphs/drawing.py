@@ -89,7 +89,7 @@ class ChainGraph:
     def _drop_node(self, node: int) -> None:
         del self._positions[node], self._at[node], self._kinds[node]
 
-    def prune(self, small: float, small_narrow: float) -> None:
+    def prune(self, small: float, small_narrow: tuple[float, float]) -> None:
         """Leave out one side of each small ring, the one with less room.
 
         Parameters
@@ -97,13 +97,15 @@ class ChainGraph:
         small
             Length of a small ring in cells.
         small_narrow
-            The same where the side has less room than is asked for.
+            The same where the side has less room than is asked for: a little less, and none.
         """
         comfort, lines = self._passage.comfort, self._lines
         order = sorted(lines, key=lambda k: (min(lines[k].narrow, comfort), -lines[k].length, k))
         for key in order:
             line = lines[key]
-            rest = (small_narrow if line.narrow < comfort else small) - line.length
+            lack = 1 - min(line.narrow / comfort, 1) if comfort else 0.0
+            limit = small_narrow[0] + (small_narrow[1] - small_narrow[0]) * lack
+            rest = (limit if lack else small) - line.length
             if rest >= 0 and len(self._at[line.tail]) > 1 and self._detour(key, rest) <= rest:
                 self._drop(key)
         self._join()

@@ -27,6 +27,7 @@ from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, l
 from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
+    LOSS_PAIRS,
     AnchorOption,
     Bundle,
     BundleOption,
@@ -41,6 +42,7 @@ from hybridnav.ext.graphs.fleet_options import (
     StretchOption,
     StyleOption,
     VehiclesOption,
+    warn_of_loss,
 )
 
 if TYPE_CHECKING:
@@ -61,8 +63,8 @@ _STYLES = ("lanes", "roadmap")
 _SHOWN = 8
 """Ids in a line about changes."""
 _STRETCH = 1.05
-_APART_M, _NEAR_M, _FAR_M = 4.0, 1.0, 2.0
-"""Spacing of lanes; of roadmaps for Nav2, which joins them at the nearest node; and of all other
+_NEAR_M, _FAR_M = 1.0, 2.0
+"""Spacing of roadmaps for Nav2, which joins them at the nearest node; and of all other
 roadmaps: one-way lanes need long edges."""
 
 FormatOption = Annotated[
@@ -73,8 +75,8 @@ SpacingOption = Annotated[
     typer.Option(
         "--spacing",
         metavar="D",
-        help=f"Distance in metres between the lanes of a hall, by default {_APART_M:g}; of a "
-        f"roadmap, within which points see a node, by default {_NEAR_M:g}, with --lanes and in "
+        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of "
+        f"a roadmap, within which points see a node, by default {_NEAR_M:g}, with --lanes and in "
         f"formats other than nav2 {_FAR_M:g}.",
     ),
 ]
@@ -174,10 +176,12 @@ def export(
     with stage(f"writing {out}", seconds, "write"):
         written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
         left_out = _write_graph(topology, (graph, written), fleet or robot, out, frame)
+    is_few = (fleet is not None or nodes is not None) and not polylines
+    pairs = LOSS_PAIRS if report is None and is_few else report
     judged = None
-    if report is not None:
+    if pairs is not None:
         with stage("comparing routes", seconds, "report"):
-            judged = hn.ext.graphs.judge_route_graph(graph, pairs=report)
+            judged = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
     figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
     lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
@@ -187,11 +191,11 @@ def export(
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
     figures |= {"changes": changes} if changes else {}
     _respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
+    warn_of_loss({graph.grid.name: judged} if judged is not None and is_few else {})
     if plot is not None:
-        from hybridnav.ext.graphs import plot_route_graph  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
 
-        save_figure(plot_route_graph(graph), plot)
+        save_figure(hn.ext.graphs.plot_route_graph(graph), plot)
 
 
 def _builder(
@@ -205,8 +209,7 @@ def _builder(
 ) -> Callable[..., RouteGraph]:
     """Return what builds the graph of a map in a style; see `export`."""
     if style == "lanes":
-        apart_m = _APART_M if spacing_m is None else spacing_m
-        return partial(hn.ext.graphs.build_lane_graph, spacing_m=apart_m)
+        return partial(hn.ext.graphs.build_lane_graph, spacing_m=spacing_m)
     return partial(
         hn.ext.graphs.build_route_graph,
         nodes=nodes,
@@ -247,11 +250,19 @@ def _export_over_floors(
     building = load_floors(map_file, reading, seconds)
     seed = reading.seed or 0
     build = _builder(style, nodes, spacing_m, is_near=False, stretch=stretch, seed=seed)
+    reports: list[GraphReport] = []
+
+    def judging(topology: hn.TopologicalMap) -> RouteGraph:
+        built = build(topology)
+        reports.append(hn.ext.graphs.judge_route_graph(built, pairs=LOSS_PAIRS))
+        return built
+
     began = time.perf_counter()
     with progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
-            building, name=map_file.stem, build=build, progress=advance
+            building, name=map_file.stem, build=judging, progress=advance
         )
+    judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         left_out = fleet.write_building(align_floors(graph), out)
@@ -264,14 +275,17 @@ def _export_over_floors(
         },
         "links": [link.name for link in graph.links],
         "left_out": list(left_out),
+        "report": {name: asdict(each) for name, each in judged.items()},
     }
     lines = [f"graph      {printable(out)}"]
     for number, floor in enumerate(graph.floors):
         counts = f"{floor.graph.n_nodes:,} nodes, {floor.graph.n_edges:,} edges"
         lines.append(f"{'' if number else 'floors':<10} {printable(floor.name)}: {counts}")
+        lines.append(f"{'nearest':>10} {_line(judged[floor.name].nearest)}")
     links = ", ".join(printable(link.name) for link in graph.links) or "none"
     lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
     _respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
+    warn_of_loss(judged)
 
 
 def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:

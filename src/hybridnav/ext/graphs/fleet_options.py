@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.common import UsageError
+from hybridnav._base.files import printable
+from hybridnav.cli.common import UsageError, complain
 
 if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
-    from hybridnav.ext.graphs import RouteGraph
+    from hybridnav.ext.graphs import GraphReport, RouteGraph
 
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
@@ -22,6 +23,8 @@ _FEWEST, _MOST = 2, 3
 """Numbers of an anchor: latitude, longitude, and the heading if there is one."""
 
 _MOST_PAIRS = 1_000_000
+LOSS_PAIRS, _MOST_LOSS = 400, 0.1
+"""Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
 
 StyleOption = Annotated[
     str,
@@ -214,6 +217,17 @@ class Fleet:
         if self.anchor is not None:
             return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
+
+
+def warn_of_loss(judged: dict[str, GraphReport]) -> None:
+    """Print a warning for each map or floor whose graph makes routes much longer."""
+    for name, report in judged.items():
+        if report.nearest.mean > _MOST_LOSS:
+            complain(
+                f"warning: routes on the graph of {printable(name)} are {report.nearest.mean:.0%} "
+                f"longer on average than shortest paths, above {_MOST_LOSS:.0%}: for shorter ones "
+                "give a smaller --spacing, or --style roadmap without --nodes"
+            )
 
 
 def _anchor(text: str) -> hn.ext.graphs.Anchor:

@@ -32,22 +32,26 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.topology.rooms import Rooms
 
+_APART_M = 4.0
+"""Distance between lanes in metres by default."""
+_ARENA_M2 = 25.0
+"""Area in square metres below which lanes are nearer to each other: with 4 m none has a net."""
 _SPECK = 0.125
 """Side of the largest obstacle that lanes pass on one side only, in distances between lanes."""
 _LEAST_M = 0.3
 """Clearance beyond the robot's radius below which free space gets no lane for its own sake, in
 metres: maps of laser scans end in many thin rays."""
-_SMALL, _SMALL_NARROW = 1.75, 2.5
+_SMALL, _SMALL_NARROW = 1.75, (2.5, 3.5)
 """Length of the smallest rings of lanes, in distances between lanes; and where there is less room
-than is asked for."""
-_MERGED_M, _NEAR_M = 1.0, 0.7
+than is asked for, a little less and none beyond the robot's radius."""
+_MERGED_M, _NEAR_M = 1.0, 0.8
 """Length below which a chain, and a straight edge, becomes one node, in metres."""
 _STEP_M = 0.2
-_BEND_M = 1.0
+_BEND_M = 2.0
 """Where chains may bend, and what a bend costs, in metres."""
 _SNAP_M = 0.8
 """How far nodes move to set edges along walls, in metres."""
-_CHORD, _DETOUR, _CHORD_RAD = 2.5, 1.15, math.radians(22)
+_CHORD, _DETOUR, _CHORD_RAD = 2.5, 1.08, math.radians(15)
 """Chords: their length in distances between lanes, the detour that they save, and the angle to
 other edges, so that they make no fans."""
 _LONGEST = 1.25
@@ -63,7 +67,7 @@ _STEPS = 5
 def build_lane_graph(
     topology: TopologicalMap,
     *,
-    spacing_m: float = 4.0,
+    spacing_m: float | None = None,
     margin_m: float = 0.25,
     keep: RouteGraph | WaypointGraph | None = None,
     progress: Progress = no_progress,
@@ -80,8 +84,9 @@ def build_lane_graph(
     topology
         The map; with rooms, nodes lie in rooms and doors too, and edges name them.
     spacing_m
-        Distance between the lanes of a hall in metres. Edges are about 1.25 times as long at most,
-        and free space farther than 0.9 times from lanes gets one of its own.
+        Distance between the lanes of a hall in metres; None for 4, or where the robot can enter
+        less than 25 m² for half the root of that area, 1 at least. Edges are about 1.25 times as
+        long at most, and free space farther than 1.1 times from lanes gets one of its own.
     margin_m
         Clearance beyond the robot's radius that lanes keep where there is as much, in metres.
     keep
@@ -119,7 +124,8 @@ def build_lane_graph(
     True
     """
     checked_type("topology", topology, TopologicalMap)
-    checked_between("spacing_m", spacing_m, 0.5, 100)
+    if spacing_m is not None:
+        checked_between("spacing_m", spacing_m, 0.5, 100)
     checked_between("margin_m", margin_m, 0, 100)
     grid, cell_m = topology.grid, topology.grid.resolution_m
     space = FreeSpace.of(grid)
@@ -130,6 +136,8 @@ def build_lane_graph(
             f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
             f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
         )
+    if spacing_m is None:
+        spacing_m = _spacing_m(int((part_of >= 0).sum()) * grid.cell_area_m2)
     progress(1, _STEPS)
     directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
     layout = Layout(
@@ -140,7 +148,8 @@ def build_lane_graph(
     )
     drawing = _drawn(topology, space, part_of, layout, margin_m / cell_m)
     progress(2, _STEPS)
-    drawing.prune(_SMALL * layout.apart, _SMALL_NARROW * layout.apart)
+    least, most = _SMALL_NARROW
+    drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
     drawing.merge(_MERGED_M / cell_m)
     sketch = drawing.straightened(max(1, round(_STEP_M / cell_m)), _BEND_M / cell_m)
     progress(3, _STEPS)
@@ -163,6 +172,12 @@ def build_lane_graph(
     if keep is None or known is None:
         return graph
     return _renamed(graph, keep, _same(sketch, known, cell_m))
+
+
+def _spacing_m(area_m2: float) -> float:
+    """Return the distance between lanes for an area, in steps of half a metre: graphs of a map that
+    changes a little keep theirs."""
+    return _APART_M if area_m2 >= _ARENA_M2 else max(round(math.sqrt(area_m2)) / 2, 1.0)
 
 
 def _drawn(

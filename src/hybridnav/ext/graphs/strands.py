@@ -22,7 +22,7 @@ _OFF = 0.6
 """Least clearance of a pillar, in distances between lanes."""
 _STEP = 1.2
 """Length of a step of `spread` in cells, on average."""
-_COVER = 0.9
+_COVER = 1.1
 """Distance from strands from which on free space gets one of its own, in distances between
 lanes."""
 _ROOM = 0.75
