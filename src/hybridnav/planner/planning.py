@@ -386,11 +386,9 @@ class Planning:
     def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         # Each result has its own settings, so that a change of one does not affect the next.
-        settings = {
-            key: dict(value) if isinstance(value, dict) else value
-            for key, value in self._settings.items()
-        }
+        settings = {k: dict(v) if isinstance(v, dict) else v for k, v in self._settings.items()}
         start, goal = (tuple(pose.tolist()) for pose in request.poses)
+        outcome["proof_source"] = self.grid, self.costs, request.closed
         return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:

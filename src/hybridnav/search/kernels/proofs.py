@@ -1,0 +1,141 @@
+"""Kernels of proofs: the tree of shortest paths that bounds all others, and walls round an area."""
+
+import numpy as np
+
+from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.moves import COL_STEP, FAR, ROW_STEP
+
+STRAIGHT, DIAGONAL = 195025, 275807
+"""What moves cost: their ratio is below sqrt 2 by 7e-12 of it, so that a bound in these numbers is
+one in lengths."""
+ONE = 2**14
+"""The factor 1 in units."""
+ROOT, OUTSIDE = 8, 9
+"""Marks of the start of a tree, and of cells that are not in it."""
+
+
+@njit(cache=True, nogil=True)
+def _least(rows, cols):
+    """Return the cost of the shortest path of an offset without obstacles."""
+    rows, cols = abs(rows), abs(cols)
+    return 2 * ONE * (STRAIGHT * abs(rows - cols) + DIAGONAL * min(rows, cols))
+
+
+@njit(cache=True, nogil=True)
+def tree_of(moves, units, start, goal, limit):
+    """Return the tree of cheapest paths from a cell, over the cells from which the goal may be
+    nearer than a limit.
+
+    Parameters
+    ----------
+    moves
+        uint8 (rows, cols), legal moves of each cell, bit k for direction k.
+    units
+        int32 (rows, cols), the factor of each cell, `ONE` or more.
+    start, goal
+        (row, col).
+    limit
+        Cost, counted in `STRAIGHT` and `DIAGONAL` times the units of both cells of a move.
+
+    Returns
+    -------
+    NDArray
+        uint8 (rows, cols), the direction from each cell to the one before it, `ROOT` at the start
+        and `OUTSIDE` elsewhere.
+    """
+    rows, cols = moves.shape
+    cost = np.full((rows, cols), np.int64(FAR))
+    tree = np.full((rows, cols), np.uint8(OUTSIDE))
+    back = np.full((rows, cols), np.uint8(ROOT))
+    heap = np.empty((4096, 2), np.int64)
+    size = 1
+    cost[start] = 0
+    heap[0] = _least(start[0] - goal[0], start[1] - goal[1]), start[0] * cols + start[1]
+
+    # A*: as the heuristic is consistent, a cell has its least cost when it is taken.
+    while size > 0 and heap[0, 0] < limit:
+        cell = pop(heap, size)
+        size -= 1
+        row, col = cell // cols, cell % cols
+        if tree[row, col] != OUTSIDE:
+            continue
+        tree[row, col] = back[row, col]
+        for k in range(8):
+            if moves[row, col] >> k & 1 == 0:
+                continue
+            to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
+            step = (DIAGONAL if k & 1 else STRAIGHT) * (units[row, col] + units[to_row, to_col])
+            further = cost[row, col] + step
+            if further < cost[to_row, to_col]:
+                cost[to_row, to_col] = further
+                back[to_row, to_col] = (k + 4) & 7
+                if size == len(heap):
+                    larger = np.empty((2 * size, 2), np.int64)
+                    larger[:size] = heap
+                    heap = larger
+                ahead = _least(to_row - goal[0], to_col - goal[1])
+                push(heap, size, further + ahead, to_row * cols + to_col)
+                size += 1
+
+    # Among equally good directions those of the cells beside and below are chosen: alike, they
+    # take less room in a file.
+    for row in range(rows):
+        for col in range(cols):
+            if tree[row, col] >= ROOT:
+                continue
+            for k in (tree[row, col - 1], tree[row - 1, col]):
+                if k >= ROOT or moves[row, col] >> k & 1 == 0:
+                    continue
+                to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
+                step = (DIAGONAL if k & 1 else STRAIGHT) * (units[row, col] + units[to_row, to_col])
+                if (
+                    tree[to_row, to_col] != OUTSIDE
+                    and cost[to_row, to_col] + step == cost[row, col]
+                ):
+                    tree[row, col] = k
+                    break
+    return tree
+
+
+@njit(cache=True, nogil=True)
+def walls_round(area, row, col):
+    """Return the cells along the border of an area, (row, col) of a closed chain of 8-neighbours.
+
+    Parameters
+    ----------
+    area
+        bool (rows, cols), a 4-connected set none of which lies on the rim; the cells round it that
+        hang together by sides and corners are the other side.
+    row, col
+        A cell of the area whose neighbour at row - 1 lies on the other side.
+
+    Returns
+    -------
+    NDArray
+        int64 (n, 2); from each cell to the next one, and from the last to the first, is a move to
+        an 8-neighbour or none.
+    """
+    chain = np.empty((1024, 2), np.int64)
+    n = 0
+    # The walker stands in the area and looks along `ahead`, the other side to its right.
+    first_row, first_col, ahead = row, col, 0
+    while True:
+        beside = (ahead + 6) & 7
+        if n + 2 > len(chain):
+            larger = np.empty((2 * len(chain), 2), np.int64)
+            larger[:n] = chain[:n]
+            chain = larger
+        chain[n] = row + ROW_STEP[beside], col + COL_STEP[beside]
+        n += 1
+        next_row, next_col = row + ROW_STEP[ahead], col + COL_STEP[ahead]
+        corner_row, corner_col = next_row + ROW_STEP[beside], next_col + COL_STEP[beside]
+        if not area[next_row, next_col]:
+            ahead = (ahead + 2) & 7
+        elif area[corner_row, corner_col]:
+            row, col = corner_row, corner_col
+            ahead = beside
+        else:
+            row, col = next_row, next_col
+        if row == first_row and col == first_col and ahead == 0:
+            return chain[:n]
