@@ -12,6 +12,7 @@ MAP is a YAML file of ROS beside a PGM image, or a MovingAI map; the proof must 
 import base64
 import cmath
 import hashlib
+import itertools
 import json
 import math
 import re
@@ -24,6 +25,7 @@ import numpy as np
 MOVES = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
 STRAIGHT, DIAGONAL = 195025, 275807  # the ratio is below sqrt(2), by 7 parts in 10^12
 ONE = 2**14  # the factor 1: a metre costs a metre
+UNIT = 2 * ONE * STRAIGHT
 
 
 class Rejected(Exception):
@@ -129,61 +131,112 @@ def check_no_path(walls, factors, proof, ends):
     return math.inf
 
 
-# A PATH OF CELLS. A *potential* is a number p for each cell, so that no move raises p by more than
-# it costs. The moves of a path raise p by p(goal) - p(start) in all, so every path costs at least
+# A POTENTIAL is a number p for each node of a graph, so that no move raises p by more than it
+# costs. The moves of a path raise p by p(goal) - p(start) in all, so every path costs at least
 # that. Any such numbers prove. Here p is the cost of a walk back to the start, one move after the
-# other as the proof states them for some cells, its tree. All other cells have p = bound - (the
-# least cost from there to the goal on an empty map), which no move raises by more than it costs: so
-# only moves from or to the tree are to be looked at, and all of them are.
+# other as the proof states them for some nodes, its tree. All others have p = bound - (the least
+# cost from there to the goal on an empty map), which no move raises by more than it costs: so only
+# moves from or to the tree are to be looked at, and all of them are. Costs are whole numbers, UNIT
+# a cell.
 
 
-def check_cells(walls, factors, proof, ends):
-    """Check a path of cells, and the potential that bounds all others."""
-    path, (start, goal) = walk(*proof["path"]), ends // proof["grain"]
-    need((path[0] == start).all() and (path[-1] == goal).all(), "the path has other ends")
-    beside = [path[1:] * (0, 1) + path[:-1] * (1, 0), path[1:] * (1, 0) + path[:-1] * (0, 1)]
-    need(not any(walls[tuple(cells.T)].any() for cells in (path, *beside)), "the path meets a wall")
-    weights = factors[tuple(path.T)]
-    cost = (np.hypot(*np.diff(path, axis=0).T) * (weights[1:] + weights[:-1])).sum() / (2 * ONE)
-
+def check_potential(costs_of, walls, factors, proof, ends, bound):
+    """Check a potential on a grid, from the costs of four of the MOVES, 0 where there is none."""
     top, left, rows, cols = proof["box"]
+    part = np.s_[top : top + rows + 2, left : left + cols + 2]
+    costs = costs_of(walls[part], factors[part])
     raw = zlib.decompressobj().decompress(base64.b85decode(proof["tree"]), rows * cols + 1)
     tree = np.pad(np.frombuffer(raw, np.uint8).reshape(rows, cols), 1, constant_values=9)
-    part = np.s_[top : top + rows + 2, left : left + cols + 2]
-    free, factors = ~walls[part], factors[part]
-    need(min(top, left) >= 0 and tree.shape == free.shape and (tree < 10).all(), "a wrong tree")
     need(
-        ((path[[0, -1]] > (top, left)) & (path[[0, -1]] <= (top + rows, left + cols))).all(),
-        "a box",
+        min(top, left) >= 0 and tree.shape == costs.shape[1:] and (tree < 10).all(), "a wrong tree"
     )
+    (start, goal) = ends = ends - (top, left)
+    need(((ends > 0) & (ends <= (rows, cols))).all(), "an end is not in the box of the tree")
     inside, before = np.flatnonzero(tree < 8), np.arange(tree.size)
-    step = np.array([STRAIGHT, DIAGONAL])[tree.ravel()[inside] % 2]
-    before[inside] += MOVES[tree.ravel()[inside]] @ [tree.shape[1], 1]
+    move = tree.ravel()[inside]
+    before[inside] += MOVES[move] @ [tree.shape[1], 1]
     back = np.zeros(tree.size, np.int64)
-    back[inside] = step * (factors.ravel()[inside] + factors.ravel()[before[inside]])
+    back[inside] = costs.reshape(4, -1)[move % 4, np.where(move < 4, inside, before[inside])]
+    need((back[inside] > 0).all(), "a move of the tree meets a wall")
     while len(inside) and (tree.ravel()[before[inside]] < 8).any():  # twice as far with each turn
         need(back.max() < 2**61, "the tree has a cycle")
         back, before = back + back[before], before[before]
     need((tree.ravel()[before[inside]] == 8).all(), "a branch of the tree does not end at a root")
-
-    bound = math.floor(proof["bound"] / proof["side_m"] * (1 - 1e-9) * 2 * ONE * STRAIGHT)
-    down, across = (
-        abs(np.arange(n) + at) for n, at in zip(tree.shape, (top, left) - goal, strict=True)
-    )
+    down, across = (abs(np.arange(n) - at) for n, at in zip(tree.shape, goal, strict=True))
     ahead = np.maximum(down[:, None], across) * STRAIGHT
-    ahead = 2 * ONE * (ahead + np.minimum(down[:, None], across) * (DIAGONAL - STRAIGHT))
-    p = np.where(tree == 9, bound - ahead, back.reshape(tree.shape))
-    for down, across in MOVES[:4]:
-        shift = [(-down, -across), (-down, 0), (0, -across)]
-        there, *sides = (lambda array, by=by: np.roll(array, by, (0, 1)) for by in shift)
-        looked_at = (
-            ((tree < 9) | there(tree < 9)) & free & there(free) & sides[0](free) & sides[1](free)
-        )
-        costs = (DIAGONAL if down * across else STRAIGHT) * (factors + there(factors))
-        need((abs(p - there(p)) <= costs)[looked_at].all(), "a move raises p by more than it costs")
-    lowest, highest = (p[tuple(end - (top, left))] for end in (start, goal))
-    need(lowest <= 0 and highest >= bound, "p does not rise from start to goal by the bound")
+    ahead += np.minimum(down[:, None], across) * (DIAGONAL - STRAIGHT)
+    p = np.where(tree == 9, bound - 2 * ONE * ahead, back.reshape(tree.shape))
+    for cost, step in zip(costs, MOVES, strict=False):
+        there = np.roll(p, -step, (0, 1))
+        looked_at = ((tree < 9) | np.roll(tree < 9, -step, (0, 1))) & (cost > 0)
+        need((abs(p - there) <= cost)[looked_at].all(), "a move raises p by more than it costs")
+    need(p[tuple(start)] <= 0 and p[tuple(goal)] >= bound, "p does not rise by the bound")
+
+
+def check_cells(walls, factors, proof, ends):
+    """Check a path of cells, whose nodes are the cells: diagonals need both cells beside them."""
+    path, ends = walk(*proof["path"]), ends // proof["grain"]
+    need((path[[0, -1]] == ends).all(), "the path has other ends")
+    beside = [path[1:] * (0, 1) + path[:-1] * (1, 0), path[1:] * (1, 0) + path[:-1] * (0, 1)]
+    need(not any(walls[tuple(cells.T)].any() for cells in (path, *beside)), "the path meets a wall")
+    bound = math.floor(proof["bound"] / proof["side_m"] * (1 - 1e-9) * UNIT)
+    check_potential(costs_of_cells, walls, factors, proof, ends, bound)
+    weights = factors[tuple(path.T)]
+    return (np.hypot(*np.diff(path, axis=0).T) * (weights[1:] + weights[:-1])).sum() / (2 * ONE)
+
+
+def costs_of_cells(walls, factors):
+    """Return the costs of moves between cells, the mean of their factors times the length."""
+    costs = np.zeros((4, *walls.shape), np.int64)
+    for n, (down, across) in enumerate(MOVES[:4]):
+        by = [(0, 0), (down, across), (down, 0), (0, across)]
+        shut = np.any([np.roll(walls, (-row, -col), (0, 1)) for row, col in by], axis=0)
+        weight = factors + np.roll(factors, (-down, -across), (0, 1))
+        costs[n] = np.where(shut, 0, weight * (DIAGONAL if down * across else STRAIGHT))
+    return costs
+
+
+# A LINE BY COSTS. Let a line cost K. Cut it where it enters another cell, and measure each part as
+# a king would walk it, along sides and diagonals: at most 1.0824 times as far. Slide the cuts along
+# their sides: the sum of these measures is linear but where two cuts lie opposite each other, so it
+# is least with all cuts at corners. Then it is the cost of moves along sides, by the cheaper of the
+# two cells, and across cells. So K is at least the least cost of such moves, over 1.0824, between
+# two corners near the ends, less the cost from the ends to these corners.
+
+
+def costs_of_corners(walls, factors):
+    """Return the costs of moves between corners of cells; corner (r, c) is below cell (r, c)."""
+    price = np.where(walls, 2**62, 2 * factors)
+    east, north = np.minimum(price, np.roll(price, 1, 0)), np.minimum(price, np.roll(price, 1, 1))
+    costs = np.stack([east, price, north, np.roll(price, 1, 1)])
+    return np.where(costs == 2**62, 0, costs) * np.array([STRAIGHT, DIAGONAL] * 2)[:, None, None]
+
+
+def check_line_by_costs(walls, factors, proof, ends):
+    """Check a line, its cost, and a potential of corners that bounds all others."""
+    line = free_line(walls, proof, ends).astype(float) / proof["grain"]
+    cost = 0.0
+    for first, last in itertools.pairwise(line):
+        cuts = [
+            np.arange(math.ceil(min(pair)), max(pair)) for pair in zip(first, last, strict=True)
+        ]
+        parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
+        parts = np.sort(np.concatenate([[0.0, 1.0], *parts]))
+        middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
+        cost += np.hypot(*(last - first)) * (dearest(factors, middle) * np.diff(parts)).sum() / ONE
+    ends, corners = line[[0, -1]], np.rint(line[[0, -1]]).astype(int)
+    joins = (np.hypot(*(corners - ends).T) * dearest(factors, ends)).sum() / ONE
+    least = (proof["bound"] / proof["side_m"] * (1 - 1e-9) + joins) * math.sqrt(4 - math.sqrt(8))
+    wider = [np.pad(array, (0, 1), constant_values=1) for array in (walls, factors)]  # for the rim
+    if proof["bound"] > math.dist(*ends) * proof["side_m"]:  # as no factor is below 1
+        check_potential(costs_of_corners, *wider, proof, corners, math.floor(least * UNIT))
     return cost
+
+
+def dearest(factors, points):
+    """Return the largest factor of the cells that points lie in, or between."""
+    near = [np.floor(points + off).astype(int).T for off in 1e-7 * MOVES[1::2]]
+    return np.max([factors[tuple(cells)] for cells in near], axis=0)
 
 
 # A LINE. A shortest path is a chain of straight lines, like a taut string. It bends at *corners*
@@ -233,15 +286,19 @@ def cut_by_rows(walls, first, last, grain):
     return np.bincount(of[cut], minlength=len(first)) > 0
 
 
+def free_line(walls, proof, ends):
+    """Return the points of a line in whole numbers, after a check that it is free."""
+    line = np.array(proof["line"], ends.dtype) + proof["grain"]
+    need((line[[0, -1]] == ends).all(), "the line has other ends")
+    is_cut = len(line) > 1 and are_cut(walls, line[:-1], line[1:], proof["grain"]).any()
+    need(not is_cut, "the line meets a wall")
+    return line
+
+
 def check_line(walls, factors, proof, ends):
     """Check a line, and the potential at the corners that bounds all others."""
     grain, bound = proof["grain"], proof["bound"] / proof["side_m"]
-    line = np.array(proof["line"], ends.dtype) + grain
-    need((line[[0, -1]] == ends).all(), "the line has other ends")
-    need(
-        len(line) == 1 or not are_cut(walls, line[:-1], line[1:], grain).any(),
-        "the line meets a wall",
-    )
+    line = free_line(walls, proof, ends)
     cost = np.hypot(*np.diff(line.astype(float), axis=0).T).sum() / grain
 
     four = [walls[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)]
@@ -271,7 +328,12 @@ def check_line(walls, factors, proof, ends):
     return cost
 
 
-CHECKS = {"no path": check_no_path, "cells": check_cells, "line": check_line}
+CHECKS = {
+    "no path": check_no_path,
+    "cells": check_cells,
+    "line": check_line,
+    "line by costs": check_line_by_costs,
+}
 
 
 def check(measured, frame, proof):

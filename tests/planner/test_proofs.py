@@ -13,9 +13,10 @@ from benchmarks.subjects.proofs import false_proofs, frame_of, is_accepted
 from hybridnav import check_proof
 from hybridnav.errors import PlanError
 from hybridnav.planner.proofs import parting_chain
+from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
 
-PRESETS = ("shortest", "octile", "grid-astar", "grid-astar by costs")
+PRESETS = ("shortest", "octile", "grid-astar", "grid-astar by costs", "robot")
 
 
 def random_grid(rng, shape=(24, 30), radius_m=0.0):
@@ -47,13 +48,16 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
             proof = json.loads(json.dumps(result.proof(), allow_nan=False))
             said = check_proof.check(grid.measured, frame_of(grid), proof)
             assert said.startswith("path" if result.solved else "no path")
-            if result.solved:
+            if result.solved and preset != "robot":
                 assert proof["bound"] == result.lower_bound
                 assert proof["bound"] == pytest.approx(proof["cost"], rel=1e-9)
+            elif result.solved:
+                assert proof["bound"] <= min(proof["cost"], result.cost)
             for kind, false, measured in false_proofs(grid, result, proof, rng):
                 kinds[kind] = kinds.get(kind, 0) + 1
                 assert not is_accepted(grid, false, measured), (kind, false)
-    assert {"radius", "map", "cost", "bound", "corner", "closure", "forged bound"} <= kinds.keys()
+    planted = {"radius", "map", "cost", "bound", "corner", "closure", "wall on the path"}
+    assert planted | ({"forged bound"} if preset != "robot" else set()) <= kinds.keys()
 
 
 def is_free(walls, first, last):
@@ -164,3 +168,23 @@ def test_any_other_json_is_rejected_in_one_line(text):
     grid = hn.example_map("figure1")
     with pytest.raises(check_proof.Rejected, match="this is no proof"):
         check_proof.check(grid.measured, frame_of(grid), json.loads(text))
+
+
+def test_no_bound_of_a_line_by_costs_is_above_the_cheapest_path_by_brute_force():
+    rng = np.random.default_rng(3)
+    gaps = []
+    for _ in range(12):
+        grid = random_grid(rng, (9, 10))
+        planner = planner_of(grid, "robot")
+        assert planner.costs is not None
+        oracle = SidePoints(grid.enterable(), planner.costs.factors)
+        for pair in points_in(grid, rng, 3):
+            result = planner.plan(*pair)
+            if not result.solved:
+                continue
+            start, goal = map(tuple, grid.frame.positions_of(pair).tolist())
+            cheapest = oracle.cost(start, goal) * grid.resolution_m
+            gaps.append(cheapest / result.proof()["bound"] - 1)
+    assert len(gaps) > 10
+    assert min(gaps) > -1e-6
+    assert np.median(gaps) < 0.4  # factors of 1 to 3 side by side, and ends that are no corners

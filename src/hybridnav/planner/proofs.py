@@ -13,22 +13,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import ndimage
 
-from hybridnav._base.moves import COL_STEP, ROW_STEP, legal_moves
+from hybridnav._base.moves import COL_STEP, ROW_STEP
+from hybridnav.check_proof import UNIT, costs_of_cells, costs_of_corners, dearest
 from hybridnav.errors import PlanError
 from hybridnav.maps.cells import CellClass
 from hybridnav.maps.clearance import within_radius
-from hybridnav.search.kernels.proofs import ONE, OUTSIDE, STRAIGHT, tree_of, walls_round
+from hybridnav.maps.costs import cost_along
+from hybridnav.search.kernels.proofs import ONE, OUTSIDE, tree_of, walls_round
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav.maps import Frame, OccupancyGrid
     from hybridnav.planner import PlanResult
     from hybridnav.planner.costs import PlannerCosts
     from hybridnav.search.found import ClosedCells
 
 _CENTRED, _FINE = 2, 2**24
 """Parts of a cell in which ends are counted: those of centres, and of exact tests."""
+_RATIO = math.sqrt(4 - math.sqrt(8))
+"""Most by which moves between corners of cells are dearer than a line."""
 
 
 def proof_of(
@@ -48,11 +52,17 @@ def proof_of(
             "no proof is known where corners may be cut: load the map without corner_cutting"
         )
     kind = result.metric if result.solved else str(result.status)
-    make = {"no path": _no_path, "octile": _cells, "weighted": _cells, "any-angle": _line}.get(kind)
+    make = {
+        "no path": _no_path,
+        "octile": _cells,
+        "weighted": _cells,
+        "any-angle": _line,
+        "any-angle-weighted": _line_by_costs,
+    }.get(kind)
     if make is None or result.refinement is not None:
         raise PlanError(
             f"no proof is known of {kind!r:.80}: expected no path, or a path of the metric octile, "
-            "weighted or any-angle that OMPL did not change"
+            "weighted, any-angle or any-angle-weighted that OMPL did not change"
         )
     problem = _Problem(result, grid, costs, closed)
     return problem.stated | make(problem)
@@ -129,21 +139,11 @@ def _no_path(problem: _Problem) -> dict[str, Any]:
 
 
 def _cells(problem: _Problem) -> dict[str, Any]:
-    result, layer, per_cell = problem.result, problem.costs.layer, problem.grid.resolution_m
+    result, per_cell = problem.result, problem.grid.resolution_m
     assert result.path is not None  # noqa: S101 - it is solved
     cells = result.path.cells
-    low, high = _box_of(problem.free, (cells[0], cells[-1]), result.cost / per_cell)
-    part = np.s_[low[0] : high[0], low[1] : high[1]]
-    free = np.ascontiguousarray(problem.free[part])
-    units = np.full(free.shape, ONE, np.int32)
-    if layer is not None:
-        units = np.ascontiguousarray(layer.units[part])
-    ends = [tuple(end) for end in (cells[[0, -1]] - low).tolist()]
-    limit = math.floor(result.lower_bound / per_cell * (1 - 1e-9) * 2 * ONE * STRAIGHT)
-    tree = tree_of(legal_moves(free, False), units, *ends, limit)
-    shown = np.concatenate([np.argwhere(tree < OUTSIDE), np.array(ends)])
-    first, last = shown.min(axis=0), shown.max(axis=0) + 1
-    kept = tree[first[0] : last[0], first[1] : last[1]]
+    tree = _Tree(problem, costs_of_cells, cells[[0, -1]], result.cost / per_cell)
+    limit = math.floor(result.lower_bound / per_cell * (1 - 1e-9) * UNIT)
     return {
         "kind": "cells",
         "grain": _CENTRED,
@@ -151,27 +151,103 @@ def _cells(problem: _Problem) -> dict[str, Any]:
         "cost": result.cost,
         "bound": result.lower_bound,
         "path": _walk(cells),
-        "box": [*(first + low).tolist(), *kept.shape],
-        "tree": base64.b85encode(zlib.compress(kept.tobytes(), 9)).decode(),
+        **tree.stated(limit),
     }
+
+
+class _Tree:
+    """The tree of cheapest paths between two nodes, cells or corners of cells.
+
+    Parameters
+    ----------
+    problem
+        What is to be proved.
+    costs_of
+        Returns the costs of moves between nodes, from walls and factors with a rim.
+    ends
+        int64 (2, 2), the nodes (row, col).
+    length_cells
+        Length that no path of interest has.
+    """
+
+    def __init__(
+        self, problem: _Problem, costs_of: Any, ends: LongArray, length_cells: float
+    ) -> None:
+        self.low, high = _box_of(problem.free, (ends[0], ends[1]), length_cells)
+        part = np.s_[self.low[0] : high[0], self.low[1] : high[1]]
+        # There are more corners than cells in a row.
+        walls = np.pad(~problem.free[part], (1, 2), constant_values=True)
+        factors, layer = np.full(walls.shape, ONE), problem.costs.layer
+        if layer is not None:
+            factors[1:-2, 1:-2] = layer.units[part]
+        self._costs = costs_of(walls, factors)
+        self._ends = ends - self.low + 1
+
+    def grown(self, limit: int) -> tuple[ByteArray, int]:
+        """Return the tree up to a limit, with a rim, and the least cost of the second node."""
+        start, goal = map(tuple, self._ends.tolist())
+        tree, cost = tree_of(self._costs, start, goal, limit)
+        return tree, int(cost)
+
+    def stated(self, limit: int) -> dict[str, Any]:
+        """Return the part of the tree that proves that no path costs less than a limit."""
+        tree, _ = self.grown(limit)
+        shown = np.concatenate([np.argwhere(tree < OUTSIDE), self._ends])
+        first, last = shown.min(axis=0), shown.max(axis=0) + 1
+        kept = tree[first[0] : last[0], first[1] : last[1]]
+        text = base64.b85encode(zlib.compress(kept.tobytes(), 9)).decode()
+        return {"box": [*(first + self.low - 1).tolist(), *kept.shape], "tree": text}
+
+
+def _line_by_costs(problem: _Problem) -> dict[str, Any]:
+    result, frame, layer = problem.result, problem.grid.frame, problem.costs.layer
+    assert result.path is not None  # noqa: S101 - it is solved
+    assert layer is not None  # noqa: S101 - as the metric says
+    points = result.path.points if result.line is None else result.line
+    if result.line is None and result.path.is_curved:
+        raise PlanError("no proof is known of arcs along cells: take smooth='line-of-sight'")
+    stated = _stated_line(frame, points)
+    line = np.array(stated["line"]) / stated["grain"]
+    cost = cost_along(problem.grid, layer, points)
+    corners = np.rint(line[[0, -1]]).astype(np.int64)
+    units = np.pad(layer.units, 1, constant_values=ONE)
+    apart = np.hypot(*(corners - line[[0, -1]]).T)
+    joins = (apart * dearest(units, line[[0, -1]] + 1)).sum() / ONE
+    length = (cost / frame.resolution_m + joins) * _RATIO
+    tree = _Tree(problem, costs_of_corners, corners, length)
+    _, least = tree.grown(math.floor(length * UNIT))
+    bound = max(least / UNIT / _RATIO - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
+    limit = math.floor((bound * (1 - 1e-9) + joins) * _RATIO * UNIT)
+    return {
+        "kind": "line by costs",
+        **stated,
+        "cost": cost,
+        "bound": bound * frame.resolution_m,
+        **tree.stated(limit),
+    }
+
+
+def _stated_line(frame: Frame, points: FloatArray) -> dict[str, Any]:
+    """Return points of a line in whole numbers of a part of a cell."""
+    fine = np.rint(frame.positions_of(points) * _FINE).astype(np.int64)
+    grain = _FINE if (fine % (_FINE // _CENTRED)).any() else _CENTRED
+    line = fine // (_FINE // grain)
+    return {"grain": grain, "ends": line[[0, -1]].tolist(), "line": line.tolist()}
 
 
 def _line(problem: _Problem) -> dict[str, Any]:
     result, frame = problem.result, problem.grid.frame
     assert result.path is not None  # noqa: S101 - it is solved
-    fine = np.rint(frame.positions_of(result.path.points) * _FINE).astype(np.int64)
-    grain = _FINE if (fine % (_FINE // _CENTRED)).any() else _CENTRED
-    line = fine // (_FINE // grain)
+    stated = _stated_line(frame, result.path.points)
+    ends = np.array(stated["ends"]) / stated["grain"]
     bound = result.lower_bound / frame.resolution_m
     cells = result.path.cells[[0, -1]]
-    corners, distances = _corners_near(problem.free, line[[0, -1]] / grain, cells, bound)
+    corners, distances = _corners_near(problem.free, ends, cells, bound)
     return {
         "kind": "line",
-        "grain": grain,
-        "ends": line[[0, -1]].tolist(),
+        **stated,
         "cost": result.cost,
         "bound": result.lower_bound,
-        "line": line.tolist(),
         "corners": [
             [row, col, p]
             for (row, col), p in zip(corners.tolist(), distances.tolist(), strict=True)

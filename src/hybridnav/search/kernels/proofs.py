@@ -23,28 +23,38 @@ def _least(rows, cols):
 
 
 @njit(cache=True, nogil=True)
-def tree_of(moves, units, start, goal, limit):
-    """Return the tree of cheapest paths from a cell, over the cells from which the goal may be
-    nearer than a limit.
+def _cost_of(costs, row, col, k):
+    """Return the cost of a move from a node in direction k, 0 where there is none."""
+    if k < 4:
+        return costs[k, row, col]
+    row, col = row + ROW_STEP[k], col + COL_STEP[k]
+    if row < 0 or col < 0 or row >= costs.shape[1] or col >= costs.shape[2]:
+        return 0
+    return costs[k - 4, row, col]
+
+
+@njit(cache=True, nogil=True)
+def tree_of(costs, start, goal, limit):
+    """Return the tree of cheapest paths from a node of a grid, over the nodes over which a path to
+    the goal may be cheaper than a limit, as far as the way on an empty grid tells.
 
     Parameters
     ----------
-    moves
-        uint8 (rows, cols), legal moves of each cell, bit k for direction k.
-    units
-        int32 (rows, cols), the factor of each cell, `ONE` or more.
+    costs
+        int64 (4, rows, cols), the costs of moves in the first four directions, 0 where there is
+        none; no less than `STRAIGHT`, or `DIAGONAL`, times 2 `ONE`. Moves stay in the grid.
     start, goal
         (row, col).
     limit
-        Cost, counted in `STRAIGHT` and `DIAGONAL` times the units of both cells of a move.
+        Cost of a path that is not of interest.
 
     Returns
     -------
-    NDArray
-        uint8 (rows, cols), the direction from each cell to the one before it, `ROOT` at the start
-        and `OUTSIDE` elsewhere.
+    tuple
+        uint8 (rows, cols), the direction from each node to the one before it, `ROOT` at the start
+        and `OUTSIDE` elsewhere; and the least cost of the goal, or the limit if it is not below.
     """
-    rows, cols = moves.shape
+    rows, cols = costs.shape[1:]
     cost = np.full((rows, cols), np.int64(FAR))
     tree = np.full((rows, cols), np.uint8(OUTSIDE))
     back = np.full((rows, cols), np.uint8(ROOT))
@@ -53,49 +63,43 @@ def tree_of(moves, units, start, goal, limit):
     cost[start] = 0
     heap[0] = _least(start[0] - goal[0], start[1] - goal[1]), start[0] * cols + start[1]
 
-    # A*: as the heuristic is consistent, a cell has its least cost when it is taken.
-    while size > 0 and heap[0, 0] < limit:
-        cell = pop(heap, size)
+    # A*: as the heuristic is consistent, a node has its least cost when it is taken.
+    while size > 0 and heap[0, 0] < min(limit, cost[goal]):
+        node = pop(heap, size)
         size -= 1
-        row, col = cell // cols, cell % cols
+        row, col = node // cols, node % cols
         if tree[row, col] != OUTSIDE:
             continue
         tree[row, col] = back[row, col]
         for k in range(8):
-            if moves[row, col] >> k & 1 == 0:
-                continue
+            step = _cost_of(costs, row, col, k)
             to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
-            step = (DIAGONAL if k & 1 else STRAIGHT) * (units[row, col] + units[to_row, to_col])
-            further = cost[row, col] + step
-            if further < cost[to_row, to_col]:
-                cost[to_row, to_col] = further
-                back[to_row, to_col] = (k + 4) & 7
-                if size == len(heap):
-                    larger = np.empty((2 * size, 2), np.int64)
-                    larger[:size] = heap
-                    heap = larger
-                ahead = _least(to_row - goal[0], to_col - goal[1])
-                push(heap, size, further + ahead, to_row * cols + to_col)
-                size += 1
+            if step == 0 or cost[row, col] + step >= cost[to_row, to_col]:
+                continue
+            cost[to_row, to_col] = cost[row, col] + step
+            back[to_row, to_col] = (k + 4) & 7
+            if size == len(heap):
+                larger = np.empty((2 * size, 2), np.int64)
+                larger[:size] = heap
+                heap = larger
+            ahead = _least(to_row - goal[0], to_col - goal[1])
+            push(heap, size, cost[to_row, to_col] + ahead, to_row * cols + to_col)
+            size += 1
 
-    # Among equally good directions those of the cells beside and below are chosen: alike, they
+    # Among equally good directions those of the nodes beside and below are chosen: alike, they
     # take less room in a file.
     for row in range(rows):
         for col in range(cols):
             if tree[row, col] >= ROOT:
                 continue
             for k in (tree[row, col - 1], tree[row - 1, col]):
-                if k >= ROOT or moves[row, col] >> k & 1 == 0:
-                    continue
-                to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
-                step = (DIAGONAL if k & 1 else STRAIGHT) * (units[row, col] + units[to_row, to_col])
-                if (
-                    tree[to_row, to_col] != OUTSIDE
-                    and cost[to_row, to_col] + step == cost[row, col]
-                ):
-                    tree[row, col] = k
-                    break
-    return tree
+                step = _cost_of(costs, row, col, k) if k < ROOT else 0
+                to_row, to_col = row + ROW_STEP[k & 7], col + COL_STEP[k & 7]
+                if step > 0 and cost[to_row, to_col] + step == cost[row, col]:
+                    if tree[to_row, to_col] != OUTSIDE:
+                        tree[row, col] = k
+                        break
+    return tree, min(limit, cost[goal])
 
 
 @njit(cache=True, nogil=True)
