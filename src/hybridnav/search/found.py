@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -154,6 +154,8 @@ class Found:
     route: Route | None = None
     """The route that was chosen before the path; None to derive it from the path."""
     stats: PlanStats = field(default_factory=PlanStats)
+    proof: dict[str, Any] | None = None
+    """A proof of the answer, for the harness; see `PlanResult.proof`. None for none."""
 
     @property
     def has_path(self) -> bool:
