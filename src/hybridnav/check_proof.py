@@ -141,7 +141,8 @@ def check_no_path(walls, factors, proof, ends):
 
 
 def check_potential(costs_of, walls, factors, proof, ends, bound):
-    """Check a potential on a grid, from the costs of four of the MOVES, 0 where there is none."""
+    """Check a potential on a grid, from the costs of four of the MOVES, 0 where there is none;
+    return it, and where it begins."""
     top, left, rows, cols = proof["box"]
     part = np.s_[top : top + rows + 2, left : left + cols + 2]
     costs = costs_of(walls[part], factors[part])
@@ -171,6 +172,7 @@ def check_potential(costs_of, walls, factors, proof, ends, bound):
         looked_at = ((tree < 9) | np.roll(tree < 9, -step, (0, 1))) & (cost > 0)
         need((abs(p - there) <= cost)[looked_at].all(), "a move raises p by more than it costs")
     need(p[tuple(start)] <= 0 and p[tuple(goal)] >= bound, "p does not rise by the bound")
+    return p, tree, (top, left)
 
 
 def check_cells(walls, factors, proof, ends):

@@ -205,7 +205,7 @@ def verify(map_file: MapArgument[Path], proof_file: ProofArgument) -> None:
 
     try:
         proof = json.loads(proof_file.read_bytes())
-        thresholds = [float(each) for each in proof["thresholds"]]
+        low, high = map(float, proof["thresholds"])
     except OSError as error:
         raise hn.errors.MapError(f"proof {printable(proof_file)}: {error.strerror}") from None
     except (ValueError, TypeError, LookupError, RecursionError):
@@ -213,8 +213,8 @@ def verify(map_file: MapArgument[Path], proof_file: ProofArgument) -> None:
             f"proof {printable(proof_file)}: not a proof, expected one of hybridnav plan --proof"
         ) from None
     grid = hn.load_map(map_file)
-    if [grid.free_threshold, grid.occupied_threshold] != thresholds:
-        grid = hn.load_map(map_file, free_threshold=thresholds[0], occupied_threshold=thresholds[1])
+    if (grid.free_threshold, grid.occupied_threshold) != (low, high):
+        grid = hn.load_map(map_file, free_threshold=low, occupied_threshold=high)
     frame = [grid.resolution_m, *grid.frame.origin_m, grid.frame.yaw_rad]
     try:
         said = check_proof.check(grid.measured, frame, proof)

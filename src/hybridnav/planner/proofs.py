@@ -131,9 +131,11 @@ class _Problem:
 
 def _no_path(problem: _Problem) -> dict[str, Any]:
     start, goal = np.floor(problem.ends + 1e-9).astype(np.int64).tolist()
-    chain = parting_chain(problem.free, start, goal)
-    if chain is None:
+    chains = [parting_chain(problem.free, *ends) for ends in ((start, goal), (goal, start))]
+    first, second = chains
+    if first is None or second is None:
         raise PlanError("the two ends are connected: there is no proof that there is no path")
+    chain = min(first, second, key=len)
     ends = [[2 * row + 1, 2 * col + 1] for row, col in (start, goal)]
     return {"kind": "no path", "grain": _CENTRED, "ends": ends, "chain": _walk(chain)}
 
