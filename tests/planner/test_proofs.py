@@ -12,7 +12,7 @@ import hybridnav as hn
 from benchmarks.subjects.proofs import false_proofs, frame_of, is_accepted
 from hybridnav import check_proof
 from hybridnav.errors import PlanError
-from hybridnav.planner.proofs import parting_chain
+from hybridnav.search.proofs import parting_chain
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
 
