@@ -1,6 +1,7 @@
 """Proofs of results: the checker accepts the true ones, and none that was altered."""
 
 import json
+import pickle
 from fractions import Fraction
 from itertools import pairwise
 
@@ -156,8 +157,12 @@ def test_no_proof_is_made_of_what_has_none():
     with pytest.raises(PlanError, match="corners may be cut"):
         hn.HybridPlanner(map_of(grid), preset="octile").plan(*pair).proof()
     grid = grid_of(np.ones((5, 5), int))
+    planner = hn.HybridPlanner(map_of(grid))
     with pytest.raises(PlanError, match="no proof is known of 'start outside the map'"):
-        hn.HybridPlanner(map_of(grid)).plan((0, 0), pair[1]).proof()
+        planner.plan((0, 0), pair[1]).proof()
+    copied = pickle.loads(pickle.dumps(planner.plan(*pair)))  # noqa: S301 - our own
+    with pytest.raises(PlanError, match="copies of a result have no proof"):
+        copied.proof()
     layer = hn.CostLayer(np.full((5, 5), 2.0))
     with pytest.raises(PlanError, match="costs of the kind 'array'"):
         hn.HybridPlanner(map_of(grid), preset="grid-astar", costs=layer).plan(*pair).proof()
