@@ -226,7 +226,7 @@ def check_line_by_costs(walls, factors, proof, ends):
         parts = np.sort(np.concatenate([[0.0, 1.0], *parts]))
         middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
         cost += np.hypot(*(last - first)) * (dearest(factors, middle) * np.diff(parts)).sum() / ONE
-    ends, corners = line[[0, -1]], np.rint(line[[0, -1]]).astype(int)
+    ends, corners = line[[0, -1]], np.floor(line[[0, -1]] + 0.5).astype(int)
     joins = (np.hypot(*(corners - ends).T) * dearest(factors, ends)).sum() / ONE
     least = (proof["bound"] / proof["side_m"] * (1 - 1e-9) + joins) * math.sqrt(4 - math.sqrt(8))
     wider = [np.pad(array, (0, 1), constant_values=1) for array in (walls, factors)]  # for the rim

@@ -169,7 +169,7 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     stated = _stated_line(frame, points)
     line = np.array(stated["line"]) / stated["grain"]
     cost = cost_along(problem.grid, layer, points)
-    corners = np.rint(line[[0, -1]]).astype(np.int64)
+    corners = np.floor(line[[0, -1]] + 0.5).astype(np.int64)  # as the checker rounds
     units = np.pad(layer.units, 1, constant_values=ONE)
     apart = np.hypot(*(corners - line[[0, -1]]).T)
     joins = (apart * dearest(units, line[[0, -1]] + 1)).sum() / ONE
