@@ -26,6 +26,7 @@ MOVES = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (
 STRAIGHT, DIAGONAL = 195025, 275807  # the ratio is below sqrt(2), by 7 parts in 10^12
 ONE = 2**14  # the factor 1: a metre costs a metre
 UNIT = 2 * ONE * STRAIGHT
+MOST = 1000  # cells that a radius has, lest a file takes hours
 
 
 class Rejected(Exception):
@@ -79,6 +80,7 @@ def walls_of(measured, proof, side):
     """Return the walls, bool, with a rim round the map."""
     free = (measured == 1) | (measured == 2) & (proof["allow_unexplored"] is True)
     if (radius := proof["radius_m"] / side) >= 1:
+        need(radius < MOST, "a radius of too many cells")
         most = math.floor(radius * radius * (1 + 1e-9))
         free &= squares(measured == 0, math.isqrt(most)) > most
     for first, end in proof["closed"]:
@@ -94,12 +96,14 @@ def factors_of(measured, costs, side):
     if costs is None:
         return np.full(np.add(measured.shape, 2), ONE)
     reach = math.ceil(costs["inflation_radius_m"] / side)
+    need(0 <= reach < MOST, "costs that reach too far")
     cost = np.zeros(reach * reach + 2 * reach + 2)
     for n in range(reach * reach + 1):
         off = math.sqrt(n) * side - costs["inscribed_radius_m"]
         cost[n] = 253 if off <= 0 else math.floor(252 * math.exp(-costs["scaling"] * off))
     cost[0] = 254
     factors = np.floor((1 + costs["multiplier"] / 252 * cost) * ONE).astype(np.int64)
+    need((factors >= ONE).all() and (factors < 1000 * ONE).all(), "a factor is not from 1 to 1000")
     return np.pad(factors[squares(measured == 0, reach)], 1, constant_values=ONE)
 
 
@@ -369,6 +373,9 @@ def check(measured, frame, proof):
     except Exception as error:  # whatever else a file may hold
         raise Rejected(f"this is no proof: {type(error).__name__}: {error}") from None
     ends = "from {start} to {goal}, radius {radius_m} m".format(**proof)
+    closed = sum(end - first for first, end in proof["closed"])
+    ends += f", {closed} cells closed" * (closed > 0) + f", {proof['costs']}" * bool(proof["costs"])
+    ends += ", unexplored cells too" * proof["allow_unexplored"]
     if proof["kind"] == "no path":
         return f"no path {ends}"
     return f"path {ends}: costs {cost:.6f} m, none less than {proof['bound']:.6f} m"

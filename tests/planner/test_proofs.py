@@ -170,6 +170,39 @@ def test_no_proof_is_made_of_what_has_none():
         hn.HybridPlanner(map_of(grid), preset="grid-astar", costs=layer).plan(*pair).proof()
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "why"),
+    [
+        ("radius_m", 1e9, "a radius of too many cells"),
+        ("radius_m", float("nan"), "leave other cells free"),
+        ("costs", {"multiplier": -1}, "a factor is not from 1 to 1000"),
+        ("costs", {"multiplier": float("nan")}, "a factor is not from 1 to 1000"),
+        ("costs", {"inflation_radius_m": 1e9}, "costs that reach too far"),
+        ("bound", float("nan"), "this is no proof"),
+        ("bound", 1e300, "this is no proof"),
+        ("bound", -1.0, "a move raises p"),
+        ("cost", float("nan"), "the path costs"),
+        ("grain", 3, "a wrong grain"),
+        ("ends", [[-1, -1], [-1, -1]], "ends outside"),
+        ("box", [0, 0, 10**9, 10**9], "this is no proof"),
+        ("box", [-1, 0, 3, 3], "."),
+        ("tree", "", "this is no proof"),
+        ("path", [[0, 0], "89"], "this is no proof"),
+        ("closed", [[0, 10**12]], "a closed cell is outside the map"),
+    ],
+)
+def test_hostile_values_are_rejected(key, value, why):
+    grid = hn.example_map("figure1")
+    planner = hn.HybridPlanner(
+        map_of(grid), preset="grid-astar", costs=hn.CostLayer.clearance(grid)
+    )
+    proof = planner.plan((0.5, 0.5), (2.0, 2.5)).proof()
+    assert is_accepted(grid, proof)
+    value = proof["costs"] | value if key == "costs" else value
+    with np.errstate(all="ignore"), pytest.raises(check_proof.Rejected, match=why):
+        check_proof.check(grid.measured, frame_of(grid), {**proof, key: value})
+
+
 @pytest.mark.parametrize("text", ["{}", "[]", "3", '{"kind": "cells"}', "null"])
 def test_any_other_json_is_rejected_in_one_line(text):
     grid = hn.example_map("figure1")
