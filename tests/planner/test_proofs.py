@@ -16,6 +16,7 @@ from hybridnav.errors import PlanError
 from hybridnav.search.proofs import parting_chain
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
+from tests.strategies import examples
 
 PRESETS = ("shortest", "octile", "grid-astar", "grid-astar by costs", "robot")
 
@@ -38,7 +39,7 @@ def planner_of(grid, preset):
 def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
     rng = np.random.default_rng(PRESETS.index(preset))
     kinds: dict[str, int] = {}
-    for n in range(12):
+    for n in range(examples(24, 112)):  # in full 10,000 false proofs
         grid = random_grid(rng, radius_m=0.05 * (n % 3))
         planner = planner_of(grid, preset)
         for pair in points_in(grid, rng, 3):
@@ -60,6 +61,7 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
                 kinds[kind] = kinds.get(kind, 0) + 1
                 assert not is_accepted(grid, false, measured), (kind, false)
     planted = {"radius", "map", "cost", "bound", "corner", "closure", "wall on the path"}
+    print(sum(kinds.values()), "false proofs")  # noqa: T201 - for `pytest -s`
     assert planted | ({"forged bound"} if preset != "robot" else set()) <= kinds.keys()
 
 
