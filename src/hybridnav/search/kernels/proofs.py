@@ -54,6 +54,7 @@ def tree_of(costs, start, goal, limit):
         uint8 (rows, cols), the direction from each node to the one before it, `ROOT` at the start
         and `OUTSIDE` elsewhere; and the least cost of the goal, or the limit if it is not below.
     """
+    # The least known cost of each node, its way back, and the open list by cost and way ahead.
     rows, cols = costs.shape[1:]
     cost = np.full((rows, cols), np.int64(FAR))
     tree = np.full((rows, cols), np.uint8(OUTSIDE))
@@ -71,6 +72,7 @@ def tree_of(costs, start, goal, limit):
         if tree[row, col] != OUTSIDE:
             continue
         tree[row, col] = back[row, col]
+        # Neighbours that are cheaper over this node wait with it as the way back.
         for k in range(8):
             step = _cost_of(costs, row, col, k)
             to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
@@ -92,6 +94,7 @@ def tree_of(costs, start, goal, limit):
         for col in range(cols):
             if tree[row, col] >= ROOT:
                 continue
+            # Costs are whole numbers, so equally good is equal.
             for k in (tree[row, col - 1], tree[row - 1, col]):
                 step = _cost_of(costs, row, col, k) if k < ROOT else 0
                 to_row, to_col = row + ROW_STEP[k & 7], col + COL_STEP[k & 7]
