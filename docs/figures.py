@@ -9,10 +9,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
+from hybridnav import check_proof
 from hybridnav.ext.fleet import plot_building
 from hybridnav.ext.graphs import build_lane_graph, plot_route_graph
 from hybridnav.search.mesh import build_mesh, trace_search
@@ -20,6 +22,7 @@ from hybridnav.viz import (
     plot_costs,
     plot_level,
     plot_levels,
+    plot_map,
     plot_mesh,
     plot_rooms,
     plot_search,
@@ -34,6 +37,9 @@ LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
+
+BARRIER = [(29.1, 5.0), (29.3, 5.0), (29.3, 20.0), (29.1, 20.0)]
+"""An area across three doors between start and goal, metres."""
 
 ROBOT = ("shortest", "robot")
 """Presets whose paths are drawn over costs."""
@@ -160,6 +166,49 @@ def _page_shot(browser: Any, address: str, size: tuple[int, int]) -> Image.Image
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
+def draw_potential(file: Path) -> None:
+    """Draw the potential in the proof of a shortest path of cells, and that path."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    proof = hn.HybridPlanner(topology, preset="octile").plan(START, GOAL).proof()
+    walls = np.pad(~grid.enterable(), 1, constant_values=True)
+    ends = np.array(proof["ends"]) // 2 + 1
+    factors = np.full(walls.shape, check_proof.ONE)
+    bound = int(proof["bound"] / grid.resolution_m * (1 - 1e-9) * check_proof.UNIT)
+    p, tree, (top, left) = check_proof.check_potential(
+        check_proof.costs_of_cells, walls, factors, proof, ends, bound
+    )
+    outside = tree == 9  # noqa: PLR2004 - the mark of cells that the tree leaves out
+    metres = np.where(outside, np.nan, p / check_proof.UNIT * grid.resolution_m)
+    rows, cols = metres.shape
+    (x, y), (x_end, y_end) = grid.frame.points_of_grid(
+        [(top - 1, left - 1), (top - 1 + rows, left - 1 + cols)]
+    )
+    ax = plot_map(grid, title="p from 0 (dark) to 43.9 m (yellow), a line every two metres")
+    ax.imshow(metres, origin="lower", extent=(x, x_end, y, y_end), cmap="viridis", zorder=2)
+    at = np.linspace(x, x_end, cols), np.linspace(y, y_end, rows)
+    levels = np.arange(0, proof["bound"], 2)
+    ax.contour(*at, metres, levels=levels, colors="white", linewidths=0.5, zorder=3)
+    path = grid.frame.points_of(check_proof.walk(*proof["path"]) - 1)
+    ax.plot(*path.T, color="crimson", linewidth=1.5, zorder=4)
+    save_figure(ax, file, dpi=130)
+
+
+def draw_cut(file: Path) -> None:
+    """Draw the chain of walls that proves that there is no path, and the two ends."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    shut = hn.Blocked(polygons=[BARRIER])
+    proof = hn.HybridPlanner(topology).plan(START, GOAL, blocked=shut).proof()
+    chain = grid.frame.points_of(check_proof.walk(*proof["chain"]) - 1)
+    ax = plot_map(grid, title="A closed chain of walls round the goal")
+    ax.plot(*chain.T, color="crimson", linewidth=1.2)
+    for (x, y), name in ((START, "start"), (GOAL, "goal")):
+        ax.plot(x, y, "o", color="black")
+        ax.annotate(name, (x, y), textcoords="offset points", xytext=(-12, -14))
+    save_figure(ax, file, dpi=130)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -178,6 +227,8 @@ if __name__ == "__main__":
         (draw_building, "building.png"),
         (draw_lanes, "office-lanes.png"),
         (draw_page, "view.png"),
+        (draw_potential, "proof-potential.png"),
+        (draw_cut, "proof-cut.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)

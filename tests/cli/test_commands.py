@@ -609,3 +609,31 @@ def test_export_writes_over_nothing_without_force(cli, rooms, tmp_path, kind):
     assert out.read_text() == "mine"
     assert cli(*query, "--force").code == 0
     assert out.read_text() != "mine"
+
+
+def test_a_proof_is_written_and_verified(cli, rooms, tmp_path):
+    proof = tmp_path / "proof.json"
+    plan = ("plan", rooms, "--start", "1.5,3.5", "--goal", "7.2,4.9", "--proof", proof)
+    assert cli(*plan).code == 0
+    done = cli("verify", rooms, proof)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.startswith("accepted   path from [1.5, 3.5] to [7.2, 4.9], radius 0.25 m")
+    proof.write_text(proof.read_text().replace('"radius_m":0.25', '"radius_m":1.5'))
+    done = cli("verify", rooms, proof)
+    assert done.code == 1
+    assert done.out == "rejected   map, radius and closed cells leave other cells free\n"
+    for text, code in (("{}", 3), ("no JSON", 3), ('{"thresholds": [1]}', 3), ("[]", 3)):
+        proof.write_text(text)
+        done = cli("verify", rooms, proof)
+        assert (done.code, done.out, done.err.count("\n")) == (code, "", 1)
+    assert cli("verify", rooms, tmp_path / "none.json").code == 3
+    assert cli(*plan[:-1], tmp_path / "proof.txt").code == 2
+    assert cli(*plan, "--alternatives", "2").code == 2
+
+
+def test_a_proof_of_no_path_is_verified(cli, draw, tmp_path):
+    walled = draw("#######", "#..#..#", "#######")
+    plan = ("plan", walled, "--start", "1.5,1.5", "--goal", "5.5,1.5", "--proof")
+    assert cli(*plan, tmp_path / "p.json").code == 1
+    done = cli("verify", walled, tmp_path / "p.json")
+    assert done.out == "accepted   no path from [1.5, 1.5] to [5.5, 1.5], radius 0.25 m\n"

@@ -116,7 +116,7 @@ def test_the_table_of_consistency_counts_checks(study, method):
     assert [row[f"{kind} wrong"] for kind in KINDS] == [0] * len(KINDS)
     layers = (1, N_PAIRS, N_PAIRS) if row["regions checked"] else (0, 0, 0)
     counted = [row[f"{kind} checked"] for kind in KINDS]
-    assert counted == [*layers, N_PAIRS, N_PAIRS + 2, N_PAIRS]
+    assert counted == [*layers, N_PAIRS, N_PAIRS + 2, N_PAIRS, 0]  # no proofs
     assert row['"no path", right'] == 2
     assert row["paths"] == f"0 of {N_PAIRS}"
     assert bool(row["regions"]) == (row["regions checked"] == 1)

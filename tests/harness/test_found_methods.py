@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.methods import baseline_spec, prepare
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
@@ -102,3 +103,79 @@ def test_a_search_method_is_closed_at_the_end(monkeypatch: pytest.MonkeyPatch) -
     assert not closed
     method.close()
     assert len(closed) == 1
+
+
+class Proving:
+    """Answers as preset octile does, with a proof."""
+
+    metric = "octile"
+
+    def __init__(self, grid: hn.OccupancyGrid) -> None:
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+        self.planner = hn.HybridPlanner(topology, preset="octile")
+
+    def find(self, query: Query) -> Found:
+        """Plan, and prove it."""
+        result = self.planner.plan(*query.points)
+        cells = None if result.path is None else result.path.cells
+        return Found(cells, result.cost, result.lower_bound, proof=self.proof(result))
+
+    def proof(self, result: hn.PlanResult) -> dict[str, Any]:
+        """Return the proof."""
+        return result.proof()
+
+
+class ProvingTooMuch(Proving):
+    """Claims a bound that is above the cost."""
+
+    def proof(self, result: hn.PlanResult) -> dict[str, Any]:
+        """Return a false proof."""
+        proof = result.proof()
+        return {**proof, "bound": proof.get("bound", 0) * 1.01}
+
+
+class ProvingAnother(Proving):
+    """Proves the answer to another query."""
+
+    def proof(self, result: hn.PlanResult) -> dict[str, Any]:
+        """Return the proof of the way back."""
+        assert result.start is not None
+        assert result.goal is not None
+        return self.planner.plan(result.goal, result.start).proof()
+
+
+@pytest.mark.parametrize(
+    ("method", "text"),
+    [
+        (Proving, None),
+        (ProvingTooMuch, "the proof is rejected"),
+        (ProvingAnother, "the proof is about other ends"),
+    ],
+)
+def test_proofs_of_a_method_are_checked_and_counted(
+    method: type[Proving],
+    text: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+    monkeypatch.setitem(sys.modules, "mine", sys.modules[__name__])
+    settings = RunSettings(
+        maps=(str(write_map(tmp_path, ROOMS)),),
+        presets=(),
+        baselines=(name_of(method),),
+        pairs=6,
+        robot_radius_m=0.0,
+    )
+    evaluate(settings, tmp_path / "run")
+    study = write_outputs(tmp_path / "run")
+    (outcome,) = study.of_method(method.__name__)
+    row = consistency_row([outcome])
+    pairs = len(outcome.records)
+    assert row["proofs checked"] == pairs
+    if text is None:
+        assert row["proofs"] == f"0 of {pairs}"
+        assert not outcome.faults
+    else:
+        assert str(row["proofs"]).split()[0] != "0"
+        assert all(text in fault for _, fault in outcome.faults)

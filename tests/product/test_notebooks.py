@@ -26,6 +26,7 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
     "06_certificates": {"NEAR": ((12.0, 2.0), (12.0, 7.5)), "FAR": ((12.0, 2.0), (24.0, 23.0))}
     | {"DOORS": ((15.5, 6.2), (9.9, 6.2))},
     "07_a_robot_wakes_up": {"STARTS": [(12.0, 2.0)]},
+    "08_break_a_proof": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "ISLAND": (24.0, 23.0)},
 }
 """Settings with which each notebook runs on another map."""
 WITHOUT_OMPL = """
@@ -117,7 +118,7 @@ def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> 
 
 
 def test_there_are_notebooks() -> None:
-    assert [path.name[:3] for path in NOTEBOOKS] == [f"0{number}_" for number in range(1, 8)]
+    assert [path.name[:3] for path in NOTEBOOKS] == [f"0{number}_" for number in range(1, 9)]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -32,6 +32,7 @@ _HOME_OF = {
     "evaluate": "evaluate",
     "compare": "evaluate",
     "preset": "show",
+    "verify": "show",
 }
 """The module of each command of this package, in the order of the help; others are registered."""
 

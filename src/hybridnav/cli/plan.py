@@ -115,6 +115,14 @@ BagOption = Annotated[
         help="Write path and map as a new bag of ROS: NAME.bag of ROS 1, else a folder of ROS 2.",
     ),
 ]
+ProofOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--proof",
+        metavar="FILE",
+        help="Write a proof of the answer, .json, for hybridnav verify or check_proof.py.",
+    ),
+]
 CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
@@ -156,6 +164,7 @@ def plan(
     plot: options.PlotOption = None,
     poses: PosesOption = None,
     bag: BagOption = None,
+    proof: ProofOption = None,
     language: LanguageOption = "en",
     as_json: options.JsonOption = False,
     *,
@@ -170,6 +179,7 @@ def plan(
     """
     del no_stairs  # of a building
     _check_files(plot, poses, bag)
+    check_output(proof, "--proof", (".json",))
     where = checked_at(at)
     given = options.parsed_costs(costs)
     check_language(language)
@@ -198,6 +208,7 @@ def plan(
         plot=plot,
         poses=poses,
         bag=bag,
+        proof=proof,
         language=language,
         as_json=as_json,
     )
@@ -218,11 +229,14 @@ def _check_files(plot: Path | None, poses: Path | None, bag: Path | None) -> Non
 
 def _check_fits(request: Request) -> None:
     """Refuse files of one path for several, and comparisons of tours."""
-    for option, file in (("--poses", request.poses), ("--bag", request.bag)):
+    files = {"--poses": request.poses, "--bag": request.bag, "--proof": request.proof}
+    for option, file in files.items():
         if file is not None and request.wanted.count > 1:
             raise UsageError(
                 f"{option} writes one path, and --alternatives asks for more: leave one out"
             )
+    if request.proof is not None and len(request.waypoints) > 2:  # noqa: PLR2004 - start and goal
+        raise UsageError("--proof is of a path without --via: leave one out")
     if request.is_tour and request.compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import hybridnav as hn
+from hybridnav._base.files import replace_file
 from hybridnav.cli.common import UsageError, complain, islands_figures, stage
 from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
@@ -49,6 +51,7 @@ class Request:
     plot: Path | None
     poses: Path | None
     bag: Path | None
+    proof: Path | None
     language: str
     as_json: bool
 
@@ -98,6 +101,10 @@ class Request:
             hn.export_path(outcome, self.poses)
         if self.bag is not None:
             hn.ext.live.save_bag(self.bag, [outcome], grid=grid)
+        if self.proof is not None:
+            result = outcome.results[0] if isinstance(outcome, hn.Tour) else outcome
+            text = json.dumps(result.proof(), separators=(",", ":"), allow_nan=False)
+            replace_file(self.proof, text.encode())
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
             draw(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import (
+    EXIT_NOT_SOLVED,
     UsageError,
     answer,
     check_picture,
@@ -38,6 +40,10 @@ GuessOption = Annotated[
         help="Count the arcs that end to exist if a threshold moves by less than M, and draw the "
         "graph, these arcs dashed.",
     ),
+]
+ProofArgument = Annotated[
+    Path,
+    typer.Argument(metavar="PROOF", help="JSON of hybridnav plan --proof, or of PlanResult.proof."),
 ]
 
 
@@ -186,3 +192,33 @@ def show_preset(source: PresetArgument) -> None:
 def check_preset(source: PresetArgument) -> None:
     """Check a preset; an error names the key."""
     answer(f"{read_preset(source).name}: valid\n")
+
+
+def verify(map_file: MapArgument[Path], proof_file: ProofArgument) -> None:
+    """Check a PROOF of a plan on MAP: that its path is free, has its cost, and none costs less.
+
+    The same is done by check_proof.py, a script that needs nothing of this package.
+
+    Exits with 0 when the proof is accepted, 1 when it is rejected, 3 on unreadable input.
+    """
+    from hybridnav import check_proof  # noqa: PLC0415 - loads numpy
+
+    try:
+        proof = json.loads(proof_file.read_bytes())
+        low, high = map(float, proof["thresholds"])
+    except OSError as error:
+        raise hn.errors.MapError(f"proof {printable(proof_file)}: {error.strerror}") from None
+    except (ValueError, TypeError, LookupError, RecursionError):
+        raise hn.errors.MapError(
+            f"proof {printable(proof_file)}: not a proof, expected one of hybridnav plan --proof"
+        ) from None
+    grid = hn.load_map(map_file)
+    if (grid.free_threshold, grid.occupied_threshold) != (low, high):
+        grid = hn.load_map(map_file, free_threshold=low, occupied_threshold=high)
+    frame = [grid.resolution_m, *grid.frame.origin_m, grid.frame.yaw_rad]
+    try:
+        said = check_proof.check(grid.measured, frame, proof)
+    except check_proof.Rejected as error:
+        answer(f"rejected   {error}\n")
+        raise typer.Exit(EXIT_NOT_SOLVED) from None
+    answer(f"accepted   {said}\n")

@@ -112,7 +112,7 @@ class FoundMethod:
         ends = self._frame.points_of(np.array([start, goal]))
         found = self._method.find(search.Query((start, goal), (ends[0], ends[1])))
         stats, cost_m, least_m = found.stats, found.cost_m, found.lower_bound_m
-        counts = _counts(stats) | {"seconds": stats.seconds}
+        counts = _counts(stats) | {"seconds": stats.seconds, "proof": found.proof}
         if not found.has_path:
             gave_up = "" if math.isinf(least_m) else "no path, and no proof of none"
             return MethodResult(None, gave_up=gave_up, **counts)
@@ -260,6 +260,7 @@ class OnOwnGrid:
         line, claim = answer.any_angle, answer.by_costs
         return replace(
             answer,
+            proof=None,
             nodes=None,
             arcs=None,
             bound=math.inf,

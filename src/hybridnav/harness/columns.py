@@ -50,6 +50,8 @@ CONSISTENCY_COLUMNS = {
     "where there is one, or a path where there is none",
     "bounds": "contradictions in checked answers by the optima: a length or cost below the "
     "optimum, a bound that is broken, a claim about its own path that is wrong",
+    "proofs": "proofs of answers that `check_proof` rejected, or that are about another query, of "
+    "those that the method handed in",
     "without an answer": "queries that ended in an error, out of time, or with a lost process",
 }
 """Columns of the table of consistency, and their meaning."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav import check_proof
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
@@ -97,6 +99,10 @@ class Judge:
         checked between its plan and its path."""
         length_m, faults = self._judged_path(pair, answer)
         checked: list[Kind] = []
+        if answer.proof is not None:
+            checked.append("proofs")
+            wrong = _false_proof(self._grid, pair, answer, length_m)
+            faults += [Fault("proofs", wrong)] if wrong else []
         checks = self._consistency
         if checks is None:
             return length_m, faults, checked
@@ -206,6 +212,30 @@ def _false_claims(line: AnyAngleResult, length_m: float) -> list[str]:
             f"the lower bound {line.lower_bound_m:.6f} m is above the length {length_m:.6f} m"
         )
     return wrong
+
+
+def _false_proof(
+    grid: OccupancyGrid, pair: Pair, answer: MethodResult, length_m: float | None
+) -> str | None:
+    """Return why a proof does not prove the answer to a query, None if it does."""
+    proof: dict[str, Any] = answer.proof or {}
+    frame = grid.frame
+    free = hashlib.sha256(np.packbits(grid.enterable()).tobytes()).hexdigest()
+    try:
+        check_proof.check(
+            grid.measured, [frame.resolution_m, *frame.origin_m, frame.yaw_rad], proof
+        )
+    except check_proof.Rejected as error:
+        return f"the proof is rejected: {error}"
+    ends = frame.cells_of([proof["start"], proof["goal"]]).tolist()
+    if ends != [list(pair.start), list(pair.goal)] or proof["free_sha256"] != free:
+        return "the proof is about other ends, or about another map, radius or closure"
+    if (proof["kind"] == "no path") is answer.is_path:
+        return "the proof contradicts the answer on whether there is a path"
+    if length_m is None or proof["costs"] is not None:
+        return None
+    is_alike = abs(proof["cost"] - length_m) <= SLACK * length_m
+    return None if is_alike else f"the proof is about another path, of {proof['cost']:.6f} m"
 
 
 class Oracles:

@@ -114,9 +114,9 @@ TOO_SLOW = "too slow"
 """Status of a query that is not asked, because the time of its method on the map is spent."""
 
 
-Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds"]
+Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds", "proofs"]
 """What a contradiction is about: the regions of a map; a plan without a path; a path without a
-plan; a path that is none; whether there is a path; lengths, costs and bounds."""
+plan; a path that is none; whether there is a path; lengths, costs and bounds; a proof of those."""
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 

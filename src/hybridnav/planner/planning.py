@@ -388,6 +388,7 @@ class Planning:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         start, goal = (tuple(pose.tolist()) for pose in request.poses)
         own: Any = partial(deepcopy, self._settings)
+        outcome["proof_source"] = self.grid, self.costs, request.closed
         return PlanResult(status, settings=own, start=start, goal=goal, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:

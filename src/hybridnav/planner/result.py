@@ -21,10 +21,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planner.costs import PlannerCosts
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
     from hybridnav.planner.speed import MotionLimits
     from hybridnav.planner.why import Explanation
+    from hybridnav.search.found import ClosedCells
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
@@ -140,6 +143,11 @@ class PlanResult:
     """The instructions, or the data to find them from."""
     why_source: Callable[[], Explanation] | Explanation | None = field(default=None, repr=False)
     """The explanation, or how to find it."""
+    proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
+        default=None, repr=False
+    )
+    """What proofs are made of: the map, the costs, and the closed cells of the query; None in
+    copies of a result."""
 
     @cached_property
     def lower_bound(self) -> float:
@@ -214,6 +222,7 @@ class PlanResult:
             "bound_source": self.lower_bound,
             "settings": self.settings,
             "why_source": self.explanation,
+            "proof_source": None,
         }
 
     @property
@@ -254,6 +263,36 @@ class PlanResult:
         if not self.solved:
             raise PlanError(f"no path was planned: {self.status}")
         return self
+
+    def proof(self) -> dict[str, Any]:
+        """Return a proof of the answer, plain values for strict JSON: that its path is free, has
+        its cost, and that none costs less than its bound; or that there is no path.
+
+        `check_proof.py`, which needs nothing of this package, accepts or rejects it: see
+        :doc:`/explanation/what-a-proof-is`.
+
+        Raises
+        ------
+        PlanError
+            When no proof is known of such an answer: where corners may be cut, with costs other
+            than those of clearance, for paths of OMPL, and for copies of a result.
+
+        Examples
+        --------
+        >>> from hybridnav import check_proof
+        >>> grid = hn.example_map("figure1")
+        >>> planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+        >>> proof = planner.plan((0.5, 0.5), (2.0, 2.5)).proof()
+        >>> origin = *grid.frame.origin_m, grid.frame.yaw_rad
+        >>> check_proof.check(grid.measured, [grid.resolution_m, *origin], proof)[:43]
+        'path from [0.5, 0.5] to [2.0, 2.5], radius '
+        """
+        if self.proof_source is None:
+            raise PlanError("copies of a result have no proof: ask the result that was planned")
+        # Loads modules that plans without a proof do not need.
+        from hybridnav.planner.proofs import proof_of  # noqa: PLC0415
+
+        return proof_of(self, *self.proof_source)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for strict JSON, under the names of the attributes.

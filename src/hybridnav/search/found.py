@@ -155,6 +155,8 @@ class Found:
     route: Route | None = None
     """The route that was chosen before the path; None to derive it from the path."""
     stats: PlanStats = field(default_factory=PlanStats)
+    proof: dict[str, Any] | None = None
+    """A proof of the answer, for the harness; see `PlanResult.proof`. None for none."""
 
     @property
     def has_path(self) -> bool:

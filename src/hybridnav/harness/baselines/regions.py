@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -263,6 +263,8 @@ class MethodResult:
     """Claims about the cost of the path; None if the method planned by lengths."""
     gave_up: str = ""
     """Reason for no path and no claim that none exists, such as "timeout"."""
+    proof: dict[str, Any] | None = None
+    """A proof of the answer, which `check_proof` checks; see `PlanResult.proof`. None for none."""
 
     @property
     def is_path(self) -> bool:

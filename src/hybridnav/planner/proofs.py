@@ -1,0 +1,223 @@
+"""Proofs of results, which `check_proof.py` checks without anything of this package."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._base.moves import COL_STEP, ROW_STEP
+from hybridnav.check_proof import ONE, UNIT, costs_of_cells, costs_of_corners, dearest
+from hybridnav.errors import PlanError
+from hybridnav.maps.cells import CellClass
+from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.costs import cost_along
+from hybridnav.search.proofs import CostTree, corners_near, parting_chain
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import Frame, OccupancyGrid
+    from hybridnav.planner import PlanResult
+    from hybridnav.planner.costs import PlannerCosts
+    from hybridnav.search.found import ClosedCells
+
+_CENTRED, _FINE = 2, 2**24
+"""Parts of a cell in which ends are counted: those of centres, and of exact tests."""
+_RATIO = math.sqrt(4 - math.sqrt(8))
+"""Most by which moves between corners of cells are dearer than a line."""
+
+
+def proof_of(
+    result: PlanResult, grid: OccupancyGrid, costs: PlannerCosts, closed: ClosedCells | None
+) -> dict[str, Any]:
+    """Return the proof of a result; see `PlanResult.proof`.
+
+    Parameters
+    ----------
+    result
+        The result of a query.
+    grid, costs, closed
+        The map and the costs that it was planned by, and the closed cells of the query.
+    """
+    if grid.corner_cutting:
+        raise PlanError(
+            "no proof is known where corners may be cut: load the map without corner_cutting"
+        )
+    kind = result.metric if result.solved else str(result.status)
+    make = {
+        "no path": _no_path,
+        "octile": _cells,
+        "weighted": _cells,
+        "any-angle": _line,
+        "any-angle-weighted": _line_by_costs,
+    }.get(kind)
+    if make is None or result.refinement is not None:
+        raise PlanError(
+            f"no proof is known of {kind!r:.80}: expected no path, or a path of the metric octile, "
+            "weighted, any-angle or any-angle-weighted that OMPL did not change"
+        )
+    problem = _Problem(result, grid, costs, closed)
+    return problem.stated | make(problem)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What is to be proved."""
+
+    result: PlanResult
+    grid: OccupancyGrid
+    costs: PlannerCosts
+    closed: ClosedCells | None
+
+    @cached_property
+    def allow_unexplored(self) -> bool:
+        """Whether unexplored cells may be entered."""
+        return bool(self.result.settings["planner"]["allow_unexplored"])
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """bool (rows, cols), the cells that paths of the query may use."""
+        free = self.grid.enterable(allow_unexplored=self.allow_unexplored)
+        for shut in (self.closed, self.costs.closed):
+            if shut is not None:
+                free.ravel()[shut.flat] = False
+        return free
+
+    @property
+    def units(self) -> IntArray | None:
+        """int32 (rows, cols), the factors in units; None for lengths."""
+        return None if self.costs.layer is None else self.costs.layer.units
+
+    @cached_property
+    def ends(self) -> FloatArray:
+        """float64 (2, 2), positions (row, col) of start and goal in grid units."""
+        assert self.result.start and self.result.goal  # noqa: S101, PT018 - results of plans
+        points = np.array([self.result.start[:2], self.result.goal[:2]])
+        return self.grid.frame.positions_of(points)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """The map, the robot, what is closed, and the two ends."""
+        grid, layer, costs = self.grid, self.costs.layer, None
+        if layer is not None:
+            kind = layer.source.get("kind")
+            if kind != "clearance":
+                raise PlanError(
+                    f"no proof is known of costs of the kind {kind!r:.60}: expected clearance"
+                )
+            costs = {name: value for name, value in layer.source.items() if name != "kind"}
+        kinds = (CellClass.FREE, CellClass.UNEXPLORED)[: 1 + self.allow_unexplored]
+        radius_cells = grid.robot_radius_m / grid.resolution_m
+        near = within_radius(grid.measured == CellClass.OCCUPIED, radius_cells=radius_cells)
+        shut = np.isin(grid.measured, kinds) & ~near & ~self.free
+        edges = np.flatnonzero(np.diff(shut.ravel(), prepend=False, append=False))
+        return {
+            "thresholds": [grid.free_threshold, grid.occupied_threshold],
+            "map_sha256": hashlib.sha256(grid.measured.tobytes()).hexdigest(),
+            "side_m": grid.resolution_m,
+            "origin": [*grid.frame.origin_m, grid.frame.yaw_rad],
+            "radius_m": grid.robot_radius_m,
+            "allow_unexplored": self.allow_unexplored,
+            "closed": edges.reshape(-1, 2).tolist(),
+            "free_sha256": hashlib.sha256(np.packbits(self.free).tobytes()).hexdigest(),
+            "costs": costs,
+            "start": list(self.result.start or ())[:2],
+            "goal": list(self.result.goal or ())[:2],
+        }
+
+
+def _no_path(problem: _Problem) -> dict[str, Any]:
+    start, goal = np.floor(problem.ends + 1e-9).astype(np.int64).tolist()
+    chains = [parting_chain(problem.free, *ends) for ends in ((start, goal), (goal, start))]
+    first, second = chains
+    if first is None or second is None:
+        raise PlanError("the two ends are connected: there is no proof that there is no path")
+    chain = min(first, second, key=len)
+    ends = [[2 * row + 1, 2 * col + 1] for row, col in (start, goal)]
+    return {"kind": "no path", "grain": _CENTRED, "ends": ends, "chain": _walk(chain)}
+
+
+def _cells(problem: _Problem) -> dict[str, Any]:
+    result, per_cell = problem.result, problem.grid.resolution_m
+    assert result.path is not None  # noqa: S101 - it is solved
+    cells = result.path.cells
+    length = result.cost / per_cell
+    tree = CostTree(problem.free, problem.units, costs_of_cells, cells[[0, -1]], length)
+    limit = math.floor(result.lower_bound / per_cell * (1 - 1e-9) * UNIT)
+    return {
+        "kind": "cells",
+        "grain": _CENTRED,
+        "ends": (2 * cells[[0, -1]] + 1).tolist(),
+        "cost": result.cost,
+        "bound": result.lower_bound,
+        "path": _walk(cells),
+        **tree.stated(limit),
+    }
+
+
+def _line_by_costs(problem: _Problem) -> dict[str, Any]:
+    result, frame, layer = problem.result, problem.grid.frame, problem.costs.layer
+    assert result.path is not None  # noqa: S101 - it is solved
+    assert layer is not None  # noqa: S101 - as the metric says
+    points = result.path.points if result.line is None else result.line
+    if result.line is None and result.path.is_curved:
+        raise PlanError("no proof is known of arcs along cells: take smooth='line-of-sight'")
+    stated = _stated_line(frame, points)
+    line = np.array(stated["line"]) / stated["grain"]
+    cost = cost_along(problem.grid, layer, points)
+    corners = np.floor(line[[0, -1]] + 0.5).astype(np.int64)  # as the checker rounds
+    units = np.pad(layer.units, 1, constant_values=ONE)
+    apart = np.hypot(*(corners - line[[0, -1]]).T)
+    joins = (apart * dearest(units, line[[0, -1]] + 1)).sum() / ONE
+    length = (cost / frame.resolution_m + joins) * _RATIO
+    tree = CostTree(problem.free, problem.units, costs_of_corners, corners, length)
+    _, least = tree.grown(math.floor(length * UNIT))
+    bound = max(least / UNIT / _RATIO - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
+    limit = math.floor((bound * (1 - 1e-9) + joins) * _RATIO * UNIT)
+    return {
+        "kind": "line by costs",
+        **stated,
+        "cost": cost,
+        "bound": bound * frame.resolution_m,
+        **tree.stated(limit),
+    }
+
+
+def _stated_line(frame: Frame, points: FloatArray) -> dict[str, Any]:
+    """Return points of a line in whole numbers of a part of a cell."""
+    fine = np.rint(frame.positions_of(points) * _FINE).astype(np.int64)
+    grain = _FINE if (fine % (_FINE // _CENTRED)).any() else _CENTRED
+    line = fine // (_FINE // grain)
+    return {"grain": grain, "ends": line[[0, -1]].tolist(), "line": line.tolist()}
+
+
+def _line(problem: _Problem) -> dict[str, Any]:
+    result, frame = problem.result, problem.grid.frame
+    assert result.path is not None  # noqa: S101 - it is solved
+    stated = _stated_line(frame, result.path.points)
+    ends = np.array(stated["ends"]) / stated["grain"]
+    bound = result.lower_bound / frame.resolution_m
+    cells = result.path.cells[[0, -1]]
+    corners, distances = corners_near(problem.free, ends, cells, bound)
+    return {
+        "kind": "line",
+        **stated,
+        "cost": result.cost,
+        "bound": result.lower_bound,
+        "corners": [
+            [row, col, p]
+            for (row, col), p in zip(corners.tolist(), distances.tolist(), strict=True)
+        ],
+    }
+
+
+def _walk(cells: LongArray) -> list[Any]:
+    """Return the first one of some cells, each an 8-neighbour of the next, and the moves."""
+    number = np.zeros((3, 3), np.int64)
+    number[ROW_STEP + 1, COL_STEP + 1] = np.arange(8)
+    moves = number[tuple(np.diff(cells, axis=0).T + 1)]
+    return [cells[0].tolist(), "".join(map(str, moves.tolist()))]
