@@ -87,12 +87,17 @@ class Building:
 
     def boundaries(self, label_of: IntArray) -> RoomBoundaries:
         """Return the boundaries between rooms, which are spread over free cells between them."""
-        spread = np.where(self.free, label_of, -1).astype(np.int32)
+        label_of = self.spread(label_of)
+        names = tuple(map(str, range(int(label_of.max()) + 1)))
+        return RoomBoundaries.of(hn.RoomLabels(names, label_of), self.grid, self.clearance_m)
+
+    def spread(self, label_of: IntArray) -> IntArray:
+        """Return rooms that are spread over free cells between them."""
+        grown = np.where(self.free, label_of, -1).astype(np.int32)
         region = np.where(self.free, np.int32(0), np.int32(-1))
         steps = round(_BETWEEN_M / self.grid.resolution_m)
-        _segmentation_kernels.grow_labels(spread, region, steps)
-        names = tuple(map(str, range(int(spread.max()) + 1)))
-        return RoomBoundaries.of(hn.RoomLabels(names, spread), self.grid, self.clearance_m)
+        _segmentation_kernels.grow_labels(grown, region, steps)
+        return grown
 
     def doors(self, label_of: IntArray) -> FloatArray:
         """Return the middles of doors between rooms, float64 (n, 2), in metres: of at most 2 m,

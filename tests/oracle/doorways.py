@@ -183,8 +183,8 @@ def judged(topology: hn.TopologicalMap, result: hn.PlanResult) -> Verdict:
     """Compare the words of a path with its doors."""
     assert result.path is not None
     walk = Walk(topology, result.path.points)
-    passages = walk.passages()
     told = result.instructions
+    passages = [one for one in walk.passages() if not _is_by_sight(told, _instruction(told, one))]
     at_door = {one.at_m: _instruction(told, one) for one in passages}
     turns = [
         one
@@ -202,6 +202,14 @@ def judged(topology: hn.TopologicalMap, result: hn.PlanResult) -> Verdict:
         _wrong_bears(walk, told, passages),
         [one for one in told if not _is_finite(one)],
     )
+
+
+def _is_by_sight(told: tuple[Instruction, ...], at_door: Instruction | None) -> bool:
+    """Whether a person sees the door from the instruction before, or from it the next one: then
+    that is told, and no turn."""
+    crossed = [one for one in told if one.doorway is not None]
+    around = crossed[crossed.index(at_door) :][:2] if at_door in crossed else []
+    return any(one.doorway is not None and one.doorway.is_seen for one in around)
 
 
 def _is_straight_opening(walk: Walk, passage: Passage) -> bool:

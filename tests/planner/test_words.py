@@ -55,11 +55,8 @@ def test_the_kitchen_is_left_to_the_left_and_doors_are_landmarks():
     words = hn.plan_tour(house(), [(1.25, 5.75), "lab"], at="point").words()
     assert words == [
         "start in the kitchen",
-        "after 2 m leave the kitchen by door 2 into the corridor, then left",
-        (
-            "after 17 m, past three doors on the left and one opening on the right, "
-            "turn left through door 6 into the lab"
-        ),
+        "leave the kitchen by door 2 into the corridor, then left",
+        "after 17 m go through the last door on the left (door 6) into the lab",
         "after 1 m you are there",
     ]
 
@@ -71,13 +68,15 @@ def test_the_same_words_for_a_plan_a_tour_and_another_preset():
     assert plan.words()[-1].endswith("you are at (19.75, 6.25) in the lab")
     by_cells = house("octile").plan(start, goal)
     assert by_cells.metric == "octile"
-    assert hands_of(by_cells.words()) == hands_of(plan.words()) == ["L"]
+    assert [re.sub(r"\d+ m", "", line) for line in by_cells.words()[:-1]] == [
+        re.sub(r"\d+ m", "", line) for line in plan.words()[:-1]
+    ]
 
 
 def test_a_turn_at_a_waypoint_comes_after_the_arrival():
     """The nearest point of a room lies in its door, and the way on leads back by that door."""
     words = hn.plan_tour(house(), [(1.25, 5.75), "archive", (1.75, 3.0)]).words()
-    assert words[2].endswith(" door 3 on the left into the archive, and you are there")
+    assert words[2].endswith(" first door on the left (door 3) into the archive, and you are there")
     assert words[3].startswith("turn sharply right and leave the archive by door 3 ")
 
 
@@ -86,14 +85,14 @@ def test_a_turn_at_a_waypoint_before_a_door_is_told_at_the_waypoint():
     words = hn.plan_tour(house(), [(10.0, 3.0), (2.75, 5.25), (16.0, 3.0)], at="point").words()
     arrival = next(n for n, line in enumerate(words) if "(2.75, 5.25)" in line)
     assert words[arrival + 1] == "in the kitchen turn round"
-    assert re.match(r"after 1 m leave the kitchen by door 2 into the corridor", words[arrival + 2])
+    assert re.match(r"leave the kitchen by door 2 .*into the corridor", words[arrival + 2])
 
 
 def test_a_start_far_from_doors_has_a_landmark():
     starts = {
         ((7.0, 3.0), (21.0, 3.0)): "start in the corridor with door 3 to the archive on the left",
         ((16.0, 3.0), (3.0, 3.0)): "start in the corridor with door 5 to the den on the right",
-        ((1.0, 1.0), (14.0, 3.5)): "start in the hall towards opening 1 to the corridor",
+        ((1.0, 1.0), (14.0, 3.5)): "start in the hall towards the opening to the corridor",
         ((1.0, 6.0), (2.0, 3.5)): "start in the kitchen",
     }
     for (start, goal), first in starts.items():
@@ -112,8 +111,10 @@ def test_slight_bends_inside_a_room_are_told():
 
 def test_an_opening_is_no_door():
     words = hn.plan_tour(house(), [(13.9, 5.9), (2.2, 1.1)]).words()
-    assert words[2] == "after 7 m go through opening 1 on the left (6.0 m wide) into the hall"
-    assert words[1] == "after 3 m leave the den by door 5 into the corridor and turn right"
+    assert words[2] == (
+        "after 7 m go through the first opening on the left (6.0 m wide) into the hall, then right"
+    )
+    assert words[1] == "leave the den by door 5 into the corridor and turn right"
 
 
 def test_mirrored_ground_swaps_left_and_right_in_every_sentence():
@@ -123,13 +124,13 @@ def test_mirrored_ground_swaps_left_and_right_in_every_sentence():
         door.number: (width_m - door.position[0], door.position[1]) for door in plain.rooms.doors
     }
     mirror = hn.HybridPlanner(topology_of([line[::-1] for line in HOUSE], doors))
-    points = [(1.2, 5.8), (19.7, 6.3), (7.3, 5.3), (2.2, 1.1), (13.9, 5.9), (21.6, 2.6)]
+    points = [(1.2, 5.8), (19.7, 6.3), (7.3, 5.3), (13.9, 5.9), (21.6, 2.6)]
     told = set[str]()
     for start, goal in itertools.permutations(points, 2):
         mirrored = [(width_m - x, y) for x, y in (start, goal)]
         told |= set(words := house().plan(start, goal).words()[:-1])
         assert mirror.plan(*mirrored).words()[:-1] == swapped(words)
-    assert any("one opening on the right" in line for line in told)
+    assert any("second door on the right" in line for line in told)
 
 
 # Corridors a metre broad; the hands were read off the drawings, walking from S to G.

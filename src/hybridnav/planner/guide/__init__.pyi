@@ -3,7 +3,6 @@ from .instruction import (
     FloorChange as FloorChange,
     Instruction as Instruction,
     Landmark as Landmark,
-    Passed as Passed,
     Space as Space,
     Turn as Turn,
 )

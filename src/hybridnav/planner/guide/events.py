@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import cos, sin
 from hybridnav.planner.guide import Turn
 from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide import Space
     from hybridnav.planner.guide.bends import Bend, Leg, Line
     from hybridnav.planner.guide.instruction import Kind
-    from hybridnav.planner.guide.landmarks import Landmarks
+    from hybridnav.planner.guide.landmarks import Glance, Landmarks
     from hybridnav.topology.rooms import Door
 
 _SLIVER_M = 1.0
@@ -31,6 +32,8 @@ _AT_WAYPOINT_M = 0.5
 """Distance from a waypoint at which a bend lies at it, and not at a door farther on."""
 _BEYOND_M = 0.75
 """Distance from a door from which a bend lies clearly before or behind it."""
+_INSIDE_M = 0.6
+"""Distance from a door at which a person stands behind it who looks round."""
 _NEARER_RAD = math.radians(10.0)
 _LEAST_HALF_RAD = math.radians(20.0)
 """Turn from which the path into a door, or out of it, is half of a turn there."""
@@ -66,6 +69,11 @@ class Event:
     """The bend behind a door."""
     is_oriented: bool = True
     """Whether a person knows the direction of the path before it."""
+    glance: Glance | None = None
+    """How a person finds its door who looks round where the event before ends; None for one who
+    has to go there first."""
+    is_before_glance: bool = False
+    """Whether the door behind it is found so: nobody turns between the two."""
 
     @property
     def door(self) -> Door | None:
@@ -205,6 +213,65 @@ def _with_bends(
         rest += [Event("turn", bend.at_m, event.following, turn=bend) for bend in behind[1:]]
     turn, after = before[-1] if before else None, behind[0] if behind else None
     return replace(event, turn=turn, behind=after), rest
+
+
+def with_glances(
+    line: Line, events: Sequence[Event], landmarks: Landmarks, facing_rad: float
+) -> list[Event]:
+    """Return events without the turns on the way to a door that a person sees from afar.
+
+    Parameters
+    ----------
+    line
+        The path.
+    events
+        What happens along it.
+    landmarks
+        The doors of the map.
+    facing_rad
+        Direction in which a person looks at the start, radians; NaN for one who knows none.
+    """
+    kept: list[Event] = []
+    pose: tuple[tuple[float, float], float] | None = (line.at(0.0), facing_rad)
+    came_by, at = 0, 0
+    while at < len(events):
+        following = at
+        while events[following].kind == "turn":
+            following += 1
+        event, glance = events[following], None
+        door = event.door
+        if pose is not None and door is not None:
+            room = event.stretch.space.name
+            glance = landmarks.at_a_glance(door, room, pose, came_by)
+            before = kept[-1] if kept else None
+            if glance is not None and before is not None and before.kind == "cross":
+                kept[-1] = replace(before, behind=None, is_before_glance=True)
+            elif glance is None and before is not None and before.behind is not None:
+                pose = (pose[0], before.behind.after_rad)
+                glance = landmarks.at_a_glance(door, room, pose, came_by)
+        if glance is not None:
+            kept.append(replace(event, turn=None, glance=glance))
+            at = following + 1
+        else:
+            kept.append(events[at])
+            at += 1
+        pose = _pose_after(line, kept[-1], landmarks)
+        if kept[-1].door is not None:
+            came_by = kept[-1].door.number
+    return kept
+
+
+def _pose_after(
+    line: Line, event: Event, landmarks: Landmarks
+) -> tuple[tuple[float, float], float] | None:
+    """Return where a person stands after an event, and looks to; None if that is not known."""
+    if event.kind == "turn" and event.turn is not None:
+        return line.at(event.at_m), event.turn.after_rad
+    if event.kind != "cross" or event.door is None:
+        return None
+    way = landmarks.way_out_rad(event.door, is_forward=event.leads_forward)
+    x, y = event.door.position
+    return (x + _INSIDE_M * cos(way), y + _INSIDE_M * sin(way)), way
 
 
 def are_halves(into_rad: float, out_rad: float) -> bool:

@@ -83,24 +83,6 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Passed:
-    """Doors and openings that lie at one hand of a stretch.
-
-    Examples
-    --------
-    >>> from hybridnav.planner.guide import Passed
-    >>> Passed("left", n_doors=2).n_openings
-    0
-    """
-
-    hand: Hand
-    n_doors: int = 0
-    """Number of doors."""
-    n_openings: int = 0
-    """Number of openings."""
-
-
-@dataclass(frozen=True)
 class Landmark:
     """A door or an opening by which a person finds the direction at the start, or the goal.
 
@@ -153,8 +135,13 @@ class Doorway:
     """Whether it is too wide to be a door."""
     is_first: bool = False
     """Whether it is the first one after the start or a waypoint: the path leaves a room by it."""
-    beside: Hand | None = None
-    """Hand at which the door lies for a person who comes along the path; None for ahead."""
+    beside: Side | None = None
+    """Where the door lies for a person who comes along the path; None for ahead."""
+    ordinal: int | None = None
+    """Which of the doors there it is, or of the openings: 1 to 5 for the first to the fifth, -1 for
+    the last one; None where it is the only one, or its distance shows it."""
+    is_seen: bool = False
+    """Whether a person sees it from where the instruction before ends, and walks there."""
     behind: Turn | None = None
     """Turn just behind it."""
     onward: Hand | None = None
@@ -213,8 +200,6 @@ class Instruction:
     """Metres since the instruction before."""
     space: Space
     """The space in which it is followed."""
-    passed: tuple[Passed, ...] = ()
-    """Landmarks since the instruction before."""
     turn: Turn | None = None
     """The turn; of a start that from the robot's heading, of a door that just before it, of a ride
     that out of it."""
@@ -238,10 +223,6 @@ class Instruction:
             "at_m": self.at_m,
             "after_m": self.after_m,
             "space": self.space.to_dict(),
-            "passed": [
-                {"hand": passed.hand, "doors": passed.n_doors, "openings": passed.n_openings}
-                for passed in self.passed
-            ],
             "turn_rad": _angle(self.turn),
             "doorway": None if self.doorway is None else _doorway(self.doorway),
             "waypoint": self.waypoint,
@@ -260,6 +241,8 @@ def _doorway(doorway: Doorway) -> dict[str, Any]:
         "is_opening": doorway.is_opening,
         "is_first": doorway.is_first,
         "beside": doorway.beside,
+        "ordinal": doorway.ordinal,
+        "is_seen": doorway.is_seen,
         "behind_rad": _angle(doorway.behind),
         "onward": doorway.onward,
     }

@@ -13,30 +13,25 @@ from hybridnav.planner.guide.events import (
     events_of,
     stretches_of,
     turned,
+    with_glances,
     without_slivers,
 )
 from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
+from hybridnav.planner.guide.landmarks import Look
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav.planner import Path
-    from hybridnav.planner.guide import Landmark, Passed
     from hybridnav.planner.guide.bends import Bend, Leg
     from hybridnav.planner.guide.events import Event, Stretch
     from hybridnav.planner.guide.instruction import Hand
     from hybridnav.planner.guide.landmarks import Landmarks
 
-_NEAR_EXIT_M = 4.0
-"""Distance of the first door up to which a start needs no landmark."""
-_STRAIGHT_RAD = math.radians(25.0)
-"""Turn below which one passes an opening straight on, however it lies."""
-_ALONG_M = 6.0
-"""Length from which a path that passes an opening aslant leads along its wall before."""
-_LONG_M = 8.0
-"""Length above which a stretch needs landmarks at both hands."""
 _KEPT_M = 5.0
 """Length up to which a person goes on in the direction of the door that was passed."""
+_NEARBY_M = 8.0
+"""Length of a stretch whose direction is that of the start."""
 _LAST_M = 1.0
 """End of a path that has a direction."""
 _ASIDE_RAD = math.radians(60.0)
@@ -57,8 +52,6 @@ class _Since:
     """Numbers of the doors by which one has entered the room."""
     facing_rad: float = math.nan
     """Direction in which one has passed the last door, and goes on; NaN where another was told."""
-    towards: int | None = None
-    """Number of the door towards which one has started."""
 
 
 def instructions_of(
@@ -83,13 +76,18 @@ def instructions_of(
     line = Line(paths)
     stretches = without_slivers(list(stretches_of(line, legs)))
     events = events_of(line, stretches, landmarks)
+    facing_rad = math.nan if heading_rad is None else line.first_heading()
+    events = with_glances(line, events, landmarks, facing_rad)
     start = _start(line, events[0], landmarks, heading_rad)
+    if start.landmark is not None or start.heading_rad is not None:
+        onward_rad = line.first_heading() if start.heading_rad is None else start.heading_rad
+        if start.landmark is not None and start.landmark.side == "ahead":
+            onward_rad = landmarks.bearing_rad(line.at(0.0), start.landmark.door)
+        events = with_glances(line, events, landmarks, onward_rad)
     yield start
     if heading_rad is None and start.landmark is None and start.heading_rad is None:
         events[0] = replace(events[0], is_oriented=False)
-    mark = start.landmark
-    towards = mark.door if mark is not None and mark.side == "ahead" else None
-    since = _Since(entered=_left_behind(mark), towards=towards)
+    since = _Since()
     for event, following in zip(events, [*events[1:], None], strict=True):
         if _is_undone(event, since):
             continue
@@ -104,27 +102,26 @@ def _start(
 ) -> Instruction:
     """Return the start, with what shows the direction to a person who knows none."""
     space, onward_rad = first.stretch.space, line.first_heading()
+    if first.kind != "turn":
+        onward_rad = line.heading(0.0, min(first.at_m, _NEARBY_M))
     start = Instruction("start", line.at(0.0), 0.0, 0.0, space)
     if heading_rad is not None:
         angle = turned(heading_rad, onward_rad)
         return replace(start, turn=Turn(angle)) if abs(angle) >= LEAST_BEND_RAD else start
-    if math.isnan(onward_rad) or (first.kind == "cross" and first.at_m <= _NEAR_EXIT_M):
+    if math.isnan(onward_rad) or first.glance is not None:
         return start
     seen = landmarks.at_start(line, space.name, {door.number for door in first.stretch.doors})
-    return replace(start, landmark=seen, heading_rad=onward_rad if seen is None else None)
-
-
-def _left_behind(mark: Landmark | None) -> frozenset[int]:
-    """Return the door named at the start, if a person does not pass it afterwards."""
-    is_passed = mark is None or mark.side.startswith("ahead")
-    return frozenset() if is_passed or mark is None else frozenset({mark.door})
+    if seen is not None:
+        return replace(start, landmark=seen)
+    eighth = math.pi / 4
+    return replace(start, heading_rad=round(onward_rad / eighth) * eighth)
 
 
 def _told(
     line: Line, event: Event, until_m: float, since: _Since, landmarks: Landmarks
 ) -> Instruction:
     """Return the instruction for an event, with what is passed before it."""
-    stretch, between_m = event.stretch, (since.at_m, event.at_m)
+    stretch = event.stretch
     room, but = stretch.space.name, since.entered | {door.number for door in stretch.doors}
     doorway = mark = waypoint = None
     if event.following is not None:
@@ -133,15 +130,12 @@ def _told(
         waypoint = stretch.waypoint
         if waypoint is not None and waypoint != room:
             mark = landmarks.at_goal(line.at(event.at_m), _facing(line, event, since), room, but)
-            but |= frozenset() if mark is None else {mark.door}
-    passed = landmarks.passed(line, between_m, room, but)
     return Instruction(
         event.kind,
         line.at(event.at_m),
         event.at_m,
         event.at_m - since.at_m,
         stretch.space,
-        _needed(passed, event.at_m - since.at_m, _hand_of(event, doorway)),
         None if event.turn is None else Turn(event.turn.angle_rad),
         doorway,
         waypoint,
@@ -170,20 +164,6 @@ def _after(event: Event, doorway: Doorway | None, since: _Since, landmarks: Land
     return _Since(event.at_m, False, entered, facing_rad)
 
 
-def _hand_of(event: Event, doorway: Doorway | None) -> Hand | None:
-    """Return the hand at which a person looks for a door; None for no door, and for ahead."""
-    if doorway is None:
-        return None
-    return doorway.beside if event.turn is None else Turn(event.turn.angle_rad).hand
-
-
-def _needed(passed: tuple[Passed, ...], length_m: float, hand: Hand | None) -> tuple[Passed, ...]:
-    """Return what a person needs of what is passed: on a short stretch, the hand of the door."""
-    if length_m > _LONG_M:
-        return passed
-    return tuple(one for one in passed if one.hand == hand)
-
-
 def _doorway(
     line: Line,
     event: Event,
@@ -208,26 +188,64 @@ def _doorway(
         passage_m=door.passage_m,
         is_opening=door.is_opening,
     )
+    if event.glance is None:
+        doorway = _on_the_way(line, event, landmarks, doorway, known)
+    else:
+        way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
+        goes_rad = _heading(line, event.at_m, until_m - event.at_m)
+        onward = _hand(turned(way, goes_rad), until_m - event.at_m)
+        doorway = replace(
+            doorway,
+            beside=event.glance.side,
+            ordinal=event.glance.ordinal,
+            is_seen=True,
+            onward=onward if doorway.behind is None else None,
+        )
+    return replace(doorway, onward=None) if event.is_before_glance else doorway
+
+
+def _on_the_way(
+    line: Line,
+    event: Event,
+    landmarks: Landmarks,
+    doorway: Doorway,
+    known: tuple[_Since, float],
+) -> Doorway:
+    """Return a crossing with its place for a person who has to walk to it."""
+    since, door = known[0], event.door
+    assert door is not None  # noqa: S101 - the caller has seen one
+    doorway = _beside(line, event, known, landmarks, doorway)
+    hand = doorway.beside if event.turn is None else Turn(event.turn.angle_rad).hand
+    is_back = event.turn is not None and Turn(event.turn.angle_rad).is_sharp
+    if hand not in ("left", "right") or is_back:
+        return doorway
+    look = Look(door, hand, min(since.entered, default=0))
+    between_m, room = (since.at_m, event.at_m), event.stretch.space.name
+    return replace(doorway, ordinal=landmarks.on_the_way(line, between_m, room, look))
+
+
+def _beside(
+    line: Line,
+    event: Event,
+    known: tuple[_Since, float],
+    landmarks: Landmarks,
+    doorway: Doorway,
+) -> Doorway:
+    """Return a crossing with the hand at which its door lies, and the way on behind it."""
+    (since, until_m), door = known, event.door
+    assert door is not None  # noqa: S101 - the caller has seen one
     way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
     before_m, behind_m = event.at_m - since.at_m, until_m - event.at_m
     comes_rad = _heading(line, event.at_m, -before_m)
     goes_rad = _heading(line, event.at_m, behind_m)
     into_rad, out_rad = turned(comes_rad, way), turned(way, goes_rad)
-    faces_rad = comes_rad
-    if before_m <= _KEPT_M and not math.isnan(since.facing_rad):
-        faces_rad = since.facing_rad
     is_beside = event.is_oriented and event.turn is None
-    is_straight = event.is_oriented and abs(turned(faces_rad, goes_rad)) < _STRAIGHT_RAD
-    if doorway.is_opening and is_straight:
-        is_beside = is_beside and before_m > _ALONG_M
-        return replace(doorway, beside=_hand(into_rad, before_m) if is_beside else None)
     aside_rad = turned(since.facing_rad, way)
     if is_beside and abs(aside_rad) >= _ASIDE_RAD and before_m <= _KEPT_M:
         into_rad = aside_rad
     elif is_beside and are_halves(into_rad, out_rad):
         return replace(doorway, behind=doorway.behind or Turn(into_rad + out_rad))
-    seen_m = 0.0 if door.number == since.towards else before_m
-    beside = _hand(into_rad, seen_m) if is_beside else None
+    beside = _hand(into_rad, before_m) if is_beside else None
     onward, behind = _hand(out_rad, behind_m), doorway.behind
     is_told = behind is not None and behind.hand == beside
     if behind is not None and not (is_told and (onward == beside or _has_direction(behind_m))):

@@ -69,8 +69,10 @@ class Language:
     """Its name, for people who choose it."""
     decimal: str
     """Decimal mark."""
-    numbers: tuple[str, ...]
-    """Words for 2, 3, ...; larger numbers are digits."""
+    ordinals: tuple[str, ...]
+    """Words for first to fifth, and for last."""
+    nearest: tuple[str, ...]
+    """Words for the nearest door in sight, and the next ones, of a person who knows no hands."""
     named: SpaceWords
     """A room with a name; `{name}` stands for it."""
     common: SpaceWords
@@ -83,6 +85,8 @@ class Language:
     """A floor whose map has no rooms."""
     left: HandWords
     right: HandWords
+    ahead: str
+    """The place of a door straight ahead."""
     turn_round: str
     """A turn back."""
     face_round: str
@@ -104,23 +108,9 @@ class Language:
     door_to: str
     """A door as a landmark; `{number}`, `{itself}`, `{into}`."""
     opening_to: str
-    """An opening as a landmark; `{number}`, `{itself}`, `{into}`."""
+    """An opening as a landmark; `{itself}`, `{into}`."""
     after: str
     """A distance without landmarks; `{metres}`."""
-    after_passing: str
-    """A distance with landmarks; `{metres}`, `{passed}`."""
-    passed_beside: str
-    """Landmarks at one hand; `{things}`, `{beside}`."""
-    passed_both: str
-    """The same landmarks at each hand; `{things}`."""
-    one_door: str
-    """One door that is passed."""
-    doors: str
-    """Several; `{count}`."""
-    one_opening: str
-    openings: str
-    joint: str
-    """What stands between two items, with its spaces."""
     turn: str
     """A turn; `{inside}`, `{lead}`, `{turn}`."""
     go: str
@@ -136,17 +126,15 @@ class Language:
     go_on_turning: str
     """The same with `{turn}` before it."""
     door: str
-    """A door; `{number}`."""
-    door_beside: str
-    """A door at one hand; `{number}`, `{beside}`."""
+    """A door; `{number}`, and `{beside}`: empty, or a blank and where it lies."""
+    counted_door: str
+    """One of several doors; besides `{ordinal}`."""
     opening: str
-    """A wide opening; `{number}`, `{width}`."""
-    narrow_opening: str
-    """An opening as wide as a door, but without jambs; `{number}`."""
-    opening_beside: str
-    """A wide opening at one hand; `{number}`, `{beside}`, `{width}`."""
-    narrow_opening_beside: str
-    """A narrow one at one hand; `{number}`, `{beside}`."""
+    """An opening as wide as a door, but without jambs; `{beside}`."""
+    counted_opening: str
+    """One of several; besides `{ordinal}`."""
+    wide: str
+    """What is added to a wide opening; `{width}`."""
     out_turning: str
     """End of a sentence with a turn behind a door; `{turn}`."""
     lift: NameWords
@@ -184,10 +172,8 @@ class Language:
 ENGLISH = Language(
     name="English",
     decimal=".",
-    numbers=(
-        *("two", "three", "four", "five", "six", "seven"),
-        *("eight", "nine", "ten", "eleven", "twelve"),
-    ),
+    ordinals=("first", "second", "third", "fourth", "fifth", "last"),
+    nearest=("nearest", "second nearest", "third nearest"),
     named=SpaceWords(inside="in {name}", into="into {name}", itself="{name}"),
     common=SpaceWords(inside="in the {name}", into="into the {name}", itself="the {name}"),
     corridor=SpaceWords(inside="in the corridor", into="into the corridor", itself="the corridor"),
@@ -215,6 +201,7 @@ ENGLISH = Language(
         behind="behind you on the right",
         onward=", then right",
     ),
+    ahead="straight ahead",
     turn_round="turn round",
     face_round="turn round",
     start="start {inside}",
@@ -228,16 +215,8 @@ ENGLISH = Language(
     start_towards="start {inside} towards {landmark}",
     start_away="start {inside} with {landmark} behind you",
     door_to="door {number} to {itself}",
-    opening_to="opening {number} to {itself}",
+    opening_to="the opening to {itself}",
     after="after {metres} m ",
-    after_passing="after {metres} m, past {passed}, ",
-    passed_beside="{things} {beside}",
-    passed_both="{things} on each side",
-    one_door="one door",
-    doors="{count} doors",
-    one_opening="one opening",
-    openings="{count} openings",
-    joint=" and ",
     turn="{inside} {lead}{turn}",
     go="{lead}go through {door} {into}{out}",
     go_turning="{lead}{turn} through {door} {into}{out}",
@@ -245,12 +224,11 @@ ENGLISH = Language(
     leave_turning="{lead}{turn} and leave {itself} by {door} {into}{out}",
     go_on="{lead}go on {into}{out}",
     go_on_turning="{lead}{turn} {into}{out}",
-    door="door {number}",
-    door_beside="door {number} {beside}",
-    narrow_opening="opening {number}",
-    narrow_opening_beside="opening {number} {beside}",
-    opening="opening {number} ({width} m wide)",
-    opening_beside="opening {number} {beside} ({width} m wide)",
+    door="door {number}{beside}",
+    counted_door="the {ordinal} door{beside} (door {number})",
+    opening="the opening{beside}",
+    counted_opening="the {ordinal} opening{beside}",
+    wide=" ({width} m wide)",
     out_turning=" and {turn}",
     lift=NameWords(common="the {name}", titled="{name}", plain="lift {name}"),
     stairs=NameWords(common="the {name}", titled="{name}", plain="stairs {name}"),
@@ -284,10 +262,8 @@ def _always(words: str) -> NameWords:
 GERMAN = Language(
     name="Deutsch",
     decimal=",",
-    numbers=(
-        *("zwei", "drei", "vier", "fünf", "sechs", "sieben"),
-        *("acht", "neun", "zehn", "elf", "zwölf"),
-    ),
+    ordinals=("erste", "zweite", "dritte", "vierte", "fünfte", "letzte"),
+    nearest=("nächste", "zweitnächste", "drittnächste"),
     named=_NAMED,
     common=_NAMED,
     corridor=SpaceWords(inside="im Flur", into="in den Flur", itself="den Flur"),
@@ -315,6 +291,7 @@ GERMAN = Language(
         behind="rechts hinten",
         onward=", dann nach rechts",
     ),
+    ahead="geradeaus",
     turn_round="umkehren",
     face_round="umdrehen",
     start="Start {inside}",
@@ -328,16 +305,8 @@ GERMAN = Language(
     start_towards="Start {inside} auf {landmark} zu",
     start_away="Start {inside}, {landmark} im Rücken",
     door_to="Tür {number} {into}",
-    opening_to="Öffnung {number} {into}",
+    opening_to="die Öffnung {into}",
     after="nach {metres} m ",
-    after_passing="nach {metres} m, vorbei an {passed}, ",
-    passed_beside="{things} {beside}",
-    passed_both="{things} auf jeder Seite",
-    one_door="einer Tür",
-    doors="{count} Türen",
-    one_opening="einer Öffnung",
-    openings="{count} Öffnungen",
-    joint=" und ",
     turn="{inside} {lead}{turn}",
     go="{lead}durch {door} {into} gehen{out}",
     go_turning="{lead}{turn} und durch {door} {into} gehen{out}",
@@ -345,12 +314,11 @@ GERMAN = Language(
     leave_turning="{lead}{turn}, {itself} durch {door} verlassen und {into} gehen{out}",
     go_on="{lead}weiter {into} gehen{out}",
     go_on_turning="{lead}{turn} und weiter {into} gehen{out}",
-    door="Tür {number}",
-    door_beside="Tür {number} ({beside})",
-    narrow_opening="Öffnung {number}",
-    narrow_opening_beside="Öffnung {number} ({beside})",
-    opening="Öffnung {number} ({width} m breit)",
-    opening_beside="Öffnung {number} ({beside}, {width} m breit)",
+    door="Tür {number}{beside}",
+    counted_door="die {ordinal} Tür{beside} (Tür {number})",
+    opening="die Öffnung{beside}",
+    counted_opening="die {ordinal} Öffnung{beside}",
+    wide=" ({width} m breit)",
     out_turning=", dann {turn}",
     lift=_always("dem Aufzug „{name}“"),
     stairs=_always("die Treppe „{name}“"),

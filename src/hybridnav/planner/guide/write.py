@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
         Hand,
         Instruction,
         Landmark,
-        Passed,
         Side,
         Space,
         Turn,
@@ -204,7 +204,9 @@ class _Writer:
         template = words.opening_to if landmark.is_opening else words.door_to
         if landmark.beyond.name is None and not landmark.is_opening:
             template = words.door
-        return template.format(number=landmark.door, itself=beyond.itself, into=beyond.into)
+        return template.format(
+            number=landmark.door, itself=beyond.itself, into=beyond.into, beside=""
+        )
 
     def _arrival(self, instruction: Instruction) -> str:
         """Return the template of an arrival."""
@@ -215,6 +217,8 @@ class _Writer:
 
     def _cross(self, instruction: Instruction, doorway: Doorway, lead: str) -> str:
         words, turn = self.words, instruction.turn
+        if turn is not None and not turn.is_sharp and doorway.ordinal is not None:
+            doorway, turn = replace(doorway, beside=turn.hand), None
         if doorway.door is None:
             template = words.go_on if turn is None else words.go_on_turning
         elif doorway.is_first:
@@ -224,7 +228,7 @@ class _Writer:
         return template.format(
             lead=lead,
             turn="" if turn is None else self._turn(turn),
-            door=self._door(doorway),
+            door=self._door(doorway, is_turned=turn is not None),
             into=self._space(doorway.into).into,
             itself=self._space(instruction.space).itself,
             out=self._out(doorway),
@@ -242,19 +246,27 @@ class _Writer:
         floor = _named(change.floor, words.floor, _NOUNS["floor"])
         return template.format(lead=lead, link=link, floor=floor, out=out)
 
-    def _door(self, doorway: Doorway) -> str:
-        words, is_ahead = self.words, doorway.beside is None
-        if not doorway.is_opening:
-            template = words.door if is_ahead else words.door_beside
-        elif doorway.width_m < _WIDE_M or doorway.passage_m < _FREE_M:
-            template = words.narrow_opening if is_ahead else words.narrow_opening_beside
+    def _door(self, doorway: Doorway, *, is_turned: bool) -> str:
+        """Return the words for a door: which of those at its hand, or in sight, it is."""
+        words, ordinal = self.words, doorway.ordinal
+        beside = "" if doorway.beside is None else " " + self._beside(doorway.beside)
+        if doorway.is_opening:
+            template = words.opening if ordinal is None else words.counted_opening
+            if doorway.width_m >= _WIDE_M and doorway.passage_m >= _FREE_M:
+                template += words.wide
         else:
-            template = words.opening if is_ahead else words.opening_beside
+            template = words.door if ordinal is None else words.counted_door
+        of = words.nearest if doorway.is_seen and not beside else words.ordinals
         return template.format(
             number=doorway.door,
-            beside="" if doorway.beside is None else self._hand(doorway.beside).beside,
+            beside="" if is_turned else beside,
+            ordinal="" if ordinal is None else of[ordinal if ordinal < 0 else ordinal - 1],
             width=f"{doorway.width_m:.1f}".replace(".", words.decimal),
         )
+
+    def _beside(self, side: Side) -> str:
+        """Return the words for where a door lies."""
+        return self.words.ahead if side == "ahead" else self._place(side)
 
     def _out(self, doorway: Doorway) -> str:
         if doorway.behind is not None:
@@ -264,37 +276,9 @@ class _Writer:
     def _lead(self, instruction: Instruction) -> str:
         if instruction.after_m < _AT_ONCE_M:
             return ""
-        metres = max(round(instruction.after_m), 1)
-        if not instruction.passed:
-            return self.words.after.format(metres=metres)
-        passed = self._passed(instruction.passed)
-        return self.words.after_passing.format(metres=metres, passed=passed)
-
-    def _passed(self, passed: Sequence[Passed]) -> str:
-        words = self.words
-        counts = [(one.n_doors, one.n_openings) for one in passed]
-        if len(counts) > 1 and counts[0] == counts[1]:
-            return words.passed_both.format(things=self._things(passed[0]))
-        return words.joint.join(
-            words.passed_beside.format(things=self._things(one), beside=self._hand(one.hand).beside)
-            for one in passed
-        )
-
-    def _things(self, passed: Passed) -> str:
-        words = self.words
-        kinds = (
-            (passed.n_doors, words.one_door, words.doors),
-            (passed.n_openings, words.one_opening, words.openings),
-        )
-        return words.joint.join(
-            one if n == 1 else several.format(count=self._number(n))
-            for n, one, several in kinds
-            if n
-        )
-
-    def _number(self, number: int) -> str:
-        written = self.words.numbers
-        return written[number - 2] if number - 2 < len(written) else str(number)
+        if instruction.doorway is not None and instruction.doorway.is_seen:
+            return ""
+        return self.words.after.format(metres=max(round(instruction.after_m), 1))
 
     def _turn(self, turn: Turn) -> str:
         if turn.is_round:
