@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 55_440,
-    "lines": 92_160,
-    "files": 378,
-    "code outside ext": 38_170,
-    "lines of a file, median": 269,
+    "code": 59_902,
+    "lines": 99_017,
+    "files": 408,
+    "code outside ext": 41_291,
+    "lines of a file, median": 265.5,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
-    "arrows, with single modules": 75,
+    "arrows, with single modules": 78,
     "files visited by paper": 51,
-    "lines visited by paper": 12_935,
-    "modules of a plan and a picture": 132,
+    "lines visited by paper": 13_121,
+    "modules of a plan and a picture": 133,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
-    "names at the root": 44,
-    "parameters of commands, shared ones once": 113,
-    "lines of tests": 58_020,
+    "names at the root": 48,
+    "parameters of commands, shared ones once": 122,
+    "lines of tests": 60_921,
 }
 
 

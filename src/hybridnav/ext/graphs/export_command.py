@@ -28,6 +28,7 @@ from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs.fleet_options import (
     ENDINGS,
     LOSS_PAIRS,
+    STYLES,
     AnchorOption,
     Bundle,
     BundleOption,
@@ -42,6 +43,8 @@ from hybridnav.ext.graphs.fleet_options import (
     StretchOption,
     StyleOption,
     VehiclesOption,
+    check_polylines,
+    check_style,
     warn_of_loss,
 )
 
@@ -59,7 +62,6 @@ _ENDINGS = {
 """Endings of the file of each format."""
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
-_STYLES = ("lanes", "roadmap")
 _SHOWN = 8
 """Ids in a line about changes."""
 _STRETCH = 1.05
@@ -125,14 +127,14 @@ def export(
     others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
     out = bundle or _checked_out(kind, out)
-    _check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
+    check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     if kind in _PARTS:
         _check_plain(
             kind,
             {
-                "--style": style != _STYLES[0],
+                "--style": style != STYLES[0],
                 "--keep": keep is not None,
                 "--nodes": nodes is not None,
                 "--spacing": spacing_m is not None,
@@ -144,7 +146,7 @@ def export(
             },
         )
     of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
-    _check_style(style, of_roadmaps, {"--keep": keep})
+    check_style(style, of_roadmaps, {"--keep": keep})
     _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
@@ -237,7 +239,7 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     out = _checked_out(kind, out)
-    _check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
+    check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
@@ -324,27 +326,6 @@ def _check_taken(out: Path, *, force: bool) -> None:
     """Refuse to write over a file."""
     if out.is_file() and not force:
         raise UsageError(f"{printable(out)} exists: add --force to write over it")
-
-
-def _check_polylines(kind: str, *, given: bool, straight: bool) -> None:
-    """Refuse the option with others that are for straight edges, and for other formats."""
-    if given and straight:
-        raise UsageError(
-            "--polylines does not go with --report, --plot and --lanes, which are for straight "
-            "edges: leave them out"
-        )
-    if given and kind in ENDINGS:
-        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
-
-
-def _check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
-    """Refuse styles that are none, and options of the other one."""
-    if style not in _STYLES:
-        raise UsageError(f"--style must be one of {', '.join(_STYLES)}, got {style!r:.80}")
-    other = _STYLES[style == "lanes"]
-    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
-        if given is not None:
-            raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
 
 
 def _spacing(given_m: float | None, *, is_near: bool) -> float:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import GraphReport, RouteGraph
 
+STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
 _FEWEST, _MOST = 2, 3
@@ -217,6 +218,27 @@ class Fleet:
         if self.anchor is not None:
             return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
+
+
+def check_polylines(kind: str, *, given: bool, straight: bool) -> None:
+    """Refuse the option with others that are for straight edges, and for other formats."""
+    if given and straight:
+        raise UsageError(
+            "--polylines does not go with --report, --plot and --lanes, which are for straight "
+            "edges: leave them out"
+        )
+    if given and kind in ENDINGS:
+        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
+
+
+def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
+    """Refuse styles that are none, and options of the other one."""
+    if style not in STYLES:
+        raise UsageError(f"--style must be one of {', '.join(STYLES)}, got {style!r:.80}")
+    other = STYLES[style == "lanes"]
+    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
+        if given is not None:
+            raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
 
 
 def warn_of_loss(judged: dict[str, GraphReport]) -> None:

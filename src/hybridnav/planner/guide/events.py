@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
     from hybridnav.planner.guide import Space
     from hybridnav.planner.guide.bends import Bend, Leg, Line
+    from hybridnav.planner.guide.glances import Glance
     from hybridnav.planner.guide.instruction import Kind
-    from hybridnav.planner.guide.landmarks import Glance, Landmarks
+    from hybridnav.planner.guide.landmarks import Landmarks
     from hybridnav.topology.rooms import Door
 
 _SLIVER_M = 1.0

@@ -16,8 +16,8 @@ from hybridnav.planner.guide.events import (
     with_glances,
     without_slivers,
 )
+from hybridnav.planner.guide.glances import Look
 from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
-from hybridnav.planner.guide.landmarks import Look
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
