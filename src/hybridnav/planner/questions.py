@@ -160,7 +160,7 @@ class Questions:
         >>> planner = hn.HybridPlanner(topology)
         >>> planner.distances([(0.5, 0.5), (1.5, 0.5)], [(0.5, 0.5), (2.0, 2.5)]).round(3)
         array([[0.   , 2.546],
-               [1.   , 2.096]])
+               [1.   , 2.125]])
         """
         wanted = nearest, progress
         if self._privacy is not None:  # each pair has private rooms of its own

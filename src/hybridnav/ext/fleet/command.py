@@ -25,7 +25,6 @@ from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import check_model, load_numba, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
-from hybridnav.ext.fleet.checks import check_closing
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
@@ -242,6 +241,8 @@ def close_over_floors(
     def check(item: hn.OutOfOrder) -> None:
         """Refuse what is not in the building, which is read once."""
         loaded.append(loaded[0] if loaded else load_floors(map_file, reading, {}))
+        from hybridnav.ext.fleet.checks import check_closing  # noqa: PLC0415 - loads numpy
+
         check_closing(item, loaded[0].floors, loaded[0].links)
 
     change_closed(map_file, close or (), open_again or (), why, check=check)

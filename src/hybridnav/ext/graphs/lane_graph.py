@@ -115,7 +115,7 @@ def build_lane_graph(
     Examples
     --------
     >>> from hybridnav.ext.graphs import build_lane_graph
-    >>> cells = np.ones((24, 120))
+    >>> cells = np.ones((24, 180))
     >>> cells[2:-2, 2:-2] = 0.0
     >>> grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
