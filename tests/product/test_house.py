@@ -6,7 +6,7 @@ from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
     "code": 59_902,
-    "lines": 99_017,
+    "lines": 99_018,
     "files": 408,
     "code outside ext": 41_291,
     "lines of a file, median": 265.5,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 122,
-    "lines of tests": 60_921,
+    "lines of tests": 60_926,
 }
 
 
