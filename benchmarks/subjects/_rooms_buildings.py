@@ -54,8 +54,8 @@ class Building:
 
     @property
     def site(self) -> str:
-        """The building that the map shows."""
-        return SITES[self.name]
+        """The building that the map shows; a generated one is its own."""
+        return SITES.get(self.name, self.name)
 
     @classmethod
     def read(cls, data: Path, name: str) -> Building:

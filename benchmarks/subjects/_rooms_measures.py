@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import hybridnav as hn
 from benchmarks.common import print_head, print_row
 from benchmarks.subjects._rooms_buildings import SITES, Building
-from benchmarks.subjects.train_rooms import Training
+from benchmarks.subjects.train_rooms import Training, of_generated
 from hybridnav.harness.judges import compare_rooms
 from hybridnav.maps.names import Segmentation
 from hybridnav.topology.rooms.find import judged_rooms
@@ -79,13 +79,13 @@ def _is_right(building: Building, point: FloatArray) -> bool | None:
     return None if len(rooms) == 0 else len(np.unique(rooms)) > 1
 
 
-def measures_table(data: Path, out: Path) -> None:
+def measures_table(data: Path, out: Path, n_generated: int = 0) -> None:
     """Print what every method reaches on every building, and draw its rooms into a folder.
 
-    The judge never saw the building's site.
+    The judge never saw the building's site; with some generated floors, none of the buildings.
     """
     buildings = [Building.read(data, name) for name in SITES]
-    training = Training(buildings)
+    training = of_generated(n_generated) if n_generated else Training(buildings)
     print("## Rooms by published measures\n")
     columns = "building", "method", "MCC", "MCC per zone", "IoU", "rooms at IoU 0.5", "at 0.7"
     print_head(*columns, "doors found", "found doors right", "rooms / true", "s")

@@ -190,13 +190,14 @@ OPTIONS = [
     NEEDED_DATA,
     option("-o", "--out", default="out/rooms", type=Path),
     option("--no-routes", action="store_true", help="segmentation alone"),
+    option("--generated", type=int, default=0, metavar="N", help="judge of N generated floors"),
 ]
 
 
 def main(given: Namespace) -> None:
     """Read the command line and print all tables."""
     given.out.mkdir(parents=True, exist_ok=True)
-    measures_table(given.data, given.out)
+    measures_table(given.data, given.out, given.generated)
     if not given.no_routes:
         floors = [Floor.read(given.data / "bwi_gdc" / name) for name in FLOORS]
         agree = routes_table(floors)

@@ -1,7 +1,8 @@
 """Train the judge of rooms on the reference data, and write its table.
 
 The table `src/hybridnav/topology/rooms/room_judge.npz` is made from all buildings; the figures of
-the documentation are of forests that never saw the building's site (`without`).
+the documentation are of forests that never saw the building's site (`without`). With `--generated`
+it is made from generated floors alone.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, option
+from benchmarks.common import DATA, Refused, option
 from benchmarks.subjects._rooms_boost import Boosting, Examples, averaged, boost
 from benchmarks.subjects._rooms_buildings import SITES, Building
+from benchmarks.subjects._rooms_generated import generated
 from hybridnav.topology.rooms import merging
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
 from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, outside_of
@@ -130,16 +132,16 @@ def _true_labels(
     return same, np.where(drawn, weights * view.resolution_m, 0.0)
 
 
-def fitted(records: dict[str, list[Records]]) -> Forest:
+def fitted(records: dict[str, list[Records]], site_of: dict[str, str]) -> Forest:
     """Train on the records of some buildings; each site counts by the root of its weight."""
     totals: dict[str, float] = {}
     for name, found in records.items():
         total = sum(float(weights.sum()) for record in found for weights in record.weights)
-        totals[SITES[name]] = totals.get(SITES[name], 0.0) + total
+        totals[site_of[name]] = totals.get(site_of[name], 0.0) + total
     every = [record for found in records.values() for record in found]
     weight = np.concatenate(
         [
-            weights**_BY_SIZE / math.sqrt(totals[SITES[name]])
+            weights**_BY_SIZE / math.sqrt(totals[site_of[name]])
             for name, found in records.items()
             for record in found
             for weights in record.weights
@@ -155,8 +157,11 @@ def fitted(records: dict[str, list[Records]]) -> Forest:
 class Training:
     """Views of all buildings, and what was met in them."""
 
-    def __init__(self, buildings: list[Building]) -> None:
-        self._views = {b.name: [view_of(b, *view) for view in VIEWS] for b in buildings}
+    def __init__(
+        self, buildings: list[Building], views: tuple[tuple[float, float], ...] = VIEWS
+    ) -> None:
+        self._views = {b.name: [view_of(b, *view) for view in views] for b in buildings}
+        self._site_of = {b.name: b.site for b in buildings}
         self._known = {
             name: [met(view, None) for view in views] for name, views in self._views.items()
         }
@@ -165,23 +170,34 @@ class Training:
     def without(self, site: str | None) -> Forest:
         """Train a forest on the buildings of other sites: on pairs met by one who knows the rooms,
         then also on those that the forest itself meets."""
-        records = {n: list(r) for n, r in self._known.items() if SITES[n] != site}
-        first = fitted(records)
+        records = {n: list(r) for n, r in self._known.items() if self._site_of[n] != site}
+        first = fitted(records, self._site_of)
         for name, found in records.items():
             found.extend(met(view, first) for view in self._views[name])
-        return fitted(records)
+        return fitted(records, self._site_of)
+
+
+def of_generated(count: int) -> Training:
+    """Return the training on generated floors, the seeds from 0 on, as they are."""
+    return Training([generated(seed) for seed in range(count)], VIEWS[:1])
 
 
 OPTIONS = [
-    NEEDED_DATA,
+    DATA,
+    option("--generated", type=int, default=0, metavar="N", help="N generated floors, no data"),
     option("-o", "--out", default=Path(merging.__file__).with_name(merging.TABLE), type=Path),
 ]
 
 
 def main(given: Namespace) -> None:
-    """Read the command line, train on all buildings and write the table."""
-    buildings = [Building.read(given.data, name) for name in SITES]
-    forest = Training(buildings).without(None)
+    """Read the command line, train and write the table."""
+    if given.data is None and not given.generated:
+        raise Refused("train_rooms needs the reference data, or --generated N")
+    if given.generated:
+        training = of_generated(given.generated)
+    else:
+        training = Training([Building.read(given.data, name) for name in SITES])
+    forest = training.without(None)
     np.savez_compressed(
         given.out,
         features=forest.features.astype(np.int16),
