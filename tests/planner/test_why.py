@@ -105,6 +105,7 @@ def test_the_fewest_closed_doors_are_those_of_all_subsets(seed, corners):
     if result.status is not hn.PlanStatus.NO_PATH:
         return
     why = why_of(result)
+    check_cut(planner, why, start, doors)
     if not planner.plan(start, goal).solved or why.blocked_ends:
         assert why.to_open == ()
         return
@@ -118,6 +119,21 @@ def test_the_fewest_closed_doors_are_those_of_all_subsets(seed, corners):
     for size in range(len(opened)):
         for some in itertools.combinations(doors, size):
             assert not goes_with(planner, ends, set(doors) - set(some)), (some, opened)
+
+
+def check_cut(planner, why, start, doors):
+    """The cut is a closed chain of neighbours, none of which is reached from the start."""
+    if why.blocked_ends or planner.grid.corner_cutting:
+        assert why.cut is None
+        return
+    cells = planner.grid.frame.cells_of(why.cut)
+    assert (cells[0] == cells[-1]).all()
+    assert (np.abs(np.diff(cells, axis=0)).max(axis=1) == 1).all() or len(cells) == 1
+    able = planner.grid.classes == CellClass.FREE
+    able.ravel()[planner.closed({"doors": doors}).flat] = False
+    labels, _ = ndimage.label(np.pad(able, 1))
+    row, col = planner.grid.frame.cells_of(start)
+    assert not (labels[tuple((cells + 1).T)] == labels[row + 1, col + 1]).any()
 
 
 def planned(planner, ends, closed):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -116,6 +116,10 @@ class Explanation:
     """Whether there is a path of this radius, with what is closed, that enters unexplored cells."""
     reached_m2: tuple[float, float]
     """Square metres that can be reached from the start, and from the goal."""
+    cut: FloatArray | None = field(default=None, repr=False)
+    """float64 (n, 2), `(x, y)` in metres, map frame: a closed chain of cells that cannot be
+    entered, each beside the next one, which goes round one of the ends; beyond the map its rim.
+    None where the ends are joined, an end is blocked, or corners may be cut."""
 
     @property
     def has_path(self) -> bool:
@@ -206,7 +210,23 @@ class Case:
             to_open=to_open,
             through_unexplored=unexplored,
             reached_m2=self._reached_m2(),
+            cut=None if ends else self._cut(),
         )
+
+    def _cut(self) -> FloatArray | None:
+        """Return the shorter of the chains round the two ends."""
+        from hybridnav.search.proofs import parting_chain  # noqa: PLC0415 - loads kernels
+
+        if self.grid.corner_cutting:
+            return None
+        free, (start, goal) = self._enterable & ~self._shut, self._cells
+        chain = parting_chain(free, start, goal)
+        other = None if chain is None else parting_chain(free, goal, start)
+        if chain is None or other is None:
+            return None
+        shorter = min(chain, other, key=len)
+        points: FloatArray = self.grid.frame.points_of(shorter)
+        return points
 
     # What is closed: cells and moves, and by what.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import patheffects
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 _LOOKS = 4
 """Points of a path that are looked up in the map, to a cell."""
 _ROUTE_WIDTH, PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
+_CUT: Any = {"colors": style.PATH, "capstyle": "round", "gid": "cut"}
+"""The line of cells that part start and goal."""
 
 
 def plot_plan(  # noqa: PLR0913 - independent parts of a picture
@@ -59,7 +61,8 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     Arcs run through the middle of their boundaries, so that two doors are two lines. Places of the
     route, or of the corridor if the preset searched in one, keep their full colours; the others are
     pale. The route lies along the path, with a dot in each place that it passes; a route without a
-    path runs from place to place. Without a path the title states the reason.
+    path runs from place to place. Without a path the title states the status, and a line runs along
+    the cells that part start and goal.
 
     Parameters
     ----------
@@ -121,9 +124,14 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
         _draw_route(canvas, topology, result.route, places, path)
     if result.path is not None:
         draw_path(canvas, path)
+    cut = None if result.explanation is None else result.explanation.cut
+    if cut is not None:
+        canvas.add_lines([cut], **_CUT, linewidths=_ROUTE_WIDTH * canvas.sizes.line, zorder=6)
     draw_markers(canvas, markers, [path])
     words = _words(topology, result, optimum_m) if title is None else [title]
     entries = _entries(result, places, strong, canvas.sizes, unexplored=unexplored)
+    if cut is not None:
+        entries.append((Line2D([], [], color=style.PATH, lw=_ROUTE_WIDTH), "cut"))
     entries += query + ground_entries(grid)
     return finish(canvas, entries, words)
 
