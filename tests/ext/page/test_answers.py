@@ -143,6 +143,17 @@ def _square(point: list[float]) -> list[tuple[float, float]]:
     return [(x - 2, y - 2), (x + 2, y - 2), (x + 2, y + 2), (x - 2, y + 2)]
 
 
+def test_a_route_that_is_not_there_says_why(client: Client) -> None:
+    doors = [door.number for door in client.session.planning.topology.rooms.listed_doors]
+    query = QUERY | {"closed": {"floors": [{"floor": 0, "doors": doors}]}}
+    found = client.post("plan", query | {"language": "de"}).value
+    assert not found["solved"]
+    assert "Tür" in found["why"]
+    assert "door" in client.post("plan", query).value["why"]
+    assert client.post("plan", query | {"brief": True}).value["why"] == ""
+    assert client.post("plan", QUERY).value["why"] == ""
+
+
 def test_costs_are_an_overlay_of_the_presets_that_have_some(client: Client) -> None:
     assert client.get("floor/0/costs/shortest.json").value == {"most": None}
     assert client.get("floor/0/tile/costs-shortest/0/0/0.png").code == 422

@@ -85,7 +85,7 @@ def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> di
     finite."""
     why = plan.note if not isinstance(plan, PlanResult) else ""
     if isinstance(plan, PlanResult):
-        why = plan.settings.get("profile", {}).get("forbids", "") or plan.reason
+        why = plan.settings.get("profile", {}).get("forbids", "")
     return {
         "status": str(plan.status),
         "why": why,

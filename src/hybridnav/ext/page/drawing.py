@@ -281,7 +281,10 @@ class PagePlanning:
             return self._facts(planner.plan(*points, blocked=closed))
         result = planner.plan(*points, blocked=closed)
         tour = tour_of(planner, [result], named_ends(query, points))
-        return self._facts(result) | self._itinerary(tour, query.language)
+        facts, explanation = self._facts(result), result.explanation
+        if explanation is not None and not facts["why"]:
+            facts["why"] = " ".join(explanation.words(query.language))
+        return facts | self._itinerary(tour, query.language)
 
     def on_floor(self, query: PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""

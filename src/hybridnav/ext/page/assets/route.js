@@ -253,7 +253,9 @@ export class Routes {
     this.byId("others-note").textContent = "";
     this.page.floors.note();
     this.#place(Boolean(route?.solved));
-    if (route && !route.solved) this.page.say(t("no-route", said(route.status)), true);
+    if (route && !route.solved) {
+      this.page.say([t("no-route", said(route.status)), route.why].filter(Boolean).join(". "), true);
+    }
   }
 
   // On a phone the way stands above the controls: it is what somebody reads while walking.
