@@ -53,7 +53,7 @@ class PaintedFloor:
         heights, widths = rng.integers(6, 11, rng.integers(2, 4)), rng.integers(6, 11, 3)
         tops, lefts = (np.concatenate([[1], 1 + np.cumsum(one + 1)]) for one in (heights, widths))
         self.free = np.zeros((tops[-1], lefts[-1]), np.bool_)
-        self.label_of = np.full(self.free.shape, -1, np.int32)
+        self.label_of: NDArray[np.int32] = np.full(self.free.shape, -1, np.int32)
         self.boxes: list[tuple[int, int, int, int]] = []
         for (top, low), (left, right) in itertools.product(
             itertools.pairwise(tops), itertools.pairwise(lefts)

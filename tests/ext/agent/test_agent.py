@@ -46,7 +46,18 @@ def write_floor(floor: PaintedFloor, folder: Path) -> Path:
 
 
 def asker(answers: Answers) -> Any:
-    return lambda tool, /, **arguments: answers.call(tool, arguments)
+    def ask(name: str, /, **arguments: Any) -> dict[str, Any]:
+        return checked(name, arguments, answers.call(name, arguments))
+
+    return ask
+
+
+def checked(name: str, arguments: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """The answer, which has the fields that its schema states, and is small."""
+    next(tool for tool in TOOLS if tool.name == name).gives.model_validate(found)
+    if not {"points", "count"} & arguments.keys():
+        assert len(json.dumps(found, ensure_ascii=False).encode()) <= 2048, found
+    return found
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -76,7 +87,7 @@ async def asked(client: Any, name: str, /, **arguments: Any) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(result.content[0].text)
     assert found == result.structured_content
     assert result.is_error == (not found["ok"])
-    return found
+    return found if name == "rout" else checked(name, arguments, found)
 
 
 @pytest.mark.full
@@ -220,6 +231,61 @@ def test_small_answers_and_a_limit_in_time(tmp_path, monkeypatch):
     late = asyncio.run(serving.answered(answers, "route", {}))
     assert not late["ok"]
     assert "no answer within" in late["text"]
+
+
+def test_a_long_route_comes_in_parts(tmp_path):
+    """Rooms in a row, each with a door at another end: more words than an answer holds."""
+    n = 40
+    free = np.ones((12, 10 * n), np.bool_)
+    labels = np.full(free.shape, -1, np.int32)
+    for k in range(n):
+        free[:, 10 * k + 9] = False
+        labels[:, 10 * k : 10 * k + 10] = k
+        if k < n - 1:
+            at = 1 if k % 2 else 7
+            free[at : at + 4, 10 * k + 9] = True
+    names = tuple(f"the long name of a room, number {k}" for k in range(n))
+    floor = PaintedFloor(0)
+    floor.free, floor.label_of, floor.names = free, labels, names
+    ask = asker(Answers(session_of(floor, tmp_path)))
+    route = {"start": names[0], "goal": names[-1]}
+    whole, part = [], ask("route", **route)
+    assert part["words_left"] > 0
+    while True:
+        whole += part["words"]
+        if not part["words_left"]:
+            break
+        part = ask("route", **route, words_from=len(whole))
+    assert f"number {n - 1}" in whole[-1]
+    assert len(whole) > 20
+
+
+def test_a_model_is_served_as_a_map_is(tmp_path):
+    floor = PaintedFloor(6)
+    session = session_of(floor, tmp_path)
+    planner = session.planning.planner("shortest")
+    hn.save(planner, tmp_path / "floor.hnm")
+
+    async def main() -> dict[str, Any]:
+        async with connected(tmp_path / "floor.hnm") as client:
+            return await asked(client, "list_rooms", count=50)
+
+    found = asyncio.run(main())
+    assert {room["name"] for room in found["rooms"]} == set(floor.names)
+
+
+def test_nothing_outside_the_folder_is_read_or_written(tmp_path):
+    inside, outside = tmp_path / "maps", tmp_path / "secret"
+    inside.mkdir()
+    outside.mkdir()
+    path = write_floor(PaintedFloor(7), inside)
+    (inside / "rooms.yaml").rename(outside / "rooms.yaml")
+    (inside / "rooms.yaml").symlink_to(outside / "rooms.yaml")
+    words = [sys.executable, "-m", "hybridnav", "serve", str(path), "--robot-radius", "0.2"]
+    done = subprocess.run(words, input="", capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode != 0
+    assert "leads out of" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_the_example_asks_a_map(tmp_path):

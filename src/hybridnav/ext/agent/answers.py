@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tempfile
 import threading
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 _MOST_PLANNERS = 3
 """Widths whose planners are kept."""
 _MOST_POINTS = 200
+_PASSED, _MOST_LETTERS = 16, 900
+"""Rooms that a route lists, and letters of its words: a whole answer has at most 2 kB."""
 
 
 class Answers:
@@ -235,11 +238,13 @@ class Answers:
             "gap": round(max(tour.gap, 0.0), 9),
             "start": rounded(tour.start),
             "goal": rounded(tour.goal),
-            "rooms": [leg.room or leg.shape for leg in tour.legs][:50],
-            "doors": doors[:50],
+            "rooms": [leg.room or leg.shape for leg in tour.legs][:_PASSED],
+            "doors": doors[:_PASSED],
         }
         if asked.words:
-            answer["words"] = tour.words(asked.language)
+            lines = tour.words(asked.language)[asked.words_from :]
+            answer["words"] = _fitting(lines)
+            answer["words_left"] = len(lines) - len(answer["words"])
         path = tour.results[0].path
         if asked.points and path is not None:
             answer["points"] = path.points[:_MOST_POINTS].round(3).tolist()
@@ -303,23 +308,33 @@ class Answers:
         goals = self._places.candidates(asked.of, start)
         goals.sort(key=lambda goal: math.dist(goal[1], here))
         best: list[tuple[float, dict[str, Any]]] = []
+        others_m = math.inf
         for facts, point in goals:
-            straight = math.dist(point, here)
-            if len(best) == asked.count and straight >= best[-1][0]:
+            straight_m = math.dist(point, here)
+            if len(best) >= asked.count and straight_m >= best[asked.count - 1][0]:
+                others_m = straight_m  # no path to this one or a later one is shorter
                 break
             found = planner.draft(here, point, blocked=self._closed)
             if math.isfinite(found.cost):
-                best.append((found.cost, facts | {"length_m": round(found.cost, 3)}))
-                best = sorted(best, key=lambda one: one[0])[: asked.count]
+                bound_m = math.floor(found.lower_bound * 1000) / 1000
+                lengths = {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
+                best.append((found.cost, facts | lengths))
+                best.sort(key=lambda one: one[0])
         if not best:
             raise UnclearError(
                 f"none of {len(goals)} of {asked.of!r:.80} can be reached from there"
             )
+        others_m = min([others_m, *(length for length, _ in best[asked.count :])])
+        best = best[: asked.count]
         names = ", ".join(
             f"{facts.get('name') or 'door ' + str(facts['number'])} ({length:.2f} m)"
             for length, facts in best
         )
-        return {"text": f"Nearest: {names}.", "nearest": [facts for _, facts in best]}
+        return {
+            "text": f"Nearest: {names}.",
+            "nearest": [facts for _, facts in best],
+            "others_at_least_m": round(others_m, 3) if math.isfinite(others_m) else None,
+        }
 
     def _picture(self, asked: ask.Picture) -> dict[str, Any]:
         from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
@@ -418,6 +433,12 @@ class Answers:
         self._closed = renamed(self._closed)
         self._before = [renamed(one) if isinstance(one, Blocked) else one for one in self._before]
         return {"text": f"room {old} is called {new} now, saved.", "room": self._places.room(new)}
+
+
+def _fitting(lines: list[str]) -> list[str]:
+    """Return the first lines, as many as an answer holds, one at least."""
+    ends = itertools.accumulate(len(line) for line in lines)
+    return lines[: max(1, sum(end <= _MOST_LETTERS for end in ends))]
 
 
 def _refused(text: str) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from hybridnav.ext.agent.serving import INSTRUCTIONS, answered, schema_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from pydantic import BaseModel
     from starlette.requests import Request
 
     from hybridnav.ext.page.session import Session
@@ -88,7 +89,6 @@ def description() -> dict[str, Any]:
     >>> sorted(description()["paths"])[0]
     '/floor/{floor}/api/can_reach'
     """
-    answer = {"application/json": {"schema": Answer.model_json_schema()}}
     floor = {"name": "floor", "in": "path", "required": True, "schema": {"type": "integer"}}
     paths = {
         f"/floor/{{floor}}/api/{tool.name}": {
@@ -96,10 +96,10 @@ def description() -> dict[str, Any]:
                 "operationId": tool.name,
                 "summary": " ".join((tool.asks.__doc__ or "").split()),
                 "parameters": [floor],
-                "requestBody": {"content": {"application/json": {"schema": schema_of(tool.asks)}}},
+                "requestBody": {"content": _content(tool.asks)},
                 "responses": {
-                    "200": {"description": "The answer.", "content": answer},
-                    "422": {"description": "What to do instead.", "content": answer},
+                    "200": {"description": "The answer.", "content": _content(tool.gives)},
+                    "422": {"description": "What to do instead.", "content": _content(Answer)},
                 },
             }
         }
@@ -107,3 +107,8 @@ def description() -> dict[str, Any]:
     }
     info = {"title": "hybridnav", "version": __version__, "description": INSTRUCTIONS}
     return {"openapi": "3.1.0", "info": info, "paths": paths}
+
+
+def _content(model: type[BaseModel]) -> dict[str, Any]:
+    """Return what OpenAPI says of JSON of a model; definitions stay inside its schema."""
+    return {"application/json": {"schema": schema_of(model)}}

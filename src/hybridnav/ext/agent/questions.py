@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
@@ -57,6 +57,8 @@ class RouteBetween(Journey):
     """The shortest path between two places, with a proof, the rooms and doors passed, and words."""
 
     words: bool = True
+    words_from: Annotated[int, Field(ge=0, le=10_000)] = 0
+    """Lines to leave out, for the rest of a long description."""
     points: bool = False
     """Whether the points of the path are wanted too, at most 200."""
     language: Language = "en"
@@ -111,16 +113,159 @@ class Picture(_Strict):
     goal: Place | None = None
 
 
-class Answer(BaseModel):
-    """What every call returns; further fields are those that the call is about."""
+# Answers: what cannot be answered has the first three fields alone.
 
-    model_config = ConfigDict(extra="allow")
+
+class Answer(BaseModel):
+    """What every call returns."""
+
+    model_config = ConfigDict(extra="forbid")
     ok: bool
     """Whether the question was answered; if not, `text` says what to do."""
     text: str
     """The answer in words."""
-    choices: list[dict[str, Any]] = []
+    choices: list[Room | dict[str, str]] | None = None
     """What a name may mean, if it may mean several things."""
+
+
+class Room(BaseModel):
+    """A room in a list."""
+
+    name: str
+    kind: Literal["room", "corridor", "hall"]
+    area_m2: float
+    point: list[float]
+    """A point in it, x and y in metres."""
+    doors: list[int]
+
+
+class Closed(BaseModel):
+    """What is closed in this session."""
+
+    doors: list[int]
+    rooms: list[str]
+
+
+class Tight(BaseModel):
+    """Where the widest way is tightest."""
+
+    point: list[float]
+    door: int | None
+
+
+class Beside(BaseModel):
+    """A door, and what lies behind it."""
+
+    door: int
+    to: str | None
+    kind: str
+
+
+class NearDoor(BaseModel):
+    """The door that is nearest by the crow."""
+
+    number: int
+    straight_m: float
+
+
+class Near(BaseModel):
+    """A room or a door, and how far it is by the way one goes."""
+
+    length_m: float
+    lower_bound_m: float
+    """No path to it is shorter."""
+    name: str | None = None
+    kind: str | None = None
+    area_m2: float | None = None
+    point: list[float] | None = None
+    doors: list[int] | None = None
+    number: int | None = None
+    rooms: list[str | None] | None = None
+
+
+class MapAnswer(Answer):
+    """Of `describe_map`."""
+
+    name: str | None = None
+    size_m: list[float] | None = None
+    corners: list[list[float]] | None = None
+    free_m2: float | None = None
+    rooms: dict[str, int] | None = None
+    doors: int | None = None
+    robot_radius_m: float | None = None
+    closed: Closed | None = None
+    edits_allowed: bool | None = None
+
+
+class RoomsAnswer(Answer):
+    """Of `list_rooms`."""
+
+    total: int | None = None
+    rooms: list[Room] | None = None
+
+
+class PlaceAnswer(Answer):
+    """Of `where_am_i`."""
+
+    room: str | None = None
+    ground: Literal["free", "occupied", "unexplored"] | None = None
+    beside: list[Beside] | None = None
+    nearest_door: NearDoor | None = None
+
+
+class WhyAnswer(Answer):
+    """Of `explain`, and of ways that are not there."""
+
+    status: str | None = None
+    reason: list[str] | None = None
+    doors_to_open: list[int] | None = None
+    widest_m: float | None = None
+    tight: Tight | None = None
+    has_path: bool | None = None
+    through_unexplored: bool | None = None
+
+
+class RouteAnswer(WhyAnswer):
+    """Of `route`."""
+
+    length_m: float | None = None
+    lower_bound_m: float | None = None
+    """No path is shorter."""
+    gap: float | None = None
+    start: list[float] | None = None
+    goal: list[float] | None = None
+    rooms: list[str] | None = None
+    doors: list[int] | None = None
+    words: list[str] | None = None
+    words_left: int | None = None
+    """Lines after these: ask with `words_from`."""
+    points: list[list[float]] | None = None
+
+
+class ReachAnswer(WhyAnswer):
+    """Of `can_reach`."""
+
+    can_reach: bool | None = None
+    length_m: float | None = None
+
+
+class NearestAnswer(Answer):
+    """Of `nearest`."""
+
+    nearest: list[Near] | None = None
+    others_at_least_m: float | None = None
+    """No other one is nearer than that; None if there is no other."""
+
+
+class ChangeAnswer(Answer):
+    """Of what changes something."""
+
+    closed: Closed | None = None
+    room: Room | None = None
+
+
+class PictureAnswer(WhyAnswer):
+    """Of `picture`; the picture itself comes beside it."""
 
 
 class Tool(NamedTuple):
@@ -136,22 +281,24 @@ class Tool(NamedTuple):
     name: str
     asks: type[BaseModel]
     """Its arguments; the docstring says what it is for."""
-    edits: bool
+    gives: type[Answer]
+    """What it returns."""
+    edits: bool = False
     """Whether it changes what others see, and is refused unless edits are allowed."""
 
 
 TOOLS = (
-    Tool("describe_map", DescribeMap, False),
-    Tool("list_rooms", ListRooms, False),
-    Tool("where_am_i", WhereAmI, False),
-    Tool("route", RouteBetween, False),
-    Tool("can_reach", CanReach, False),
-    Tool("nearest", Nearest, False),
-    Tool("explain", Explain, False),
-    Tool("picture", Picture, False),
-    Tool("close", Close, True),
-    Tool("open", Open, True),
-    Tool("undo", Undo, True),
-    Tool("name_room", NameRoom, True),
+    Tool("describe_map", DescribeMap, MapAnswer),
+    Tool("list_rooms", ListRooms, RoomsAnswer),
+    Tool("where_am_i", WhereAmI, PlaceAnswer),
+    Tool("route", RouteBetween, RouteAnswer),
+    Tool("can_reach", CanReach, ReachAnswer),
+    Tool("nearest", Nearest, NearestAnswer),
+    Tool("explain", Explain, WhyAnswer),
+    Tool("picture", Picture, PictureAnswer),
+    Tool("close", Close, ChangeAnswer, edits=True),
+    Tool("open", Open, ChangeAnswer, edits=True),
+    Tool("undo", Undo, ChangeAnswer, edits=True),
+    Tool("name_room", NameRoom, ChangeAnswer, edits=True),
 )
 """All functions, for every protocol."""

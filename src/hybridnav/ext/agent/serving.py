@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._version import __version__
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.agent.questions import TOOLS, Answer
+from hybridnav.ext.agent.questions import TOOLS
 
 if TYPE_CHECKING:
     from hybridnav.ext.agent.answers import Answers
@@ -85,7 +85,7 @@ async def _serve(answers: Answers) -> None:
             name=tool.name,
             description=" ".join((tool.asks.__doc__ or "").split()),
             inputSchema=schema_of(tool.asks),
-            outputSchema=Answer.model_json_schema(),
+            outputSchema=tool.gives.model_json_schema(),
             annotations=types.ToolAnnotations(readOnlyHint=not tool.edits),
         )
         for tool in TOOLS
