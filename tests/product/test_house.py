@@ -5,11 +5,11 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_902,
-    "lines": 99_018,
+    "code": 60_035,
+    "lines": 99_236,
     "files": 408,
-    "code outside ext": 41_291,
-    "lines of a file, median": 265.5,
+    "code outside ext": 41_311,
+    "lines of a file, median": 266.0,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 122,
-    "lines of tests": 60_926,
+    "lines of tests": 61_019,
 }
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import tempfile
 import threading
 from collections import OrderedDict
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,26 +14,34 @@ from pydantic import ValidationError
 
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import questions as ask
-from hybridnav.ext.agent.places import SHOWN, Places, UnclearError, rounded
+from hybridnav.ext.agent.places import (
+    SHOWN,
+    Places,
+    UnclearError,
+    doubled,
+    fitting,
+    narrowed,
+    rounded,
+    tight_of,
+)
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, matching
 from hybridnav.planner import Blocked, HybridPlanner, plan_tour
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav.ext.page.session import Session
-    from hybridnav.planner import Explanation, Tour
+    from hybridnav.planner import Tour
+    from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
 
 _MOST_PLANNERS = 3
 """Widths whose planners are kept."""
 _MOST_POINTS = 200
-_PASSED, _MOST_LETTERS = 16, 900
-"""Rooms that a route lists, and letters of its words: a whole answer has at most 2 kB."""
+_PASSED = 16
+"""Rooms that a route lists."""
 
 
 class Answers:
@@ -213,7 +219,7 @@ class Answers:
         key = width / 2
         known = self._planners.get(key)
         if known is None or known.pyramid_rooms is not self._rooms.labels:
-            known = self._planners[key] = _narrowed(own, key)
+            known = self._planners[key] = narrowed(own, key)
         self._planners.move_to_end(key)
         while len(self._planners) > _MOST_PLANNERS:
             self._planners.popitem(last=False)
@@ -243,7 +249,7 @@ class Answers:
         }
         if asked.words:
             lines = tour.words(asked.language)[asked.words_from :]
-            answer["words"] = _fitting(lines)
+            answer["words"] = fitting(lines)
             answer["words_left"] = len(lines) - len(answer["words"])
         path = tour.results[0].path
         if asked.points and path is not None:
@@ -265,7 +271,7 @@ class Answers:
             "status": str(tour.status),
             "reason": words,
             "doors_to_open": [one.which for one in why.to_open if one.kind == "doors"],
-            "widest_m": _doubled(why.widest_m),
+            "widest_m": doubled(why.widest_m),
         }
 
     def _can_reach(self, asked: ask.CanReach) -> dict[str, Any]:
@@ -274,7 +280,7 @@ class Answers:
             return {"can_reach": False, **self._no_path(planner, tour, asked, "en")}
         ends: Any = tour.start, tour.goal
         why = planner.explain(*ends, blocked=self._shut(asked.avoiding))
-        width = _doubled(why.widest_m)
+        width = doubled(why.widest_m)
         limits = "nothing limits the width" if width is None else f"below {width:.3f} m wide"
         return {
             "text": f"Yes, in {tour.length_m:.2f} m; for all who are {limits}."
@@ -283,7 +289,7 @@ class Answers:
             "can_reach": True,
             "length_m": round(tour.length_m, 3),
             "widest_m": width,
-            **_tight(why),
+            **tight_of(why),
         }
 
     def _explain(self, asked: ask.Explain) -> dict[str, Any]:
@@ -295,10 +301,10 @@ class Answers:
         return {
             "text": " ".join(why.words(asked.language)),
             "has_path": why.has_path,
-            "widest_m": _doubled(why.widest_m),
+            "widest_m": doubled(why.widest_m),
             "doors_to_open": [one.which for one in why.to_open if one.kind == "doors"],
             "through_unexplored": why.through_unexplored,
-            **_tight(why),
+            **tight_of(why),
         }
 
     def _nearest(self, asked: ask.Nearest) -> dict[str, Any]:
@@ -435,34 +441,5 @@ class Answers:
         return {"text": f"room {old} is called {new} now, saved.", "room": self._places.room(new)}
 
 
-def _fitting(lines: list[str]) -> list[str]:
-    """Return the first lines, as many as an answer holds, one at least."""
-    ends = itertools.accumulate(len(line) for line in lines)
-    return lines[: max(1, sum(end <= _MOST_LETTERS for end in ends))]
-
-
 def _refused(text: str) -> dict[str, Any]:
     return {"ok": False, "text": text}
-
-
-def _doubled(radius_m: float) -> float | None:
-    """Return the width of a radius, rounded down; None for no limit."""
-    return math.floor(radius_m * 2000) / 1000 if math.isfinite(radius_m) else None
-
-
-def _tight(why: Explanation) -> dict[str, Any]:
-    """Return where the widest path is tightest."""
-    if why.tight is None:
-        return {}
-    door = None if why.tight.door is None else why.tight.door.number
-    return {"tight": {"point": rounded(why.tight.point), "door": door}}
-
-
-def _narrowed(planner: HybridPlanner, radius_m: float) -> HybridPlanner:
-    """Return the planner of a robot of another radius on the same map, with the same rooms."""
-    grid = replace(planner.grid, robot_radius_m=radius_m)
-    before = planner.topology.pyramid
-    pyramid = DualGraphPyramid.build(
-        grid, merge_distance_m=before.merge_distance_m, rooms=before.rooms
-    )
-    return HybridPlanner(TopologicalMap(pyramid), preset=planner.preset)

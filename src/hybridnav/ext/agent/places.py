@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,17 +13,22 @@ import numpy as np
 from hybridnav.errors import HybridNavError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key
-from hybridnav.planner import Blocked
+from hybridnav.planner import Blocked, HybridPlanner
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from hybridnav.planner import Explanation
     from hybridnav.topology.rooms import Door, Rooms
 
 Point = tuple[float, float]
 _ARTICLES = {"the", "a", "an", "der", "die", "das", "dem", "den", "ein", "eine", "einen", "einem"}
 _DOOR = re.compile(r"(?:door|tür|tuer)[ :#-]*(\d{1,9})", re.IGNORECASE)
 _SIGNS = re.compile(r"[\W_]+")
+_MOST_LETTERS = 900
+"""Letters of the words of a route: a whole answer has at most 2 kB."""
 SHOWN = 10
 """Choices, doors and neighbours of an answer."""
 
@@ -151,3 +159,32 @@ class Places:
 def rounded(point: tuple[float, ...] | None) -> list[float] | None:
     """Return a point to the millimetre."""
     return None if point is None else [round(number, 3) for number in point]
+
+
+def fitting(lines: list[str]) -> list[str]:
+    """Return the first lines, as many as an answer holds, one at least."""
+    ends = itertools.accumulate(len(line) for line in lines)
+    return lines[: max(1, sum(end <= _MOST_LETTERS for end in ends))]
+
+
+def doubled(radius_m: float) -> float | None:
+    """Return the width of a radius, rounded down; None for no limit."""
+    return math.floor(radius_m * 2000) / 1000 if math.isfinite(radius_m) else None
+
+
+def tight_of(why: Explanation) -> dict[str, Any]:
+    """Return where the widest path is tightest."""
+    if why.tight is None:
+        return {}
+    door = None if why.tight.door is None else why.tight.door.number
+    return {"tight": {"point": rounded(why.tight.point), "door": door}}
+
+
+def narrowed(planner: HybridPlanner, radius_m: float) -> HybridPlanner:
+    """Return the planner of a robot of another radius on the same map, with the same rooms."""
+    grid = replace(planner.grid, robot_radius_m=radius_m)
+    before = planner.topology.pyramid
+    pyramid = DualGraphPyramid.build(
+        grid, merge_distance_m=before.merge_distance_m, rooms=before.rooms
+    )
+    return HybridPlanner(TopologicalMap(pyramid), preset=planner.preset)
