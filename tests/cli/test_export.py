@@ -291,7 +291,7 @@ def test_the_loss_of_few_nodes_is_printed_and_a_warning(cli, tmp_path):
     loss = few.answer["report"]["nearest"]["mean"]
     assert (few.code, loss > 0.1) == (0, True)
     assert f"are {loss:.0%} longer on average than shortest paths, above 10%" in few.err
-    many = cli(*given, 2000)
+    many = cli(*given, 2000, "--force")
     assert (many.code, many.err) == (0, "")
     assert "nearest    routes longer by" in many.out
 

@@ -32,6 +32,7 @@ REFUSE = {"shortest", "octile", "ompl"}
 COMMANDS = {"plan", "build", "evaluate", "view"}
 """Commands that make a planner."""
 NO_PLANNER = {"show", "rooms", "compare", "preset", "map", "replay", "explore", "export", "check"}
+NO_PLANNER |= {"closed", "serve", "verify"}  # `serve` plans shortest paths alone
 RADIUS_M = 0.25
 CLEARANCE = "clearance:multiplier=4"
 

@@ -17,8 +17,9 @@ from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.search import distance_table
-from hybridnav.search.distance_table import ViewLabels, distance_blocks
+from hybridnav.search.distance_table import distance_blocks
 from hybridnav.search.mesh import CornerHierarchy, MeshSearch, build_mesh
+from hybridnav.search.mesh.labels import MeshLabels, ViewLabels
 from tests.oracle.any_angle import some_positions
 from tests.oracle.grid import distances, move_graph
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -80,7 +81,7 @@ def test_octile_tables_agree_with_scipy(classes, seed):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_answers_with_and_without_closures(preset, monkeypatch):
-    monkeypatch.setattr(distance_table, "_BLOCK", 4)  # several blocks
+    monkeypatch.setattr(distance_table, "BLOCK", 4)  # several blocks
     grid = office_world().grid(robot_radius_m=0.25)
     planner = planner_of(grid, preset)
     free = np.argwhere(grid.classes == CellClass.FREE)
@@ -119,7 +120,7 @@ def test_labels_without_a_hierarchy_agree_with_those_of_one(classes, seed):
     cells = np.array([cell for cell, _ in picked])
     ends = cells, np.array([position for _, position in picked], np.float64)
     for source in (
-        distance_table.MeshLabels(search, search.graph),
+        MeshLabels(search, search.graph),
         ViewLabels(search, search.edges),
     ):
         for rows, columns, lengths in distance_blocks(source, ends, ends):

@@ -123,7 +123,7 @@ def test_a_tour_is_told_by_rooms_and_doors(planner):
     assert [door.rooms for door in doors] == [("hall", "kitchen"), ("hall", "lab"), ("hall", "lab")]
     words = tour.words()
     assert words[0] == "start in the kitchen"
-    assert words[1].startswith("after 3 m leave the kitchen by door 1 into the hall")
+    assert words[1].startswith("leave the kitchen by door 1 into the hall")
     assert words[1].endswith(" left")
     assert words[2].endswith(" door 2 on the left into the lab, and you are there")
     assert words[-1] == "turn right and leave the lab by door 2 into the hall, and you are there"
@@ -325,7 +325,7 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
     points = done.answer["points"]
     assert (points[0], points[-1]) == (done.answer["start"], done.answer["goal"])
     assert len(points) == len(done.answer["headings_rad"])
-    assert done.answer["words"][-1].endswith("you are at (1.25, 1.25) in the hall")
+    assert "you are at (1.25, 1.25) in the hall" in done.answer["words"][-1]
     assert sum(leg["length_m"] for leg in done.answer["legs"]) == pytest.approx(
         done.answer["length_m"]
     )
@@ -406,7 +406,7 @@ def test_a_bad_file_of_rooms_is_unreadable_input(cli, map_file):
 
 def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):
     out, picture = tmp_path / "found.yaml", tmp_path / "found.svg"
-    query = ("rooms", map_file, "-o", out, "--robot-radius", "0", "--plot", picture)
+    query = ("rooms", map_file, "--find", "-o", out, "--robot-radius", "0", "--plot", picture)
     done = cli(*query)
     assert done.code == 0
     assert "room-1" in done.out

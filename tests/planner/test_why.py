@@ -18,7 +18,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.maps.widest import WidestPaths
-from hybridnav.planner.why import Closure
+from hybridnav.planner.why_words import Closure
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 PLAIN = settings(max_examples=examples(150), deadline=None, derandomize=True)

@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 60_035,
-    "lines": 99_236,
-    "files": 408,
-    "code outside ext": 41_311,
-    "lines of a file, median": 266.0,
+    "code": 60_060,
+    "lines": 99_286,
+    "files": 410,
+    "code outside ext": 41_334,
+    "lines of a file, median": 265.5,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
     "arrows, with single modules": 78,
     "files visited by paper": 51,
-    "lines visited by paper": 13_121,
+    "lines visited by paper": 13_138,
     "modules of a plan and a picture": 133,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 122,
-    "lines of tests": 61_019,
+    "lines of tests": 61_021,
 }
 
 

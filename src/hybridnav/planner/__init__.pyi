@@ -42,10 +42,10 @@ from .speed import (
     SpeedProfile as SpeedProfile,
 )
 from .tour import Tour as Tour, plan_tour as plan_tour
-from .why import (
+from .why import Explanation as Explanation
+from .why_words import (
     BlockedEnd as BlockedEnd,
     Closure as Closure,
-    Explanation as Explanation,
     TightPlace as TightPlace,
 )
 

@@ -22,7 +22,7 @@ _MOST_REPEATED = 10
 _NONE: frozenset[int] = frozenset()
 
 
-class Ground(NamedTuple):
+class OpenGround(NamedTuple):
     """Where a robot may go if nothing is closed."""
 
     enterable: BoolArray
@@ -32,7 +32,7 @@ class Ground(NamedTuple):
 
 
 def fewest_to_open(
-    ground: Ground, closures: dict[Name, LongArray], cells: tuple[tuple[int, int], ...]
+    ground: OpenGround, closures: dict[Name, LongArray], cells: tuple[tuple[int, int], ...]
 ) -> tuple[Name, ...]:
     """Find the fewest closures that have to open for a path between two open cells.
 
@@ -86,7 +86,7 @@ class _Regions:
     repeated: frozenset[int]
     """The closures of several passages; none if they are many."""
 
-    def __init__(self, ground: Ground, closures: list[LongArray]) -> None:
+    def __init__(self, ground: OpenGround, closures: list[LongArray]) -> None:
         from scipy import ndimage, sparse  # noqa: PLC0415 - half a second that plans do not need
 
         shape, free = ground.enterable.shape, ground.enterable.ravel()

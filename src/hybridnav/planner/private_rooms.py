@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.result import PlanResult
 
 
-class Ground(NamedTuple):
+class PartGround(NamedTuple):
     """The connected parts of a floor under a profile: of each private room, and of all else."""
 
     part_of: IntArray
@@ -41,7 +41,7 @@ class Ground(NamedTuple):
     @classmethod
     def of(
         cls, is_open: BoolArray, label_of: IntArray, private: Collection[int], *, corners: bool
-    ) -> Ground:
+    ) -> PartGround:
         """Find the parts.
 
         Parameters
@@ -107,7 +107,7 @@ def opened(
     set
         Rooms of `room_of`, those of the ends not among them.
     """
-    ways = _Ways(room_of, beside, {room_of[part] for end in ends for part in end})
+    ways = _PartSearch(room_of, beside, {room_of[part] for end in ends for part in end})
     first, last = (ways.away(end) for end in ends)
     near = ways.nearest(first), ways.nearest(last)
     sums = {area: near[0][area] + near[1][area] for area in near[0] if area in near[1]}
@@ -127,7 +127,7 @@ def opened(
     return found
 
 
-class _Ways:
+class _PartSearch:
     """Ways through private parts, counted by those that they enter beside some own rooms."""
 
     def __init__(
@@ -225,7 +225,7 @@ class Privacy:
             else set()
             for floor in floors
         ]
-        self._grounds: dict[tuple[int, ClosedCells | None], Ground] = {}
+        self._grounds: dict[tuple[int, ClosedCells | None], PartGround] = {}
         self._joined: dict[tuple[Any, ...], ClosedCells] = {}
 
     def rooms_closed(self, floor: int, opened: Collection[tuple[int, int]] = ()) -> Blocked | None:
@@ -372,7 +372,7 @@ class Privacy:
                 found |= opened(room_of, beside, (parts_at(*one), parts_at(*other)))
         return found
 
-    def _ground(self, floor: int, shut: ClosedCells | None) -> Ground:
+    def _ground(self, floor: int, shut: ClosedCells | None) -> PartGround:
         """Return the parts of a floor; the last ones are kept."""
         key = floor, shut
         found = self._grounds.pop(key, None)
@@ -381,7 +381,7 @@ class Privacy:
             none = np.full(here.grid.shape, NO_ROOM, dtype=np.int32)
             label_of = none if here.rooms is None else here.rooms.label_of
             is_open, corners = here.open_but(shut), here.grid.corner_cutting
-            found = Ground.of(is_open, label_of, self._private[floor], corners=corners)
+            found = PartGround.of(is_open, label_of, self._private[floor], corners=corners)
         self._grounds[key] = found
         for old in list(self._grounds)[:-_KEPT]:
             self._grounds.pop(old, None)

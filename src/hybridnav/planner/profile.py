@@ -257,7 +257,7 @@ def forbidden(profile: Profile, passed: Callable[[Profile], list[str] | None]) -
     }
     wider = {key: one for key, one in wider.items() if getattr(profile, key) != one[0]}
 
-    def way(keys: Iterable[str]) -> str | None:
+    def wider_by(keys: Iterable[str]) -> str | None:
         """Return how a route goes that these keys forbid, None if there is none."""
         found = passed(replace(profile, **{key: wider[key][0] for key in keys}))
         if found is None:
@@ -265,8 +265,8 @@ def forbidden(profile: Profile, passed: Callable[[Profile], list[str] | None]) -
         named = f" ({', '.join(found)})" if found else ""
         return " and ".join(wider[key][1] for key in keys) + named
 
-    ways = [each for key in wider if (each := way([key])) is not None]
-    if not ways and len(wider) > 1 and (each := way(list(wider))) is not None:
+    ways = [each for key in wider if (each := wider_by([key])) is not None]
+    if not ways and len(wider) > 1 and (each := wider_by(list(wider))) is not None:
         ways = [each]
     if not ways:
         return ""

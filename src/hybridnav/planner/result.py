@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.path import Path
     from hybridnav.planner.speed import MotionLimits
-    from hybridnav.planner.why import Explanation
     from hybridnav.search.found import ClosedCells
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
@@ -74,6 +73,24 @@ class InstructionSource(Protocol):
     def instructions(self) -> tuple[Instruction, ...]:
         """Find the instructions."""
         ...
+
+
+class Reasons(Protocol):
+    """An `Explanation`, in `hybridnav.planner.why`."""
+
+    @property
+    def reason(self) -> str:
+        """The reason in one line."""
+
+    @property
+    def cut(self) -> FloatArray | None:
+        """The cells that part both ends."""
+
+    def words(self, language: str = "en") -> list[str]:
+        """Return the reason in sentences."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values."""
 
 
 Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
@@ -141,7 +158,7 @@ class PlanResult:
     rounded, `(x, y)` in metres, map frame; None of other paths."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
-    why_source: Callable[[], Explanation] | Explanation | None = field(default=None, repr=False)
+    why_source: Callable[[], Reasons] | Reasons | None = field(default=None, repr=False)
     """The explanation, or how to find it."""
     proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
         default=None, repr=False
@@ -196,7 +213,7 @@ class PlanResult:
         return source if isinstance(source, tuple) else source.instructions()
 
     @cached_property
-    def explanation(self) -> Explanation | None:
+    def explanation(self) -> Reasons | None:
         """Why there is no path, found when it is read first, in about a second on a million cells;
         None with a path, and in batches."""
         source = self.why_source

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from hybridnav.maps.widest import Bottleneck, WidestPaths
 from hybridnav.planner import Blocked, PlanStatus
 from hybridnav.planner.blocked import as_blocked
 from hybridnav.planner.endpoints import cells_of_endpoints
-from hybridnav.planner.fewest import Ground, fewest_to_open
-from hybridnav.planner.why_words import sentences
+from hybridnav.planner.fewest import OpenGround, fewest_to_open
+from hybridnav.planner.why_words import BlockedEnd, Closure, TightPlace, sentences
 from hybridnav.pyramid import LevelArc
 from hybridnav.search.found import ClosedCells
 from hybridnav.topology.rooms import Door
@@ -28,62 +28,6 @@ if TYPE_CHECKING:
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planning import Planning
     from hybridnav.topology import TopologicalMap
-
-
-class Closure(NamedTuple):
-    """One thing that is closed: of `Blocked`, or by the costs of the planner.
-
-    Examples
-    --------
-    >>> hn.planner.Closure("doors", 12)
-    Closure(kind='doors', which=12)
-    """
-
-    kind: str
-    """The name of an attribute of `Blocked`, or `"costs"`."""
-    which: Any
-    """Its number or name; of areas and keepout the place in the sequence, from 0; None for cells
-    and costs."""
-
-
-class TightPlace(NamedTuple):
-    """A point at which a path is tight.
-
-    Examples
-    --------
-    >>> hn.planner.TightPlace((0.5, 2.0)).point
-    (0.5, 2.0)
-    """
-
-    point: tuple[float, float]
-    """`(x, y)` in metres, map frame."""
-    door: Door | None = None
-    """The door that it lies in, if any."""
-
-
-class BlockedEnd(NamedTuple):
-    """An end of a query that the robot cannot stand on.
-
-    Examples
-    --------
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> why = hn.HybridPlanner(topology).explain((0.5, 0.5), (-2.0, 2.5))
-    >>> print(why.blocked_ends[0].status)
-    goal outside the map
-    """
-
-    is_start: bool
-    """Whether it is the start, else the goal."""
-    status: PlanStatus
-    """As of a plan."""
-    clearance_m: float
-    """Distance to the nearest occupied cell; 0 in one, and outside the map."""
-    closures: tuple[Closure, ...]
-    """What closes its cell."""
-    nearest: tuple[float, float] | None
-    """The nearest point that the robot can stand on, `(x, y)` in metres; None if there is none."""
-    nearest_m: float
-    """How far away it is, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +139,7 @@ class Case:
             closed = self._widest(self._shut).between(*self._cells) if self._closures else opened
             if not ends and closed.radius_m <= self.grid.robot_radius_m:
                 if self.grid.robot_radius_m < opened.radius_m:
-                    ground = Ground(self._enterable, self.grid.corner_cutting)
+                    ground = OpenGround(self._enterable, self.grid.corner_cutting)
                     to_open = fewest_to_open(ground, self._closures, self._cells)
                 unexplored = not self.allow_unexplored and self._is_joined(
                     self.grid.enterable(allow_unexplored=True) & ~self._shut

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.guide import check_language
@@ -11,7 +11,64 @@ from hybridnav.planner.guide import check_language
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav.planner.why import BlockedEnd, Closure, Explanation, TightPlace
+    from hybridnav.topology.rooms import Door
+
+
+class Closure(NamedTuple):
+    """One thing that is closed: of `Blocked`, or by the costs of the planner.
+
+    Examples
+    --------
+    >>> hn.planner.Closure("doors", 12)
+    Closure(kind='doors', which=12)
+    """
+
+    kind: str
+    """The name of an attribute of `Blocked`, or `"costs"`."""
+    which: Any
+    """Its number or name; of areas and keepout the place in the sequence, from 0; None for cells
+    and costs."""
+
+
+class TightPlace(NamedTuple):
+    """A point at which a path is tight.
+
+    Examples
+    --------
+    >>> hn.planner.TightPlace((0.5, 2.0)).point
+    (0.5, 2.0)
+    """
+
+    point: tuple[float, float]
+    """`(x, y)` in metres, map frame."""
+    door: Door | None = None
+    """The door that it lies in, if any."""
+
+
+class BlockedEnd(NamedTuple):
+    """An end of a query that the robot cannot stand on.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> why = hn.HybridPlanner(topology).explain((0.5, 0.5), (-2.0, 2.5))
+    >>> print(why.blocked_ends[0].status)
+    goal outside the map
+    """
+
+    is_start: bool
+    """Whether it is the start, else the goal."""
+    status: PlanStatus
+    """As of a plan."""
+    clearance_m: float
+    """Distance to the nearest occupied cell; 0 in one, and outside the map."""
+    closures: tuple[Closure, ...]
+    """What closes its cell."""
+    nearest: tuple[float, float] | None
+    """The nearest point that the robot can stand on, `(x, y)` in metres; None if there is none."""
+    nearest_m: float
+    """How far away it is, metres."""
+
 
 _TABLES = {
     "en": {
@@ -97,7 +154,7 @@ _TABLES = {
 }
 
 
-def sentences(why: Explanation, language: str) -> list[str]:
+def sentences(why: Any, language: str) -> list[str]:
     """Write an explanation, one sentence or two a line; see `Explanation.words`."""
     mark = check_language(language).decimal
     writer = _Writer(_TABLES[language], mark, why.radius_m)

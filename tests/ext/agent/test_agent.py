@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.ext.agent import TOOLS, Answers, serving
+from hybridnav.ext.agent import TOOLS, MapAnswers, serving
 from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.kept import RoomsFile
 from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
@@ -45,7 +45,7 @@ def write_floor(floor: PaintedFloor, folder: Path) -> Path:
     return folder / "floor.yaml"
 
 
-def asker(answers: Answers) -> Any:
+def asker(answers: MapAnswers) -> Any:
     def ask(name: str, /, **arguments: Any) -> dict[str, Any]:
         return checked(name, arguments, answers.call(name, arguments))
 
@@ -63,7 +63,7 @@ def checked(name: str, arguments: dict[str, Any], found: dict[str, Any]) -> dict
 @pytest.mark.parametrize("seed", range(3))
 def test_answers_agree_with_what_was_painted(seed, tmp_path):
     floor = PaintedFloor(seed)
-    answers = Answers(session_of(floor, tmp_path), allow_edits=True)
+    answers = MapAnswers(session_of(floor, tmp_path), allow_edits=True)
     kinds = Counter(Judge(floor, asker(answers)).questions(64))
     assert len(kinds) == 8
     assert min(kinds.values()) == 8
@@ -148,7 +148,7 @@ def test_the_page_gives_the_same_answers_as_json(tmp_path):
         point, _, room = floor.inner_point()
         found = client.post("floor/0/api/where_am_i", {"point": point})
         assert found.code == 200
-        assert found.value == Answers(session).call("where_am_i", {"point": point})
+        assert found.value == MapAnswers(session).call("where_am_i", {"point": point})
         assert found.value["room"] == floor.names[room]
         assert client.post("floor/0/api/close", {"rooms": [floor.names[0]]}).code == 422
         assert client.post("floor/0/api/route", [1]).code == 422
@@ -186,7 +186,7 @@ def test_the_page_gives_the_same_answers_as_json(tmp_path):
     ],
 )
 def test_hostile_calls_end_in_one_line(name, arguments, allow_edits, tmp_path):
-    answers = Answers(session_of(PaintedFloor(2), tmp_path), allow_edits=allow_edits)
+    answers = MapAnswers(session_of(PaintedFloor(2), tmp_path), allow_edits=allow_edits)
     found = answers.call(name, arguments)
     assert "\n" not in found["text"]
     assert len(json.dumps(found)) < 2000
@@ -196,7 +196,7 @@ def test_hostile_calls_end_in_one_line(name, arguments, allow_edits, tmp_path):
 def test_names_of_rooms_are_saved_and_taken_back(tmp_path):
     floor = PaintedFloor(3)
     session = session_of(floor, tmp_path)
-    answers = Answers(session, allow_edits=True)
+    answers = MapAnswers(session, allow_edits=True)
     old = floor.names[0]
     assert answers.call("close", {"rooms": [old]})["ok"]
     assert answers.call("name_room", {"room": old, "name": "Archive"})["ok"]
@@ -215,7 +215,7 @@ def test_names_of_rooms_are_saved_and_taken_back(tmp_path):
 
 def test_small_answers_and_a_limit_in_time(tmp_path, monkeypatch):
     floor = PaintedFloor(4)
-    answers = Answers(session_of(floor, tmp_path))
+    answers = MapAnswers(session_of(floor, tmp_path))
     start, goal = (floor.inner_point()[0] for _ in range(2))
     for name, arguments in (
         ("describe_map", {}),
@@ -247,7 +247,7 @@ def test_a_long_route_comes_in_parts(tmp_path):
     names = tuple(f"the long name of a room, number {k}" for k in range(n))
     floor = PaintedFloor(0)
     floor.free, floor.label_of, floor.names = free, labels, names
-    ask = asker(Answers(session_of(floor, tmp_path)))
+    ask = asker(MapAnswers(session_of(floor, tmp_path)))
     route = {"start": names[0], "goal": names[-1]}
     whole, part = [], ask("route", **route)
     assert part["words_left"] > 0

@@ -1,4 +1,4 @@
-from .answers import Answers as Answers
+from .answers import MapAnswers as MapAnswers
 from .questions import TOOLS as TOOLS, Tool as Tool
 from .serving import serve_stdio as serve_stdio
 

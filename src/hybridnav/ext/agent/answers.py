@@ -16,7 +16,7 @@ from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.agent.places import (
     SHOWN,
-    Places,
+    NamedPlaces,
     UnclearError,
     doubled,
     fitting,
@@ -44,7 +44,7 @@ _PASSED = 16
 """Rooms that a route lists."""
 
 
-class Answers:
+class MapAnswers:
     """Answers about one map. Threads may share it; one call is answered at a time.
 
     Parameters
@@ -59,9 +59,9 @@ class Answers:
     >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1"))), "f.hnm")
     >>> model = hn.load("f.hnm")
     >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
-    >>> from hybridnav.ext.agent import Answers
+    >>> from hybridnav.ext.agent import MapAnswers
     >>> from hybridnav.ext.page import Session
-    >>> answers = Answers(Session(model, topology, model.fitted(None)))
+    >>> answers = MapAnswers(Session(model, topology, model.fitted(None)))
     >>> answers.call("where_am_i", {"point": [0.5, 0.5]})["room"]
     'room-1'
     """
@@ -123,8 +123,8 @@ class Answers:
         return self._session.planning.topology
 
     @property
-    def _places(self) -> Places:
-        return Places(self._rooms)
+    def _places(self) -> NamedPlaces:
+        return NamedPlaces(self._rooms)
 
     def _shut(self, avoiding: list[str]) -> Blocked:
         """Return what is closed in this session with what one question avoids."""
@@ -402,7 +402,7 @@ class Answers:
             )
         )
 
-    def _undo(self, _: ask.Undo) -> dict[str, Any]:
+    def _undo(self, _: ask.TakeBack) -> dict[str, Any]:
         if not self._before:
             raise InvalidValueError("there is nothing to take back in this session")
         before = self._before[-1]

@@ -13,7 +13,6 @@ from hybridnav.ext.page.command import EditsOption, MapPage
 def serve(
     map_file: options.MapArgument[Path],
     rooms_file: options.RoomsOption = None,
-    costs: options.CostsOption = None,
     allow_edits: EditsOption = False,
     *,
     reading: MapOptions,
@@ -27,9 +26,9 @@ def serve(
     from hybridnav.ext.agent.serving import check_protocol, serve_stdio  # noqa: PLC0415
 
     check_protocol()
-    page = MapPage.read(map_file, rooms_file, options.parsed_costs(costs), reading)
+    page = MapPage.read(map_file, rooms_file, options.parsed_costs(None), reading)
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.ext.agent.answers import Answers  # noqa: PLC0415
+    from hybridnav.ext.agent.answers import MapAnswers  # noqa: PLC0415
 
     site = page.make(lambda _: None)
-    serve_stdio(Answers(site.sessions[0], allow_edits=allow_edits))
+    serve_stdio(MapAnswers(site.sessions[0], allow_edits=allow_edits))

@@ -11,7 +11,7 @@ from starlette.routing import Route
 
 from hybridnav._version import __version__
 from hybridnav.errors import HybridNavError
-from hybridnav.ext.agent.answers import Answers
+from hybridnav.ext.agent.answers import MapAnswers
 from hybridnav.ext.agent.questions import TOOLS, Answer
 from hybridnav.ext.agent.serving import INSTRUCTIONS, answered, schema_of
 
@@ -47,7 +47,7 @@ class HttpTools:
         allow_edits: bool = False,
     ) -> None:
         self._session_of, self._body_of, self._allow_edits = session_of, body_of, allow_edits
-        self._answers: WeakKeyDictionary[Session, Answers] = WeakKeyDictionary()
+        self._answers: WeakKeyDictionary[Session, MapAnswers] = WeakKeyDictionary()
 
     def routes(self, at: str, floor: str) -> list[Route]:
         """Return the routes below the path of the page and that of a floor."""
@@ -72,7 +72,7 @@ class HttpTools:
             return JSONResponse({"ok": False, "text": str(error)}, _UNPROCESSABLE)
         answers = self._answers.get(session)
         if answers is None:
-            answers = Answers(session, allow_edits=self._allow_edits)
+            answers = MapAnswers(session, allow_edits=self._allow_edits)
             self._answers[session] = answers
         found = await answered(answers, request.path_params["name"], arguments)
         if "png" in found:

@@ -41,7 +41,7 @@ class UnclearError(HybridNavError):
         self.choices = list(choices)
 
 
-class Places:
+class NamedPlaces:
     """The rooms and doors of one map, by what programs call them.
 
     Parameters

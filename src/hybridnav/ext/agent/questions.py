@@ -95,7 +95,7 @@ class Open(Close):
     """Open doors or rooms that are closed in this session."""
 
 
-class Undo(_Strict):
+class TakeBack(_Strict):
     """Take back the last `close`, `open` or `name_room` of this session."""
 
 
@@ -139,7 +139,7 @@ class Room(BaseModel):
     doors: list[int]
 
 
-class Closed(BaseModel):
+class ClosedNow(BaseModel):
     """What is closed in this session."""
 
     doors: list[int]
@@ -193,7 +193,7 @@ class MapAnswer(Answer):
     rooms: dict[str, int] | None = None
     doors: int | None = None
     robot_radius_m: float | None = None
-    closed: Closed | None = None
+    closed: ClosedNow | None = None
     edits_allowed: bool | None = None
 
 
@@ -260,7 +260,7 @@ class NearestAnswer(Answer):
 class ChangeAnswer(Answer):
     """Of what changes something."""
 
-    closed: Closed | None = None
+    closed: ClosedNow | None = None
     room: Room | None = None
 
 
@@ -298,7 +298,7 @@ TOOLS = (
     Tool("picture", Picture, PictureAnswer),
     Tool("close", Close, ChangeAnswer, edits=True),
     Tool("open", Open, ChangeAnswer, edits=True),
-    Tool("undo", Undo, ChangeAnswer, edits=True),
+    Tool("undo", TakeBack, ChangeAnswer, edits=True),
     Tool("name_room", NameRoom, ChangeAnswer, edits=True),
 )
 """All functions, for every protocol."""

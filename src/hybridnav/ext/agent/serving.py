@@ -12,7 +12,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.agent.questions import TOOLS
 
 if TYPE_CHECKING:
-    from hybridnav.ext.agent.answers import Answers
+    from hybridnav.ext.agent.answers import MapAnswers
 
 LIMIT_S = 30.0
 """Seconds after which a call is answered with an error."""
@@ -23,7 +23,7 @@ INSTRUCTIONS = (
 )
 
 
-async def answered(answers: Answers, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
+async def answered(answers: MapAnswers, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
     """Answer a call in a thread, within its time."""
     call = asyncio.to_thread(answers.call, name, arguments)
     try:
@@ -42,7 +42,7 @@ def schema_of(asks: Any) -> dict[str, Any]:
     return schema
 
 
-def serve_stdio(answers: Answers) -> None:
+def serve_stdio(answers: MapAnswers) -> None:
     """Answer a client of the Model Context Protocol on standard input and output, until it ends.
 
     Parameters
@@ -75,7 +75,7 @@ def check_protocol() -> None:
         ) from None
 
 
-async def _serve(answers: Answers) -> None:
+async def _serve(answers: MapAnswers) -> None:
     from mcp import types  # noqa: PLC0415 - an extra
     from mcp.server.lowlevel import Server  # noqa: PLC0415
     from mcp.server.stdio import stdio_server  # noqa: PLC0415

@@ -25,7 +25,7 @@ from hybridnav.ext.page.page import ASSETS, POLICY, asset, exported, exported_fl
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
-    Closing,
+    ClosingChange,
     Edit,
     Favour,
     Find,
@@ -176,7 +176,10 @@ class _Answers:
                     query.model_copy(update={"preset": GRID, "brief": True})
                 ),
             ),
-            f"{at}/closed": (Closing, lambda _, change: self._shown.site.closings.describe(change)),
+            f"{at}/closed": (
+                ClosingChange,
+                lambda _, change: self._shown.site.closings.describe(change),
+            ),
             f"{at}/alternatives": (
                 AlternativesQuery,
                 lambda _, query: self._shown.site.routes(query).alternatives(query),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from hybridnav.ext.page.requests import Closing
+    from hybridnav.ext.page.requests import ClosingChange
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planner import Journal, Profile
 
@@ -42,7 +42,7 @@ class Closings:
     check: Callable[[OutOfOrder], None]
     """Refuses to close what is not there."""
 
-    def describe(self, change: Closing | None = None) -> dict[str, Any]:
+    def describe(self, change: ClosingChange | None = None) -> dict[str, Any]:
         """Return the profiles with what they ask for, and what is out of order, after a change.
 
         Parameters

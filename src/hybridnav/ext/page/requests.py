@@ -95,7 +95,7 @@ class PartQuery(PathQuery):
     floor: FloorNumber
 
 
-class Closing(_Strict):
+class ClosingChange(_Strict):
     """A link, door or room to close until it is opened again, or to open; see `OutOfOrder`."""
 
     what: Name

@@ -18,8 +18,8 @@ from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
-    from hybridnav.search.distance_table import JumpLabels
     from hybridnav.search.found import MapChange, Metric, Query, QueryMany
+    from hybridnav.search.octile.labels import JumpLabels
 
 
 CONTRACTED_FROM = 2000
@@ -107,7 +107,7 @@ class OverJumps(Method):
         """Return labels in the contracted graph; see `Method`."""
         if self._grid.corner_cutting:
             return None
-        from hybridnav.search.distance_table import JumpLabels  # noqa: PLC0415 - for tables alone
+        from hybridnav.search.octile.labels import JumpLabels  # noqa: PLC0415 - for tables alone
 
         search = self._search or self.prepare()
         if not search.graph.is_contracted:

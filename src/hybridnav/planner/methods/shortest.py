@@ -220,7 +220,7 @@ class OverMesh(Method):
         """Return labels in the hierarchy of corners, or on the graph that is not contracted; see
         `Method`."""
         # Loads kernels for tables alone.
-        from hybridnav.search.distance_table import MeshLabels, ViewLabels  # noqa: PLC0415
+        from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
 
         search = self._on_mesh()
         search.prepare()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hybridnav._base.jit import njit
+from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.kernels.moves import COL_STEP, FAR, ROW_STEP
 
@@ -33,6 +33,7 @@ def _cost_of(costs, row, col, k):
     return costs[k - 4, row, col]
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def tree_of(costs, start, goal, limit):
     """Return the tree of cheapest paths from a node of a grid, over the nodes over which a path to

@@ -1,0 +1,60 @@
+"""Labels of cells on a jump-point graph, for tables of distances: shortest octile paths."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.moves import FAR, length_in_cells
+from hybridnav.search.distance_table import BLOCK, climbing_room
+from hybridnav.search.octile.kernels.ends import direct_costs, labels_of_cells
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.search.distance_table import Ends, Labels
+    from hybridnav.search.octile import JumpSearch
+
+
+class JumpLabels:
+    """Labels of cells in a contracted jump-point graph: shortest octile paths.
+
+    Parameters
+    ----------
+    search
+        A search on a contracted graph.
+    """
+
+    most = BLOCK
+
+    def __init__(self, search: JumpSearch) -> None:
+        graph = search.graph
+        self._tables, self._places, _, follow, _ = search.arrays
+        kinds = (graph.places & 15).astype(np.uint8)
+        self._hierarchy = kinds, graph.first, graph.arcs, follow
+        self._origin, self.n_corners = graph.origin, graph.n_corners
+
+    def _flat(self, ends: Ends) -> LongArray:
+        flat: LongArray = (ends[0] - np.array(self._origin)) @ np.array([self._tables[3], 1])
+        return flat
+
+    def labels(self, ends: Ends) -> Labels:
+        """Return the labels of ends."""
+        work = climbing_room(self.n_corners)
+        found: Labels = labels_of_cells(
+            self._tables, self._places, self._hierarchy, self._flat(ends), work
+        )
+        return found
+
+    goal_labels = labels
+
+    def direct(self, starts: Ends, goals: Ends, table: LongArray) -> None:
+        """Set the entries of cells with one free leg between them."""
+        direct_costs(self._tables, self._flat(starts), self._flat(goals), table)
+
+    def lengths(self, table: LongArray) -> FloatArray:
+        """Return costs as lengths in cells."""
+        found = np.full(table.shape, np.inf)
+        reached = table < FAR
+        found[reached] = length_in_cells(table[reached])
+        return found
