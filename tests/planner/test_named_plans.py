@@ -125,7 +125,7 @@ def test_a_tour_is_told_by_rooms_and_doors(planner):
     assert words[0] == "start in the kitchen"
     assert words[1].startswith("leave the kitchen by door 1 into the hall")
     assert words[1].endswith(" left")
-    assert words[2].endswith(" door 2 on the left into the lab, and you are there")
+    assert words[2].endswith(" door on the left (door 2) into the lab, and you are there")
     assert words[-1] == "turn right and leave the lab by door 2 into the hall, and you are there"
 
 

@@ -184,7 +184,7 @@ class Near(BaseModel):
 
 
 class MapAnswer(Answer):
-    """Of `describe_map`."""
+    """The answer of `describe_map`."""
 
     name: str | None = None
     size_m: list[float] | None = None
@@ -198,14 +198,14 @@ class MapAnswer(Answer):
 
 
 class RoomsAnswer(Answer):
-    """Of `list_rooms`."""
+    """The answer of `list_rooms`."""
 
     total: int | None = None
     rooms: list[Room] | None = None
 
 
 class PlaceAnswer(Answer):
-    """Of `where_am_i`."""
+    """The answer of `where_am_i`."""
 
     room: str | None = None
     ground: Literal["free", "occupied", "unexplored"] | None = None
@@ -214,7 +214,7 @@ class PlaceAnswer(Answer):
 
 
 class WhyAnswer(Answer):
-    """Of `explain`, and of ways that are not there."""
+    """The answer of `explain`, and of ways that are not there."""
 
     status: str | None = None
     reason: list[str] | None = None
@@ -226,7 +226,7 @@ class WhyAnswer(Answer):
 
 
 class RouteAnswer(WhyAnswer):
-    """Of `route`."""
+    """The answer of `route`."""
 
     length_m: float | None = None
     lower_bound_m: float | None = None
@@ -243,14 +243,14 @@ class RouteAnswer(WhyAnswer):
 
 
 class ReachAnswer(WhyAnswer):
-    """Of `can_reach`."""
+    """The answer of `can_reach`."""
 
     can_reach: bool | None = None
     length_m: float | None = None
 
 
 class NearestAnswer(Answer):
-    """Of `nearest`."""
+    """The answer of `nearest`."""
 
     nearest: list[Near] | None = None
     others_at_least_m: float | None = None
@@ -258,14 +258,14 @@ class NearestAnswer(Answer):
 
 
 class ChangeAnswer(Answer):
-    """Of what changes something."""
+    """The answer of what changes something."""
 
     closed: ClosedNow | None = None
     room: Room | None = None
 
 
 class PictureAnswer(WhyAnswer):
-    """Of `picture`; the picture itself comes beside it."""
+    """The answer of `picture`; the picture itself comes beside it."""
 
 
 class Tool(NamedTuple):
