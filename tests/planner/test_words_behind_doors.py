@@ -172,4 +172,10 @@ def test_every_turn_behind_the_doors_of_the_office_is_told() -> None:
     ],
 )
 def test_every_turn_behind_the_doors_of_real_floors_is_told(data: FilePath, name: str) -> None:
-    check(verdicts(found_rooms(data / name), 60), least_turns=15)
+    """Pairs until 15 turns are judged: most doors are in sight, and their turns are not told."""
+    topology, judgements = found_rooms(data / name), []
+    for seed in range(1003, 1033):
+        judgements += verdicts(topology, 60, seed=seed)
+        if sum(len(one.turns) for one in judgements) >= 15:
+            break
+    check(judgements, least_turns=15)

@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 122,
-    "lines of tests": 61_021,
+    "lines of tests": 61_042,
 }
 
 
