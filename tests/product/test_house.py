@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 60_060,
-    "lines": 99_286,
+    "code": 60_042,
+    "lines": 99_285,
     "files": 410,
-    "code outside ext": 41_334,
+    "code outside ext": 41_316,
     "lines of a file, median": 265.5,
     "lines of a file, most": 450,
     "packages": 12,

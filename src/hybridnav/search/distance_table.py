@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,19 +27,22 @@ ROOM = 4096
 
 
 class LabelSource(Protocol):
-    """What makes labels of ends, on one kind of hierarchy."""
+    """What makes labels of ends as `placed` returns them, on one kind of hierarchy."""
 
     n_corners: int
     most: int
     """Starts whose labels are held at a time."""
 
-    def labels(self, ends: Ends) -> Labels:
+    def placed(self, ends: Ends) -> Any:
+        """Return ends where they lie, which is found once."""
+
+    def labels(self, ends: Any) -> Labels:
         """Return the labels of starts."""
 
-    def goal_labels(self, ends: Ends) -> Labels:
+    def goal_labels(self, ends: Any) -> Labels:
         """Return the labels of goals."""
 
-    def direct(self, starts: Ends, goals: Ends, table: LongArray) -> None:
+    def direct(self, starts: Any, goals: Any, table: LongArray) -> None:
         """Set the entries of a table whose path passes no corner."""
 
     def lengths(self, table: LongArray) -> FloatArray:
@@ -80,15 +83,18 @@ def distance_blocks(
     """
     for first in range(0, len(goals[0]), BLOCK):
         columns = slice(first, min(first + BLOCK, len(goals[0])))
-        block = goals[0][columns], goals[1][columns]
+        block = source.placed((goals[0][columns], goals[1][columns]))
         offset, corners, costs = source.goal_labels(block)
         begin, order = by_number(corners, source.n_corners)
-        which = np.repeat(np.arange(len(block[0]), dtype=np.int32), np.diff(offset))[order]
+        n_goals = len(offset) - 1
+        which = np.repeat(np.arange(n_goals, dtype=np.int32), np.diff(offset))[order]
         buckets = begin, which, costs[order]
 
-        def fill(rows: slice, block: Ends = block, buckets: Labels = buckets) -> FloatArray:
-            some = starts[0][rows], starts[1][rows]
-            table = np.full((len(some[0]), len(block[0])), FAR, np.int64)
+        def fill(
+            rows: slice, n_goals: int = n_goals, block: Any = block, buckets: Labels = buckets
+        ) -> FloatArray:
+            some = source.placed((starts[0][rows], starts[1][rows]))
+            table = np.full((rows.stop - rows.start, n_goals), FAR, np.int64)
             source.direct(some, block, table)
             meet(source.labels(some), buckets, table)
             return source.lengths(table)

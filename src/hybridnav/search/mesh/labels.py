@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from hybridnav.search.distance_table import Ends, Labels
     from hybridnav.search.mesh import CornerHierarchy, MeshSearch
 
+    Placed = tuple[FloatArray, LongArray, IntArray]
+    """float64 (n, 2) points, (row, col), and their polygons: offsets, int32."""
+
 
 class MeshLabels:
     """Labels of points in a hierarchy of corners: shortest paths at any angle.
@@ -43,27 +46,25 @@ class MeshLabels:
         self._hierarchy = mesh.kinds, graph.first, graph.arcs, graph.follow
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 
-    def labels(self, ends: Ends) -> Labels:
+    def placed(self, ends: Ends) -> Placed:
+        """Return points with the polygons that contain them."""
+        cells, points = ends[0], rounded_into(*ends)
+        return points, *polygons_of_points(self._mesh, self._place, (cells, points))
+
+    def labels(self, ends: Placed) -> Labels:
         """Return the labels of ends."""
-        inside = np.empty(self._n_polygons, np.int32)
-        work = inside, _view_room(), climbing_room(self.n_corners)
-        found: Labels = labels_of_points(
-            self._mesh, self._hierarchy, self._place, (ends[0], rounded_into(*ends)), work
-        )
+        work = climbing_room(self.n_corners)
+        found: Labels = labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
         return found
 
     goal_labels = labels
 
-    def direct(self, starts: Ends, goals: Ends, table: LongArray) -> None:
+    def direct(self, starts: Placed, goals: Placed, table: LongArray) -> None:
         """Set the entries of ends that see each other."""
-        inside = np.empty(self._n_polygons, np.int32)
-        near, far = ((cells, rounded_into(cells, points)) for cells, points in (starts, goals))
-        offset, listed = polygons_of_points(self._mesh, self._place, near, inside)
-        to_offset, to_listed = polygons_of_points(self._mesh, self._place, far, inside)
-        begin, order = by_number(to_listed, self._n_polygons)
-        members = np.repeat(np.arange(len(far[0])), np.diff(to_offset))[order]
-        goal_lists = far[1], begin, members.astype(np.int32)
-        straight_costs(self._mesh, (near[1], offset, listed), goal_lists, _view_room(), table)
+        points, offset, listed = goals
+        begin, order = by_number(listed, self._n_polygons)
+        members = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(offset))[order]
+        straight_costs(self._mesh, starts, (points, begin, members), _view_room(), table)
 
     def lengths(self, table: LongArray) -> FloatArray:
         """Return costs as lengths in cells."""
@@ -90,10 +91,10 @@ class ViewLabels(MeshLabels):
         self._edges = edges
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 
-    def labels(self, ends: Ends) -> Labels:
+    def labels(self, ends: Placed) -> Labels:
         """Return the costs from each start to all corners."""
         offset, seen, to_seen = self.goal_labels(ends)
-        points = rounded_into(*ends)
+        points = ends[0]
         costs = np.full((len(points), self.n_corners), FAR, np.int64)
         before, heap = np.empty(self.n_corners, np.int32), np.empty((ROOM, 2), np.int64)
         for k, point in enumerate(points):
@@ -106,12 +107,9 @@ class ViewLabels(MeshLabels):
         corners = np.tile(np.arange(self.n_corners, dtype=np.int32), len(points))
         return ends_at, corners, costs.ravel()
 
-    def goal_labels(self, ends: Ends) -> Labels:
+    def goal_labels(self, ends: Placed) -> Labels:
         """Return the corners that each goal sees."""
-        work = np.empty(self._n_polygons, np.int32), _view_room()
-        found: Labels = views_of_points(
-            self._mesh, self._place, (ends[0], rounded_into(*ends)), work
-        )
+        found: Labels = views_of_points(self._mesh, ends, _view_room())
         return found
 
 

@@ -34,23 +34,22 @@ class JumpLabels:
         self._hierarchy = kinds, graph.first, graph.arcs, follow
         self._origin, self.n_corners = graph.origin, graph.n_corners
 
-    def _flat(self, ends: Ends) -> LongArray:
+    def placed(self, ends: Ends) -> LongArray:
+        """Return flat cells in the framed rectangle."""
         flat: LongArray = (ends[0] - np.array(self._origin)) @ np.array([self._tables[3], 1])
         return flat
 
-    def labels(self, ends: Ends) -> Labels:
+    def labels(self, ends: LongArray) -> Labels:
         """Return the labels of ends."""
         work = climbing_room(self.n_corners)
-        found: Labels = labels_of_cells(
-            self._tables, self._places, self._hierarchy, self._flat(ends), work
-        )
+        found: Labels = labels_of_cells(self._tables, self._places, self._hierarchy, ends, work)
         return found
 
     goal_labels = labels
 
-    def direct(self, starts: Ends, goals: Ends, table: LongArray) -> None:
+    def direct(self, starts: LongArray, goals: LongArray, table: LongArray) -> None:
         """Set the entries of cells with one free leg between them."""
-        direct_costs(self._tables, self._flat(starts), self._flat(goals), table)
+        direct_costs(self._tables, starts, goals, table)
 
     def lengths(self, table: LongArray) -> FloatArray:
         """Return costs as lengths in cells."""

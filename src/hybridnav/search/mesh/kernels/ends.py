@@ -10,54 +10,108 @@ from hybridnav.search.mesh.kernels.corner_search import polygon_in, polygons_wit
 from hybridnav.search.mesh.kernels.views import class_of, cost_of, lobe_of, see_from_point
 
 
-@njit(cache=True, nogil=True)
-def _larger(room):
-    """Return twice the room of `see_from_point`."""
-    return grow_rows(room[0]), grow_rows(room[1]), np.empty(2 * len(room[2]), np.int32)
-
-
 @guarded
 @njit(cache=True, nogil=True)
-def labels_of_points(mesh, hierarchy, place, ends, work):
-    """Return the labels of points.
+def polygons_of_points(mesh, place, ends):
+    """Return the polygons that contain each point: int64 (n + 1,) offsets and int32.
 
     Parameters
     ----------
     mesh
         See `successors`.
-    hierarchy
-        See `climb`.
     place
         Component of polygons, and the polygon of each cell.
     ends
         int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
-    work
-        Room for polygons; room of `see_from_point`; work of `climb`.
+    """
+    component, polygon_at = place
+    cells, points = ends
+    inside = np.empty(len(component), np.int32)
+    offset = np.zeros(len(cells) + 1, np.int64)
+    listed = np.empty(4 * len(cells), np.int32)
+    n = 0
+    for k in range(len(cells)):
+        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
+        inner = polygon_in(mesh, component, polygon_at, row, col)
+        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
+        while n + n_inside > len(listed):
+            listed = grow(listed)
+        listed[n : n + n_inside] = inside[:n_inside]
+        n += n_inside
+        offset[k + 1] = n
+    return offset, listed[:n]
+
+
+@njit(cache=True, nogil=True)
+def _seen(mesh, ends, k, target, room):
+    """Return the corners, int32, that a point of `ends` sees, and the room, grown if too small."""
+    points, offset, listed = ends
+    y, x, inside = points[k, 0], points[k, 1], listed[offset[k] : offset[k + 1]]
+    found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
+    while found < 0:
+        room = grow_rows(room[0]), grow_rows(room[1]), np.empty(2 * len(room[2]), np.int32)
+        found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
+    return room[2][:found], room
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def views_of_points(mesh, ends, room):
+    """Return the corners that points see, with the costs to them, as labels.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    ends
+        float64 (n, 2) points, (row, col); the polygons that contain them, see `polygons_of_points`.
+    room
+        See `see_from_point`.
 
     Returns
     -------
     tuple
         int64 (n + 1,) offsets; int32 corners, int64 costs in `UNITS`.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    component, polygon_at = place
-    cells, points = ends
-    inside, room, (records, heap) = work
-    follow = hierarchy[3]
-    offset = np.zeros(len(cells) + 1, np.int64)
+    cx, cy = mesh[0], mesh[1]
+    points, _, listed = ends
+    offset = np.zeros(len(points) + 1, np.int64)
     nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
-    for k in range(len(cells)):
-        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
-        inner = polygon_in(mesh, component, polygon_at, row, col)
-        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
-        nowhere = (0.0, 0.0, inside[:0])
-        found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
-        while found < 0:
-            room = _larger(room)
-            found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
-        seen = room[2][:found]
-        to_seen, may_follow = np.empty(found, np.int64), np.empty(found, np.int64)
-        for i in range(found):
+    for k in range(len(points)):
+        y, x = points[k, 0], points[k, 1]
+        seen, room = _seen(mesh, ends, k, (0.0, 0.0, listed[:0]), room)
+        while n + len(seen) > len(nodes):
+            nodes, costs = grow(nodes), grow(costs)
+        for corner in seen:
+            nodes[n], costs[n] = corner, cost_of(x, y, cx[corner], cy[corner])
+            n += 1
+        offset[k + 1] = n
+    return offset, nodes[:n], costs[:n]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def labels_of_points(mesh, hierarchy, ends, room, work):
+    """Return the labels of points, as `views_of_points` returns views.
+
+    Parameters
+    ----------
+    mesh, ends, room
+        See `views_of_points`.
+    hierarchy, work
+        See `climb`.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    points, _, listed = ends
+    records, heap = work
+    follow = hierarchy[3]
+    offset = np.zeros(len(points) + 1, np.int64)
+    nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
+    for k in range(len(points)):
+        y, x = points[k, 0], points[k, 1]
+        seen, room = _seen(mesh, ends, k, (0.0, 0.0, listed[:0]), room)
+        to_seen, may_follow = np.empty(len(seen), np.int64), np.empty(len(seen), np.int64)
+        for i in range(len(seen)):
             corner = seen[i]
             dx, dy, kind = x - cx[corner], y - cy[corner], kinds[corner]
             to_seen[i] = cost_of(x, y, cx[corner], cy[corner])
@@ -72,42 +126,15 @@ def labels_of_points(mesh, hierarchy, place, ends, work):
 
 @guarded
 @njit(cache=True, nogil=True)
-def polygons_of_points(mesh, place, ends, inside):
-    """Return the polygons that contain each point: int64 (n + 1,) offsets and int32."""
-    component, polygon_at = place
-    cells, points = ends
-    offset = np.zeros(len(cells) + 1, np.int64)
-    listed = np.empty(4 * len(cells), np.int32)
-    n = 0
-    for k in range(len(cells)):
-        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
-        inner = polygon_in(mesh, component, polygon_at, row, col)
-        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
-        while n + n_inside > len(listed):
-            larger = np.empty(2 * len(listed), np.int32)
-            larger[:n] = listed[:n]
-            listed = larger
-        listed[n : n + n_inside] = inside[:n_inside]
-        n += n_inside
-        offset[k + 1] = n
-    return offset, listed[:n]
-
-
-@guarded
-@njit(cache=True, nogil=True)
 def straight_costs(mesh, starts, goals, room, table):
     """Set the entries of a table whose ends see each other to the costs of straight lines.
 
     Parameters
     ----------
-    mesh
-        See `successors`.
-    starts
-        float64 (n, 2) points, (row, col), and their polygons, see `polygons_of_points`.
+    mesh, starts, room
+        See `views_of_points`.
     goals
         float64 (m, 2) points; int64 (p + 1,) and int32, the goals in each polygon.
-    room
-        See `see_from_point`.
     table
         int64 (n, m) costs in `UNITS`; changed.
     """
@@ -117,43 +144,12 @@ def straight_costs(mesh, starts, goals, room, table):
     target = (begin, members, to_points, is_seen)
     for k in range(len(points)):
         y, x = points[k, 0], points[k, 1]
-        inside = listed[offset[k] : offset[k + 1]]
-        found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
-        while found < 0:
-            room = _larger(room)
-            found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
-        for polygon in inside:
+        _, room = _seen(mesh, starts, k, target, room)
+        for polygon in listed[offset[k] : offset[k + 1]]:
             is_seen[members[begin[polygon] : begin[polygon + 1]]] = True
         for goal in np.flatnonzero(is_seen):
             table[k, goal] = cost_of(x, y, to_points[goal, 1], to_points[goal, 0])
         is_seen[:] = False
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def views_of_points(mesh, place, ends, work):
-    """Return the corners that points see, with the costs to them, as labels."""
-    cx, cy = mesh[0], mesh[1]
-    cells, points = ends
-    inside, room = work
-    offset = np.zeros(len(cells) + 1, np.int64)
-    nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
-    for k in range(len(cells)):
-        row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
-        inner = polygon_in(mesh, place[0], place[1], row, col)
-        n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
-        nowhere = (0.0, 0.0, inside[:0])
-        found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
-        while found < 0:
-            room = _larger(room)
-            found, _ = see_from_point(mesh, x, y, inside[:n_inside], nowhere, room, 0)
-        while n + found > len(nodes):
-            nodes, costs = grow(nodes), grow(costs)
-        for corner in room[2][:found]:
-            nodes[n], costs[n] = corner, cost_of(x, y, cx[corner], cy[corner])
-            n += 1
-        offset[k + 1] = n
-    return offset, nodes[:n], costs[:n]
 
 
 @guarded
