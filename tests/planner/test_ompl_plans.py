@@ -127,9 +127,19 @@ def field_of_pillars() -> hn.OccupancyGrid:
     return hn.OccupancyGrid(occupied, hn.Frame(0.25), robot_radius_m=0)
 
 
+def zigzag() -> hn.OccupancyGrid:
+    """Forty aisles with gaps at alternate ends: too many for a sampler in 10 ms."""
+    occupied = np.zeros((161, 120), dtype=np.float32)
+    occupied[4::8, :118] = occupied[8:-1:8, 2:] = 1
+    return hn.OccupancyGrid(occupied, hn.Frame(0.25), robot_radius_m=0)
+
+
 def test_where_time_is_short_the_grid_path_takes_over_and_says_so(planner_of: Any) -> None:
-    made = planner_of("ompl", "planner=BITstar", "budget_s=0.02", "confine=mask")
-    result = made.plan(*ENDS)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(zigzag()))
+    settings = ("planner=RRTstar", "budget_s=0.01", "confine=mask")
+    made = planner_of("ompl", *settings, topology=topology)
+    frame = made.topology.grid.frame
+    result = made.plan(*frame.points_of(np.array([[0, 60], [160, 60]])))
     assert result.status is hn.PlanStatus.SOLVED
     assert result.refinement.by_grid
     assert result.refinement.steps[-1] == "grid path by line of sight: solved"
