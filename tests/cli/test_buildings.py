@@ -382,7 +382,7 @@ def test_a_map_has_a_journal_too(cli: Any, tmp_path: Path) -> None:
     (tmp_path / "figure1.closed.yaml").write_text("closed: [{what: 'link:lift'}]\n")
     assert cli(*query).refuses(3, "link:lift is of a building, and this is one map")
     (tmp_path / "figure1.closed.yaml").write_text("closed: [3]\n")
-    assert cli(*query).refuses(3, "figure1.closed.yaml, line 1: expected what, since and why")
+    assert cli(*query).refuses(3, "figure1.closed.yaml, line 1: expected what, since, why and by")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import asdict
+from getpass import getuser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,8 +106,11 @@ def change_closed(
         check(OutOfOrder(what, why=why or ""))
     for what in known if "all" in open_again else open_again:
         journal.open(what)
+    by = ""
+    with suppress(OSError, KeyError, ImportError):  # there need not be a name for the user
+        by = getuser()
     for what in close:
-        journal.close(what, why=why or "")
+        journal.close(what, why=why or "", by=by)
 
 
 def list_closed(map_file: Path, *, as_json: bool) -> None:
@@ -122,5 +127,6 @@ def list_closed(map_file: Path, *, as_json: bool) -> None:
     lines = [f"closed     {len(items)}" + (f", in {printable(journal.path)}" if items else "")]
     for item in items:
         since = f"since {item.since} UTC" if item.since else ""
-        lines.append(f"{item.what:<{width}}  {', '.join(filter(None, (since, item.why)))}".rstrip())
+        facts = since, item.by and f"by {item.by}", item.why
+        lines.append(f"{item.what:<{width}}  {', '.join(filter(None, facts))}".rstrip())
     answer("\n".join(lines) + "\n")

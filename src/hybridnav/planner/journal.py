@@ -34,7 +34,7 @@ _WHAT = re.compile(
 )
 _LIMITS = Limits(max_bytes=2**19, max_values=10_000)
 _MOST_ITEMS, _MOST_TEXT = 1000, 200
-_KEYS = ("what", "since", "why")
+_KEYS = ("what", "since", "why", "by")
 _WAIT_S, _STEP_S = 10.0, 0.02
 _HEADER = "# Out of order until it is opened again; hybridnav closed writes it, without comments.\n"
 
@@ -59,6 +59,8 @@ class OutOfOrder:
     since: str = ""
     """When it was closed, UTC."""
     why: str = ""
+    by: str = ""
+    """Who closed it."""
 
     def __post_init__(self) -> None:
         """Refuse what names nothing."""
@@ -178,15 +180,15 @@ class Journal:
                 closed |= item.blocked
         return closed
 
-    def close(self, what: str, *, why: str = "") -> None:
+    def close(self, what: str, *, why: str = "", by: str = "") -> None:
         """Close something until it is opened again; who closes it again states the reason anew.
 
         Parameters
         ----------
         what
             As in `OutOfOrder`. Whether there is such a thing is seen when routes are planned.
-        why
-            The reason, one line.
+        why, by
+            The reason, and who closes it, one line each.
 
         Raises
         ------
@@ -196,7 +198,7 @@ class Journal:
             When the journal cannot be read or written.
         """
         since = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
-        made = OutOfOrder(what, since, why)
+        made = OutOfOrder(what, since, why, by)
         with self._alone() as items:
             others = [item for item in items if item.what != what]
             if len(others) >= _MOST_ITEMS:
@@ -230,7 +232,7 @@ class Journal:
         for number, entry in enumerate(entries):
             at = f"{where}, line {marked.line('closed', number)}"
             if not isinstance(entry, dict) or not {"what"} <= entry.keys() <= set(_KEYS):
-                raise MapError(f"{at}: expected what, since and why, got {brief(entry)}")
+                raise MapError(f"{at}: expected what, since, why and by, got {brief(entry)}")
             try:
                 item = OutOfOrder(**entry)
             except InvalidValueError as error:

@@ -157,7 +157,7 @@ class _Answers:
         gets: dict[str, Callable[[Request], Any]] = {
             f"{at}/map.json": lambda _: self._shown.describe(),
             f"{at}/state.json": lambda _: self._shown.state(),
-            f"{at}/closed.json": lambda _: self._shown.site.closings.describe(),
+            f"{at}/closed.json": lambda _: self._shown.site.changes(),
             f"{floor}/map.json": lambda request: self._floor(request).describe(),
             f"{floor}/rooms.json": lambda request: self._session(request).describe_rooms(),
             f"{floor}/outlines.json": lambda request: self._session(request).outlines(),

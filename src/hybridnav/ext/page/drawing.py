@@ -331,7 +331,7 @@ class PagePlanning:
         if query.closed.links:
             raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
         asked = next(map(self.blocked, query.closed.floors), None)
-        shut = None if self.journal is None else self.journal.closures()
+        shut = None if self.journal is None or query.all_open else self.journal.closures()
         return asked | shut if asked and shut else asked or shut
 
     def blocked(self, closed: FloorClosed) -> Blocked | None:

@@ -61,11 +61,11 @@ class Closings:
                 raise InvalidValueError("nothing here keeps what is closed, in the folder of a map")
             if change.closed:
                 self.check(OutOfOrder(change.what))
-                journal.close(change.what, why=change.why)
+                journal.close(change.what, why=change.why, by=change.by)
             else:
                 journal.open(change.what)
         return {
-            "profiles": [{"name": one.name, "asks": one.described} for one in self.profiles],
+            "profiles": [asdict(one) for one in self.profiles],
             "closed": [] if journal is None else [asdict(item) for item in journal.items()],
             "can_close": journal is not None,
         }

@@ -75,6 +75,8 @@ class PathQuery(_Strict):
     language: Annotated[str, StringConstraints(max_length=10)] = "en"
     """The language of the words."""
     profile: Name | None = None
+    all_open: bool = False
+    """Whether also what is out of order is passed."""
 
 
 class PlanQuery(PathQuery):
@@ -101,6 +103,7 @@ class ClosingChange(_Strict):
     what: Name
     closed: bool
     why: Annotated[str, Field(max_length=200)] = ""
+    by: Annotated[str, Field(max_length=200)] = ""
 
 
 class At(_Strict):

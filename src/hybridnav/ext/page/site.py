@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
@@ -183,6 +184,12 @@ class Site:
     def state(self) -> dict[str, Any]:
         """Return that everything is there; see `Opening.state`."""
         return {"ready": True, "stage": ""}
+
+    def changes(self) -> dict[str, Any]:
+        """Return what other pages and programs may have changed: what is out of order, and the
+        version of the rooms of each floor."""
+        versions = [session.version for session in self.sessions]
+        return self.closings.describe() | {"versions": versions}
 
     def routes(self, query: PathQuery | None = None) -> Routes:
         """Return what answers a query, whose floors there are, each closed once.
@@ -374,7 +381,11 @@ class _OverFloors:
 
     def _outcome(self, query: PathQuery) -> BuildingPlan:
         start, goal = self._ends(query)
-        return self._with(query.preset).plan(start, goal, **self._how(query))
+        building = self._with(query.preset)
+        if query.all_open:
+            building = copy(building)
+            building.journal = None
+        return building.plan(start, goal, **self._how(query))
 
     def _ends(self, query: PathQuery) -> list[tuple[str, tuple[float, float]]]:
         return [

@@ -13,9 +13,12 @@ import { LANGUAGES, written, remember, said, settings, t, translate } from "./te
 const byId = (id) => document.getElementById(id);
 const FILES = { nav2: "route-graph.geojson", model: "model.hnm", rooms: "rooms.geojson", "path-geojson": "path.geojson", "path-csv": "path.csv" };
 const END_REACH = 14; // pixels
+const EVERY_MS = 1000; // looks at what others have changed
 
 const page = {
   canvas: byId("map"),
+  profiles: [],
+  reported,
   link: openLink(),
 
   say(text, isProblem = false, isDone = false) {
@@ -131,6 +134,11 @@ function connectRoutes() {
   for (const id of ["clear", "again"]) on(id, "click", () => routes.clear());
   on("alternatives", "click", () => routes.alternatives());
   on("stairs", "change", () => routes.plan());
+  on("profile", "change", async () => {
+    remember({ profile: byId("profile").value });
+    routes.showProfiles();
+    await routes.plan();
+  });
   on("close-undo", "click", () => closures.undo());
   on("close-clear", "click", () => closures.openAll());
   on("area-start", "click", () => {
@@ -184,7 +192,10 @@ function connectView() {
     const step = { PageUp: 1, PageDown: -1 }[event.key];
     return step && page.map.ready ? showFloor(page.floors.at + step) : null;
   }, false));
-  on("face", "change", () => useSettings({ face: byId("face").value }));
+  on("face", "change", async () => {
+    await useSettings({ face: byId("face").value });
+    byId("lasting").checked = settings.face === "staff" && !byId("lasting-part").hidden;
+  });
   on("language", "change", () => useSettings({ language: byId("language").value }));
   document.querySelectorAll("input[name=mode]").forEach((input) => input.addEventListener("change", () => {
     page.say("");
@@ -292,6 +303,7 @@ function listChoices() {
   const preset = byId("preset").value;
   byId("preset").replaceChildren(...options(floors.presets));
   if (preset) byId("preset").value = preset;
+  page.routes.showProfiles();
   byId("close-link").replaceChildren(element("option", { value: "" }, t("choose")), ...options(floors.links.map((link) => link.name)));
 }
 
@@ -340,6 +352,21 @@ async function prepared() {
   followed(() => false).catch((problem) => page.say(problem.message, true));
 }
 
+// Look at what others change, while somebody sees the page.
+async function watched() {
+  for (let told = ""; ;) {
+    await pause(EVERY_MS);
+    if (document.hidden) continue;
+    try {
+      await page.closures.look();
+      told = "";
+    } catch ({ code, message }) {
+      if (code && message !== told) page.say(message, true); // a server that has ended is no news
+      told = message;
+    }
+  }
+}
+
 async function begin() {
   showSettings();
   const whole = await page.link.get("map", "");
@@ -366,7 +393,12 @@ async function begin() {
   page.floors.note();
   await page.pictures.showLayer();
   page.pictures.useTheme();
-  if (page.link.isLive) await page.fields.begin();
+  if (page.link.isLive) {
+    await page.fields.begin();
+    await page.closures.begin();
+    page.routes.showProfiles();
+    watched();
+  }
   page.canvas.dataset.ready = "true";
 }
 

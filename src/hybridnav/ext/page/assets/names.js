@@ -127,7 +127,7 @@ export class Names {
     return this.#inTurn(async () => {
       try {
         const rooms = await link.post(name, { version: map.rooms.version, ...more }, base);
-        await this.#changed(map, floor, rooms, this.chosen === about ? after : this.chosen);
+        await this.#changed(map, floor, rooms, this.chosen === about ? after : this.chosen, true);
       } catch (problem) {
         await this.#refused(problem);
       }
@@ -187,9 +187,10 @@ export class Names {
     });
   }
 
-  async #changed(map, floor, rooms, chosen) {
-    const lost = this.page.closures.follow(floor, map.rooms, rooms);
+  async #changed(map, floor, rooms, chosen, isOwn = false) {
+    const before = map.rooms;
     map.rooms = rooms;
+    const lost = await this.page.closures.follow(floor, before, rooms, isOwn);
     if (map !== this.page.map) return; // another floor is shown meanwhile
     this.rings = [];
     this.page.scene.version = rooms.version;
@@ -198,7 +199,7 @@ export class Names {
     const isTyping = typed !== this.chosen; // a name that must not be lost meanwhile
     if (rooms.rooms.some((room) => room.name === chosen)) await this.choose(chosen, isTyping ? typed : chosen);
     else await this.choose("");
-    if (this.page.closures.list.length) await this.outlined();
+    if (this.page.closures.all.length) await this.outlined();
     await this.page.changed();
     if (lost.length) this.page.say(t("gone", lost.join(", ")), true);
   }
@@ -210,7 +211,11 @@ export class Names {
     if (this.chosen) await this.outlined().catch(() => {}); // the message has said what is wrong
   }
 
-  // Take over what another page has changed.
+  // Take over what another page has changed, after the own changes.
+  follow() {
+    return this.#inTurn(() => this.refresh());
+  }
+
   async refresh() {
     const { map, floors } = this.page;
     const floor = floors.at;

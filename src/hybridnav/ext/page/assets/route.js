@@ -1,7 +1,7 @@
 // Routes: two ends, a plan with its certificate, and alternatives.
 
 import { ROUTE_COLOURS } from "./draw.js";
-import { written, said, settings, t } from "./texts.js";
+import { profileName, written, said, settings, t } from "./texts.js";
 
 const MOST_UNDER_WAY = 3; // requests at a time
 const phone = matchMedia("(max-width: 760px)");
@@ -22,8 +22,8 @@ export function picture(content) {
   return holder.firstChild;
 }
 
-// What routes are compared by: with rides, which have no length, the cost.
-const amountOf = (route) => (route.rides?.length ? route.cost : route.length_m);
+// What routes are compared by: their metres, with those that rides count.
+const amountOf = (route) => route.length_m + (route.charge_m ?? 0);
 
 function passagesOf(route) {
   if (!route.solved) return "";
@@ -46,7 +46,7 @@ export class Routes {
   ends = { start: null, goal: null }; // each { floor, point }
   routes = []; // the plan, or the plan and its alternatives
   chosen = 0;
-  open = null; // the plan without closures, while something is closed
+  open = null; // the plan without closures and profile, while there are some
   grid = null; // the optimum on the grid
   lit = -1; // the line of the words that is lit, with its door
   #wanted = null;
@@ -71,11 +71,16 @@ export class Routes {
     return end?.floor === this.page.floors.at ? end.point : null;
   }
 
+  // Who goes, null for anyone.
+  get profile() {
+    return this.page.profiles.find(({ name }) => name === settings.profile) ?? null;
+  }
+
   query(more = {}) {
     const { closures } = this.page;
     const end = ({ floor, point, name = null }) => ({ floor, point, name });
     const [start, goal] = [this.ends.start, this.ends.goal].map(end);
-    return { start, goal, preset: this.byId("preset").value, closed: closures.asked, stairs: this.byId("stairs").checked, language: settings.language, ...more };
+    return { start, goal, preset: this.byId("preset").value, closed: closures.asked, profile: this.profile?.name ?? null, stairs: this.byId("stairs").checked, language: settings.language, ...more };
   }
 
   // Plans are about all floors: their names have nothing before them.
@@ -102,6 +107,17 @@ export class Routes {
     this.showEnds();
     this.page.scene.draw();
     return this.plan();
+  }
+
+  showProfiles() {
+    const options = this.page.profiles.map(({ name }) => element("option", { value: name }, profileName(name)));
+    this.byId("profile").replaceChildren(element("option", { value: "" }, t("profile-none")), ...options);
+    this.byId("profile").value = this.profile?.name ?? "";
+    const { through_private: isPrivate = true, elsewhere = 1, stairs = true, width_m: wide, turn_m: turn } = this.profile ?? {};
+    const asks = [!isPrivate && t("asks-private"), elsewhere > 1 && t("asks-corridors"), !stairs && t("asks-stairs"),
+      wide && t("asks-wide", written(wide, 2)), turn && t("asks-turn", written(turn, 2))];
+    this.byId("asks").textContent = asks.filter(Boolean).join(", ");
+    this.byId("stairs-row").hidden = !stairs;
   }
 
   showEnds() {
@@ -172,7 +188,7 @@ export class Routes {
     let [found, open, problem] = [[], null, null];
     try {
       found = [await this.#post("plan", asked)];
-      if (this.page.closures.list.length && !asked.brief) open = await this.#planOpen(asked);
+      if ((this.page.closures.all.length || asked.profile) && !asked.brief) open = await this.#planOpen(asked);
     } catch (error) {
       problem = error;
     }
@@ -185,7 +201,7 @@ export class Routes {
   }
 
   #planOpen(asked) {
-    return this.#post("plan", { ...asked, closed: {}, brief: true });
+    return this.#post("plan", { ...asked, closed: {}, profile: null, all_open: true, brief: true });
   }
 
   // An answer about the ends of now, null for one that came after they were moved.
@@ -254,7 +270,8 @@ export class Routes {
     this.page.floors.note();
     this.#place(Boolean(route?.solved));
     if (route && !route.solved) {
-      this.page.say([t("no-route", said(route.status)), route.why].filter(Boolean).join(". "), true);
+      const status = t("no-route", said(route.status));
+      this.page.say(route.why && this.profile ? t("no-route", said(route.why)) : [status, route.why].filter(Boolean).join(". "), true);
     }
   }
 
@@ -281,7 +298,8 @@ export class Routes {
   #rowsForStaff(route) {
     const rows = [["length", shortly(route)]];
     const more = this.open?.solved ? amountOf(route) - amountOf(this.open) : 0;
-    if (more > 0.5) rows.push(["detour", t("detour-staff", someMetres(more))]);
+    if (more > 0.5) rows.push(["detour", t(this.profile ? "detour-profile" : "detour-staff", someMetres(more))]);
+    else if (this.profile && this.open?.solved) rows.push(["detour", t("no-detour")]);
     return rows;
   }
 

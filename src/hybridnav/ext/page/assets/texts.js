@@ -4,25 +4,32 @@ const TABLES = JSON.parse(document.getElementById("texts").textContent);
 export const LANGUAGES = Object.fromEntries(Object.entries(TABLES).map(([code, table]) => [code, table["own-name"]]));
 const SPOKEN = navigator.languages.map((each) => each.slice(0, 2)).find((each) => each in TABLES) ?? "en";
 
-// What the address remembers: the face, "staff" or "robot", and the language.
-export const settings = { face: "staff", language: SPOKEN };
+// What the address remembers: the face, "staff" or "robot", the language, and who goes.
+export const settings = { face: "staff", language: SPOKEN, profile: "" };
 const remembered = new URLSearchParams(location.hash.slice(1));
 if (remembered.get("face") === "robot") settings.face = "robot";
 if (remembered.get("language") in TABLES) settings.language = remembered.get("language");
+settings.profile = remembered.get("profile") ?? "";
 
 export function remember(change) {
   Object.assign(settings, change);
-  history.replaceState(null, "", `#${new URLSearchParams(settings)}`);
+  const kept = Object.entries(settings).filter(([, value]) => value);
+  history.replaceState(null, "", `#${new URLSearchParams(kept)}`);
 }
 
 export function t(key, ...values) {
   return TABLES[settings.language][key].replaceAll(/\{(\d)\}/g, (_, at) => values[at]);
 }
 
+// A profile that every building has goes by a name of the language, another one by its own.
+export function profileName(name) {
+  return TABLES[settings.language][`profile-${name}`] ?? name;
+}
+
 // What the server says in English, as far as the language has words for it.
 export function said(text) {
   return text.split("; ").map((part) => TABLES[settings.language].server
-    .reduce((now, [pattern, words]) => now.replace(new RegExp(pattern), words), part)).join("; ");
+    .reduce((now, [pattern, words]) => now.replace(new RegExp(pattern, "g"), words), part)).join("; ");
 }
 
 export function written(value, decimals = 0) {
