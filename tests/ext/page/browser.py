@@ -71,6 +71,16 @@ class Shown:
         """Click a point of the grid."""
         self.page.mouse.click(*self.at(x, y))
 
+    def take(self, which: str, text: str) -> None:
+        """Type the name of an end, and take the first room that the page offers for all of it."""
+        self.page.fill(f"#{which}", text)
+        self.wait(
+            f"(list => list.dataset.of === '{text}' && !list.hidden)"
+            f"(document.getElementById('{which}-list'))"
+        )
+        self.page.keyboard.press("Enter")
+        self.wait(f"document.querySelector('#{which}-list').hidden")
+
     def mode(self, name: str) -> None:
         """Choose what a click on the map means."""
         self.page.check(f"input[value={name}]")

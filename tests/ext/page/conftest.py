@@ -18,6 +18,7 @@ from tests.ext.page.server import (
     served,
     site_of,
     write_building,
+    write_house,
 )
 
 if TYPE_CHECKING:
@@ -66,6 +67,13 @@ def building(folder: Path) -> Iterator[Client]:
     """A client of a server of a building of two floors."""
     site = building_site_of(write_building(folder))
     with served(site, folder) as client:
+        yield client
+
+
+@pytest.fixture
+def house(folder: Path) -> Iterator[Client]:
+    """A client of a server of a building of three floors with a lift and stairs."""
+    with served(building_site_of(write_house(folder)), folder) as client:
         yield client
 
 

@@ -6,7 +6,7 @@ import json
 import socket
 import threading
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +89,38 @@ def write_building(folder: Path) -> Path:
     write_map(folder, "upper", ("e", "f", "g", "h"), "more/rooms-2.yaml", frame)
     (folder / "building.yaml").write_text(BUILDING, encoding="utf-8")
     return folder / "building.yaml"
+
+
+HOUSE = """\
+floors:
+- {name: "0", map: four.yaml, rooms: rooms.yaml}
+- {name: "1", map: one.yaml, rooms: rooms-1.yaml, elevation_m: 3.0}
+- {name: "2", map: two.yaml, rooms: rooms-2.yaml, elevation_m: 6.0}
+links:
+- name: lift
+  kind: lift
+  wait_s: 1
+  ends: [{floor: "0", room: lobby}, {floor: "1", room: lobby}, {floor: "2", room: lobby}]
+- name: stairs
+  kind: stairs
+  cost_m: 30
+  ends:
+  - {floor: "0", room: stairwell}
+  - {floor: "1", room: stairwell}
+  - {floor: "2", room: stairwell}
+"""
+
+
+def write_house(folder: Path) -> Path:
+    """Write a building of three floors with a lift and stairs; an office is private."""
+    write_map(folder, "four", ("entrance", "office 10", "lobby", "stairwell"))
+    write_map(folder, "one", ("ward 1", "ward 2", "lobby", "stairwell"), "rooms-1.yaml")
+    write_map(folder, "two", ("ward 10", "Küche", "lobby", "stairwell"), "rooms-2.yaml")
+    grid, file = hn.load_map(folder / "four.yaml"), folder / "rooms.yaml"
+    private = {"office 10": hn.RoomUse(private=True)}
+    hn.save_rooms(file, replace(hn.load_rooms(file, grid), uses=private), grid)
+    (folder / "house.yaml").write_text(HOUSE, encoding="utf-8")
+    return folder / "house.yaml"
 
 
 def folder_in(above: Path) -> Path:

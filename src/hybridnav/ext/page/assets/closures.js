@@ -153,8 +153,9 @@ export class Closures {
     const without = (some, others) => some.filter((each) => !others.some((other) => other.key === each.key));
     const news = [...without(this.lasting, before).map((each) => t("other-closed", [this.#textOf(each), each.by].filter(Boolean).join(", "))),
       ...without(before, this.lasting).map((each) => t("other-opened", this.#textOf(each)))];
-    if (news.length) this.page.say(news.join("; "));
     await this.#changed();
+    const { refusal } = this.page.routes;
+    if (news.length) this.page.say([...news, refusal].filter(Boolean).join(". "), Boolean(refusal));
   }
 
   // Follow doors and rooms of a floor to their new numbers and names, by where they are, and

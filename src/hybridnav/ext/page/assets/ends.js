@@ -52,10 +52,10 @@ export class Ends {
     if (number !== this.#asked || document.activeElement !== this.byId(which)) return;
     this.#found[which] = found;
     this.#active = text ? 0 : -1;
-    this.#list(which);
+    this.#list(which, text);
   }
 
-  #list(which) {
+  #list(which, text = this.byId(`${which}-list`).dataset.of) {
     const { floors } = this.page;
     const items = this.#found[which].map((each, at) => {
       const where = floors.named(each.floor, (name) => t("on-floor", name));
@@ -65,6 +65,7 @@ export class Ends {
       return item;
     });
     this.byId(`${which}-list`).replaceChildren(...items);
+    this.byId(`${which}-list`).dataset.of = text;
     this.byId(`${which}-list`).hidden = !items.length;
     const field = this.byId(which);
     field.ariaExpanded = String(items.length > 0);

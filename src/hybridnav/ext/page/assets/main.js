@@ -21,9 +21,11 @@ const page = {
   reported,
   link: openLink(),
 
+  // Say something; instead of nothing, why there is no route.
   say(text, isProblem = false, isDone = false) {
-    byId("status").textContent = text.charAt(0).toUpperCase() + text.slice(1);
-    byId("status").classList.toggle("problem", isProblem);
+    const said = text || (page.routes?.refusal ?? "");
+    byId("status").textContent = said.charAt(0).toUpperCase() + said.slice(1);
+    byId("status").classList.toggle("problem", isProblem || !text);
     byId("status").classList.toggle("done", isDone);
   },
 

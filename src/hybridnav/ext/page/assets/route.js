@@ -48,6 +48,7 @@ export class Routes {
   chosen = 0;
   open = null; // the plan without closures and profile, while there are some
   grid = null; // the optimum on the grid
+  refusal = ""; // why there is no route
   lit = -1; // the line of the words that is lit, with its door
   #wanted = null;
   #underWay = 0;
@@ -269,10 +270,16 @@ export class Routes {
     this.byId("others-note").textContent = "";
     this.page.floors.note();
     this.#place(Boolean(route?.solved));
-    if (route && !route.solved) {
-      const status = t("no-route", said(route.status));
-      this.page.say(route.why && this.profile ? t("no-route", said(route.why)) : [status, route.why].filter(Boolean).join(". "), true);
-    }
+    const before = this.refusal;
+    this.refusal = this.#refusalOf(route);
+    if (this.refusal !== before) this.page.say("");
+  }
+
+  #refusalOf(route) {
+    if (!route || route.solved) return "";
+    if (route.why && this.profile) return t("no-route", said(route.why));
+    if (!route.why && this.open?.solved) return t("no-route", t("all-closed"));
+    return [t("no-route", said(route.status)), route.why].filter(Boolean).join(". ");
   }
 
   // On a phone the way stands above the controls: it is what somebody reads while walking.
@@ -297,9 +304,12 @@ export class Routes {
 
   #rowsForStaff(route) {
     const rows = [["length", shortly(route)]];
-    const more = this.open?.solved ? amountOf(route) - amountOf(this.open) : 0;
-    if (more > 0.5) rows.push(["detour", t(this.profile ? "detour-profile" : "detour-staff", someMetres(more))]);
-    else if (this.profile && this.open?.solved) rows.push(["detour", t("no-detour")]);
+    if (!this.open?.solved) return rows;
+    const metresMore = route.length_m - this.open.length_m;
+    const minutesMore = Math.round(((route.travel_s ?? 0) - (this.open.travel_s ?? 0)) / 60);
+    const more = [metresMore > 0.5 && someMetres(metresMore), minutesMore > 0 && t("min", minutesMore)].filter(Boolean).join(", ");
+    if (more) rows.push(["detour", t(this.profile ? "detour-profile" : "detour-staff", more)]);
+    else if (this.profile) rows.push(["detour", t("no-detour")]);
     return rows;
   }
 

@@ -18,7 +18,8 @@ export function remember(change) {
 }
 
 export function t(key, ...values) {
-  return TABLES[settings.language][key].replaceAll(/\{(\d)\}/g, (_, at) => values[at]);
+  const words = values.map((value) => (typeof value === "number" ? value.toLocaleString(settings.language, { useGrouping: false }) : value));
+  return TABLES[settings.language][key].replaceAll(/\{(\d)\}/g, (_, at) => words[at]);
 }
 
 // A profile that every building has goes by a name of the language, another one by its own.
