@@ -74,12 +74,9 @@ class Shown:
     def take(self, which: str, text: str) -> None:
         """Type the name of an end, and take the first room that the page offers for all of it."""
         self.page.fill(f"#{which}", text)
-        self.wait(
-            f"(list => list.dataset.of === '{text}' && !list.hidden)"
-            f"(document.getElementById('{which}-list'))"
-        )
+        self.page.wait_for_selector(f"#{which}-list[data-asked='{text}'] li")
         self.page.keyboard.press("Enter")
-        self.wait(f"document.querySelector('#{which}-list').hidden")
+        self.wait(f"!document.getElementById('{which}-star').disabled")  # a room is the end
 
     def mode(self, name: str) -> None:
         """Choose what a click on the map means."""

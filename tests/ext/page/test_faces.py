@@ -325,10 +325,14 @@ def test_every_text_of_the_page_stands_in_the_tables() -> None:
             "so ist keiner erlaubt. Es gibt einen über Treppen (east stairs)",
         ),
         (
-            "profile a forbids every route: the way is by private rooms (x) and stairs, or by "
-            + "places less than 1.00 m wide (door 3, 0.80 m wide)",
-            "so ist keiner erlaubt. Es gibt einen über private Räume (x) und Treppen, oder über "
-            + "Stellen unter 1.00 m Breite (Tür 3, 0.80 m breit)",
+            (
+                "profile a forbids every route: the way is by private rooms (x) and stairs, or by "
+                "places less than 1.00 m wide (door 3, 0.80 m wide)"
+            ),
+            (
+                "so ist keiner erlaubt. Es gibt einen über private Räume (x) und Treppen, oder "
+                "über Stellen unter 1.00 m Breite (Tür 3, 0.80 m breit)"
+            ),
         ),
         ("the line does not cut 'a' in two", "die Linie teilt 'a' nicht"),
     ],

@@ -55,7 +55,7 @@ export class Ends {
     this.#list(which, text);
   }
 
-  #list(which, text = this.byId(`${which}-list`).dataset.of) {
+  #list(which, text = this.byId(`${which}-list`).dataset.asked) {
     const { floors } = this.page;
     const items = this.#found[which].map((each, at) => {
       const where = floors.named(each.floor, (name) => t("on-floor", name));
@@ -65,7 +65,7 @@ export class Ends {
       return item;
     });
     this.byId(`${which}-list`).replaceChildren(...items);
-    this.byId(`${which}-list`).dataset.of = text;
+    this.byId(`${which}-list`).dataset.asked = text;
     this.byId(`${which}-list`).hidden = !items.length;
     const field = this.byId(which);
     field.ariaExpanded = String(items.length > 0);
@@ -161,10 +161,6 @@ export class Ends {
   async #favour(which) {
     const { routes, link } = this.page;
     const end = routes.ends[which];
-    if (!end?.name) {
-      this.page.say(t("favour-what"), true);
-      return;
-    }
     const kept = !this.#favourites.has(this.textOf(end.floor, end.name));
     this.#mark(end, kept);
     this.showStars();
@@ -177,6 +173,10 @@ export class Ends {
   }
 
   showStars() {
-    for (const which of ["start", "goal"]) this.byId(`${which}-star`).ariaPressed = String(this.#favourites.has(this.page.routes.ends[which]?.text));
+    for (const which of ["start", "goal"]) {
+      const [star, end] = [this.byId(`${which}-star`), this.page.routes.ends[which]];
+      star.disabled = !end?.name;
+      star.ariaPressed = String(this.#favourites.has(end?.text));
+    }
   }
 }
