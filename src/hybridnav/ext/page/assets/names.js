@@ -72,8 +72,12 @@ export class Names {
       return;
     }
     const { room } = await this.page.link.post("at", { point });
-    await this.choose(room ?? "");
-    if (room) this.byId("room-name").select();
+    const outlined = this.choose(room ?? "");
+    if (room && !matchMedia("(pointer: coarse)").matches) { // the keys of a phone hide the map
+      this.byId("room-name").focus();
+      this.byId("room-name").select();
+    }
+    await outlined;
   }
 
   use(tool) {
