@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+import os
 from dataclasses import asdict
-from getpass import getuser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -106,11 +105,8 @@ def change_closed(
         check(OutOfOrder(what, why=why or ""))
     for what in known if "all" in open_again else open_again:
         journal.open(what)
-    by = ""
-    with suppress(OSError, KeyError, ImportError):  # there need not be a name for the user
-        by = getuser()
     for what in close:
-        journal.close(what, why=why or "", by=by)
+        journal.close(what, why=why or "", by=os.environ.get("USER", ""))
 
 
 def list_closed(map_file: Path, *, as_json: bool) -> None:
@@ -126,7 +122,6 @@ def list_closed(map_file: Path, *, as_json: bool) -> None:
     width = max((len(item.what) for item in items), default=0)
     lines = [f"closed     {len(items)}" + (f", in {printable(journal.path)}" if items else "")]
     for item in items:
-        since = f"since {item.since} UTC" if item.since else ""
-        facts = since, item.by and f"by {item.by}", item.why
+        facts = item.since and f"since {item.since} UTC", item.by and f"by {item.by}", item.why
         lines.append(f"{item.what:<{width}}  {', '.join(filter(None, facts))}".rstrip())
     answer("\n".join(lines) + "\n")

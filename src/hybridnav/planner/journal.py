@@ -64,8 +64,7 @@ class OutOfOrder:
 
     def __post_init__(self) -> None:
         """Refuse what names nothing."""
-        texts = {name: getattr(self, name) for name in _KEYS}
-        for name, text in texts.items():
+        for name, text in asdict(self).items():
             if not isinstance(text, str) or len(text) > _MOST_TEXT or not text.isprintable():
                 raise InvalidValueError(
                     f"{name} must be one line of at most {_MOST_TEXT} characters, got {brief(text)}"
@@ -197,8 +196,7 @@ class Journal:
         MapError
             When the journal cannot be read or written.
         """
-        since = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
-        made = OutOfOrder(what, since, why, by)
+        made = OutOfOrder(what, f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S}", why, by)
         with self._alone() as items:
             others = [item for item in items if item.what != what]
             if len(others) >= _MOST_ITEMS:

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
 
+_OPTIMUM = {"preset": GRID, "brief": True}
 _MOST_BYTES = 2_000_000
 """Size of a request's body."""
 _HEADERS = (
@@ -150,7 +151,7 @@ class _Answers:
 
     def routes(self, at: str, *, allow_edits: bool) -> list[Route]:
         """Return the routes below a path: those of the whole site, and those of its floors."""
-        floor = f"{at}/floor/{{floor}}"
+        floor, on = f"{at}/floor/{{floor}}", self._session
         tools = extension("formats", "tools").HttpTools(
             self._session, _body, allow_edits=allow_edits
         )
@@ -159,23 +160,14 @@ class _Answers:
             f"{at}/state.json": lambda _: self._shown.state(),
             f"{at}/closed.json": lambda _: self._shown.site.changes(),
             f"{floor}/map.json": lambda request: self._floor(request).describe(),
-            f"{floor}/rooms.json": lambda request: self._session(request).describe_rooms(),
-            f"{floor}/outlines.json": lambda request: self._session(request).outlines(),
-            f"{floor}/graph/{{level}}.json": lambda request: self._session(request).graph(
-                request.path_params["level"]
-            ),
-            f"{floor}/costs/{{preset}}.json": lambda request: self._session(request).costs(
-                request.path_params["preset"]
-            ),
+            f"{floor}/rooms.json": lambda request: on(request).describe_rooms(),
+            f"{floor}/outlines.json": lambda request: on(request).outlines(),
+            f"{floor}/graph/{{level}}.json": lambda one: on(one).graph(one.path_params["level"]),
+            f"{floor}/costs/{{preset}}.json": lambda one: on(one).costs(one.path_params["preset"]),
         }
         posts: dict[str, tuple[type[BaseModel], Callable[[Request, Any], Any]]] = {
             f"{at}/plan": (PlanQuery, lambda _, query: self._planned(query)),
-            f"{at}/optimum": (
-                PlanQuery,
-                lambda _, query: self._planned(
-                    query.model_copy(update={"preset": GRID, "brief": True})
-                ),
-            ),
+            f"{at}/optimum": (PlanQuery, lambda _, query: self._planned(query, **_OPTIMUM)),
             f"{at}/closed": (
                 ClosingChange,
                 lambda _, change: self._shown.site.closings.describe(change),
@@ -186,17 +178,14 @@ class _Answers:
             ),
             f"{at}/find": (Find, lambda _, asked: self._finder.find(self._shown.site, asked)),
             f"{at}/favour": (Favour, lambda _, asked: self._finder.favour(self._shown.site, asked)),
-            f"{floor}/stand": (Stand, lambda request, asked: self._session(request).stand(asked)),
-            f"{floor}/at": (
-                At,
-                lambda request, asked: {"room": self._session(request).room_at(asked.point)},
-            ),
-            f"{floor}/edit": (Edit, lambda request, asked: self._session(request).edit(asked)),
+            f"{floor}/stand": (Stand, lambda request, asked: on(request).stand(asked)),
+            f"{floor}/at": (At, lambda request, asked: on(request).room_at(asked)),
+            f"{floor}/edit": (Edit, lambda request, asked: on(request).edit(asked)),
             f"{floor}/undo": (
                 Undo,
-                lambda request, asked: self._session(request).undo(asked.version),
+                lambda request, asked: on(request).undo(asked.version),
             ),
-            f"{floor}/save": (Save, lambda request, asked: self._session(request).save(asked)),
+            f"{floor}/save": (Save, lambda request, asked: on(request).save(asked)),
         }
         files = {at: self._export, floor: self._export_floor}
         tile = f"{floor}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
@@ -219,8 +208,8 @@ class _Answers:
         """Return the session of the floor in an address, once it is there."""
         return self._shown.site.floor(request.path_params["floor"])
 
-    def _planned(self, query: PlanQuery) -> dict[str, Any]:
-        return self._shown.site.routes(query).plan(query)
+    def _planned(self, query: PlanQuery, **update: Any) -> dict[str, Any]:
+        return self._shown.site.routes(query).plan(query.model_copy(update=update))
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
         site, query = self._shown.site, checked(PartQuery, value) if value else None

@@ -133,23 +133,21 @@ class Favour(_Strict):
     kept: bool
 
 
-class Edit(_Strict):
-    """A change of the rooms that everybody saw at a version."""
-
-    version: Annotated[int, Field(ge=0, le=10**9)]
-    change: Annotated[dict[str, Any], Field(max_length=8)]
-
-
 class Undo(_Strict):
     """Take the last change of a version back."""
 
     version: Annotated[int, Field(ge=0, le=10**9)]
 
 
-class Save(_Strict):
+class Edit(Undo):
+    """A change of the rooms that everybody saw at a version."""
+
+    change: Annotated[dict[str, Any], Field(max_length=8)]
+
+
+class Save(Undo):
     """Write the rooms of a version; `replace` writes over a file that others have changed."""
 
-    version: Annotated[int, Field(ge=0, le=10**9)]
     replace: bool = False
 
 
@@ -188,12 +186,7 @@ class Move(_Strict):
 
 
 Change = Rename | Merge | Split | Move
-_KINDS: dict[str, type[Change]] = {
-    "rename": Rename,
-    "merge": Merge,
-    "split": Split,
-    "move": Move,
-}
+_KINDS: dict[str, type[Change]] = {"rename": Rename, "merge": Merge, "split": Split, "move": Move}
 _T = TypeVar("_T", bound=BaseModel)
 
 

@@ -12,16 +12,15 @@ from hybridnav.ext.page.answers import in_grid, in_metres
 from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
-from hybridnav.maps import RoomLabels
 from hybridnav.maps.names import natural_key
 from hybridnav.planner.named import check_names
 from hybridnav.topology.rooms.choices import free_point, room_near
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from hybridnav.ext.page.kept import RoomsFile
-    from hybridnav.ext.page.requests import Change, Edit, Save, Stand
+    from hybridnav.ext.page.requests import At, Change, Edit, Save, Stand
     from hybridnav.ext.page.tiles import Layer
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
@@ -215,9 +214,9 @@ class Session:
 
     # --- rooms
 
-    def room_at(self, point: Sequence[float]) -> str | None:
+    def room_at(self, asked: At) -> dict[str, str | None]:
         """Return the room of a point in grid units, None for no room."""
-        return self.rooms.at(in_metres(point, self.grid), self.grid)
+        return {"room": self.rooms.at(in_metres(asked.point, self.grid), self.grid)}
 
     def stand(self, asked: Stand) -> dict[str, Any]:
         """Return where a robot may stand in a room, nearest to a point, and how far that is away.

@@ -186,8 +186,7 @@ class Site:
         return {"ready": True, "stage": ""}
 
     def changes(self) -> dict[str, Any]:
-        """Return what other pages and programs may have changed: what is out of order, and the
-        version of the rooms of each floor."""
+        """Return what others may have changed: the journal, and the version of each floor."""
         versions = [session.version for session in self.sessions]
         return self.closings.describe() | {"versions": versions}
 
