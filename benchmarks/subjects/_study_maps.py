@@ -85,7 +85,7 @@ def _fits(path: Path, globs: Sequence[str]) -> bool:
 
 
 def _movingai_maps(data: Path) -> list[Path]:
-    """Return twelve maps or what there is, the folders in turn, each folder's in alphabetical order."""
+    """Return twelve maps, or all, the folders in turn, each in alphabetical order."""
     by_folder = [sorted((data / "movingai" / name).rglob("*.map")) for name in MOVINGAI_FOLDERS]
     with_pairs = [[m for m in maps if m.with_name(f"{m.name}.scen").exists()] for maps in by_folder]
     turns = max(map(len, with_pairs))
