@@ -185,7 +185,7 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     if lengths["loads"]:
         start, end, most = lengths["loads"]
         # The first reading remembers the answers before the pass, if they took more processes.
-        what = ", of what came before" if start > most else ""
+        what = " (left by earlier work)" if start > most else ""
         text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
         facts.append(("load in the timing pass", f"{text} 1 was the study's"))
     checked = [
