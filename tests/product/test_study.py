@@ -52,7 +52,7 @@ def test_quoted_figures_are_those_of_the_study(quote, published):
 
 
 def test_the_figures_of_rooms_beside_the_peers_are_those_of_their_page():
-    lines = (DOCS / "rooms.md").read_text(encoding="utf-8").splitlines()
+    lines = (DOCS / "explanation/how-rooms-are-found.md").read_text("utf-8").splitlines()
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
     (head,) = [row for row in rows if row[:2] == ["building", "method"]]
     (means,) = [row for row in rows if row[:2] == ["mean of all", "judged, unseen"]]
