@@ -209,6 +209,18 @@ def draw_cut(file: Path) -> None:
     save_figure(ax, file, dpi=130)
 
 
+def draw_gallery() -> None:
+    """Run each example that draws, and keep its picture."""
+    (IMAGES / "gallery").mkdir(exist_ok=True)
+    for file in sorted((IMAGES / "gallery").glob("*.png")):
+        script = ROOT / "examples" / f"{file.stem}.py"
+        subprocess.run([sys.executable, script], cwd=ROOT, check=True)  # noqa: S603 - ours
+        with Image.open(ROOT / "out" / file.name) as image:
+            image.thumbnail((900, 1400))
+            image.save(file)
+        shrink(file)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -232,3 +244,4 @@ if __name__ == "__main__":
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)
+    draw_gallery()

@@ -54,23 +54,30 @@ class StudyMap:
 
 
 def maps_of(data: Path, globs: Sequence[str] = ()) -> list[StudyMap]:
-    """Return the maps of the study in a folder, or those of them whose paths fit.
+    """Return the maps of the study that are in a folder, or those of them whose paths fit.
 
     Raises
     ------
     InvalidValueError
-        When a map is not there, or none fits.
+        When none is there, or none fits.
     """
     maps = [StudyMap(data / name, "ROS") for name in ROS_MAPS]
     maps += [StudyMap(data / name, "SLAM") for name in RAW_MAPS]
-    lost = [one.path for one in maps if not one.path.is_file()]
-    if lost:
-        raise InvalidValueError(f"map {lost[0].relative_to(data)} of the study is not in {data}")
+    maps = [one for one in maps if one.path.is_file()]
     maps += [StudyMap(path, "MovingAI", f"{path}.scen") for path in _movingai_maps(data)]
+    if not maps:
+        raise InvalidValueError(f"no map of the study is in {data}: python -m benchmarks fetch")
     fit = [one for one in maps if not globs or _fits(one.path.relative_to(data), globs)]
     if not fit:
         raise InvalidValueError(f"no map of the study fits {' or '.join(globs)}")
     return fit
+
+
+def lost_of(data: Path) -> list[str]:
+    """Return what of the study is not in a folder, one line each."""
+    lost = [name for name in (*ROS_MAPS, *RAW_MAPS) if not (data / name).is_file()]
+    n_lost = N_MOVINGAI - len(_movingai_maps(data))
+    return lost + ([f"{n_lost} maps of MovingAI with scenarios"] if n_lost else [])
 
 
 def _fits(path: Path, globs: Sequence[str]) -> bool:
@@ -78,13 +85,9 @@ def _fits(path: Path, globs: Sequence[str]) -> bool:
 
 
 def _movingai_maps(data: Path) -> list[Path]:
-    """Return twelve maps, the folders in turn, each folder's in alphabetical order."""
+    """Return twelve maps, or all, the folders in turn, each in alphabetical order."""
     by_folder = [sorted((data / "movingai" / name).rglob("*.map")) for name in MOVINGAI_FOLDERS]
     with_pairs = [[m for m in maps if m.with_name(f"{m.name}.scen").exists()] for maps in by_folder]
     turns = max(map(len, with_pairs))
     order = [maps[turn] for turn in range(turns) for maps in with_pairs if turn < len(maps)]
-    if len(order) < N_MOVINGAI:
-        raise InvalidValueError(
-            f"the study needs {N_MOVINGAI} MovingAI maps with scenarios, {data} has {len(order)}"
-        )
     return order[:N_MOVINGAI]

@@ -73,8 +73,10 @@ of all records; this is {_how_much(data)}. Every number below comes from
 `docs/data/study.json`, which a script fills from the records. [The harness](harness.md) describes
 the checks and the columns.
 
+## The answers on one page
+
 {in_short(data)}
-## Circumstances
+{_charts(data)}## Circumstances
 
 {_listed(circumstances(data))}
 {rules(data)}
@@ -86,9 +88,27 @@ the checks and the columns.
         text += f"## {TITLES[name]}\n\n{about(data, name)}\n\n"
         own = [table for table in tables if table.part == name]
         text += "".join(map(_section, own))
-        text += "".join(f"![{what}](images/{file})\n\n" for file, what in CHARTS[name])
+        text += "" if name in _FIRST else _pictures(name)
     text += "".join(_section(table, "##") for table in tables if not table.part)
     return f"{text}## Beside published figures\n\n{to_markdown(PUBLISHED)}"
+
+
+_FIRST = {
+    "lengths": "What is lost, and what it buys in time:",
+    "costs": "The same where a path costs more near obstacles:",
+}
+"""Parts whose charts stand on the page of answers, and what leads to them."""
+
+
+def _charts(data: Data) -> str:
+    """Return the charts of the answers."""
+    return "".join(
+        f"{lead}\n\n{_pictures(name)}" for name, lead in _FIRST.items() if name in data["parts"]
+    )
+
+
+def _pictures(name: str) -> str:
+    return "".join(f"![{what}](images/{file})\n\n" for file, what in CHARTS[name])
 
 
 def _section(table: StudyTable, level: str = "###") -> str:
@@ -185,7 +205,7 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     if lengths["loads"]:
         start, end, most = lengths["loads"]
         # The first reading remembers the answers before the pass, if they took more processes.
-        what = ", of what came before" if start > most else ""
+        what = " (left by earlier work)" if start > most else ""
         text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
         facts.append(("load in the timing pass", f"{text} 1 was the study's"))
     checked = [

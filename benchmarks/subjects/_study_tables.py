@@ -125,7 +125,7 @@ def _table(
 
 
 _NOTES = {
-    "consistency": "Contradictions of checks, by kind; empty where nothing was to check.",
+    "consistency": "Contradictions of checks, by kind. A cell is empty if that check had no case.",
     "loss octile": "The loss of the plan is that of the best path of cells inside its regions; in "
     "order, of the best that passes them as the plan does. The presets that read the plan off a "
     "path have zeros by construction. A path may be better than its plan: `paper` and "
@@ -140,8 +140,8 @@ _NOTES = {
     "graphs": "Nodes of all maps in the mean, and each passage as one edge; routes join a graph at "
     "the nearest node in sight. The figures of each over the pairs that it and all methods of the "
     "tables of losses solved.",
-    "others": "Each method over the pairs that it and all methods of the tables above solved; "
-    "beside its speed-up those of our presets over the same pairs.",
+    "others": "Each method over the pairs that it and all methods of the tables above solved. "
+    "Our presets' speed-ups over the same pairs stand beside its own.",
 }
 
 

@@ -12,8 +12,9 @@ A run that was stopped goes on where it was. DIR, else out/study or out/study-wh
 
 The checkout gets `docs/data/study.json` with the figures of all tables, and from these
 `docs/study.md`, the charts in `docs/images`, and every quoted figure in the README, the
-documentation and the paper. With --map, --part, --pairs or --repeat the pages stay in DIR/docs, and
-no quote changes: it is not the study.
+documentation and the paper. With --map, --part, --pairs or --repeat, or where
+maps are missing, the pages stay in DIR/docs, and no quote changes: it is not the study. Missing
+maps are listed, and the others run; `python -m benchmarks fetch FOLDER` gets them.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from typing import TYPE_CHECKING
 from benchmarks.common import DATA, ROOT, Refused, option
 from benchmarks.subjects._study_archive import write_archive
 from benchmarks.subjects._study_data import collect
-from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects._study_maps import lost_of, maps_of
 from benchmarks.subjects._study_page import page
 from benchmarks.subjects._study_pdf import charts_of, write_charts, write_pdf
 from benchmarks.subjects._study_quotes import QUOTES, quoted, update
@@ -120,9 +121,11 @@ def main(given: Namespace) -> int:
     began = time.monotonic()
     own = {"pairs": given.pairs, "ompl_pairs": given.pairs, "repeat": given.repeat}
     plan = replace(PLANS[given.study], **{key: n for key, n in own.items() if n is not None})
-    is_whole = plan == PLANS[given.study] and not given.map and not given.part
-    plan = plan if is_whole else replace(plan, name=PART)
     data = given.data.resolve()
+    lost = lost_of(data)
+    sys.stderr.writelines(f"not in {data}, left out: {name}\n" for name in lost)
+    is_whole = plan == PLANS[given.study] and not given.map and not given.part and not lost
+    plan = plan if is_whole else replace(plan, name=PART)
     try:
         maps = maps_of(data, given.map)
         parts = [part for part in parts_of(plan) if given.part in {None, part.name}]

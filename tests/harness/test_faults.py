@@ -135,7 +135,7 @@ def test_every_column_of_the_report_is_explained(folder, study):
 
 
 def test_the_page_on_the_harness_explains_the_same_columns():
-    page = (ROOT / "docs" / "harness.md").read_text()
+    page = (ROOT / "docs" / "reference" / "harness-columns.md").read_text()
     for column, meaning in MEANINGS.items():
         assert f"| {column} | {meaning} |" in page
 

@@ -140,11 +140,11 @@ def behaviour() -> dict[str, str]:
         (
             "docs/index.md",
             {
-                "chooses the route on the places first": "chosen on places",
-                "finds the shortest path of cells": "read off the path",
-                "finds a path that keeps its distance": "read off the path",
-                "finds the shortest path of a disc": "read off the path",
-                "searches the whole grid": "read off the path",
+                "comes first, on the places": "chosen on places",
+                "the shortest of cells, on [a graph": "read off the path",
+                "keeps its distance by [costs]": "read off the path",
+                "the shortest of a disc at any angle": "read off the path",
+                "on the whole grid": "read off the path",
             },
         ),
         (

@@ -61,8 +61,9 @@ def _examples_of(page: str) -> list[Example]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What a reader has after `make route`: the project's maps, and a folder for results."""
-    shutil.copytree(ROOT / "maps", tmp_path / "maps")
+    """What a reader has after `make route`: maps, examples, and a folder for results."""
+    for name in ("maps", "examples"):
+        shutil.copytree(ROOT / name, tmp_path / name)
     (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)  # as where Python is started

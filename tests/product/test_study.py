@@ -22,8 +22,11 @@ SECTIONS = [
     "Statement of need",
     "State of the field",
     "Software design",
+    "What was reproduced",
     "Measurements",
+    "Research impact",
     "Limitations",
+    "Use of generative AI",
     "References",
 ]
 
@@ -49,7 +52,7 @@ def test_quoted_figures_are_those_of_the_study(quote, published):
 
 
 def test_the_figures_of_rooms_beside_the_peers_are_those_of_their_page():
-    lines = (DOCS / "rooms.md").read_text(encoding="utf-8").splitlines()
+    lines = (DOCS / "explanation/how-rooms-are-found.md").read_text("utf-8").splitlines()
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
     (head,) = [row for row in rows if row[:2] == ["building", "method"]]
     (means,) = [row for row in rows if row[:2] == ["mean of all", "judged, unseen"]]
@@ -78,7 +81,7 @@ def test_the_paper_has_the_sections_and_the_length_of_its_journal():
     assert about["bibliography"] == "paper.bib"
     assert [author["name"] for author in about["authors"]] == ["The hybridnav developers"]
     assert re.findall(r"^# (.+)$", body, re.MULTILINE) == SECTIONS
-    assert 750 <= len(body.split()) <= 1250
+    assert 750 <= len(body.split()) <= 1750
 
 
 def test_the_paper_cites_what_its_bibliography_has_and_nothing_else():
@@ -99,7 +102,7 @@ def test_every_figure_of_the_papers_measurements_is_the_studys():
 def test_the_citation_names_the_paper():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     title = yaml.safe_load(PAPER.read_text(encoding="utf-8").split("---\n")[1])["title"]
-    assert title in [one["title"] for one in citation["references"]]
+    assert title == citation["preferred-citation"]["title"]
 
 
 def test_no_page_of_an_older_study_is_left():

@@ -138,7 +138,7 @@ DEFINITION = (
     "metric path maps to a walk over regions, and both agree on whether there is a path. "
     "Connectivity is computed by scipy, not by the planners. Beside these the harness checks that "
     "paths are paths and that bounds hold. A cell reads: contradictions of checks; it is empty "
-    "where nothing was to check. A plan that is read off a path is consistent with it by "
+    "if that check had no case. A plan that is read off a path is consistent with it by "
     "construction, and loses nothing: its zeros say that the reading is right, no more."
 )
 """What the table of consistency holds."""

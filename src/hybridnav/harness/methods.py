@@ -209,7 +209,7 @@ def named_spec(
     """
     if method.grid and by_costs:
         raise InvalidValueError(
-            f"method {method.name or method.source}: a grid of its own goes not with costs: "
+            f"method {method.name or method.source}: its own grid cannot be used with costs: "
             "leave out one of them"
         )
     if method.kind in {"baseline", "class"}:

@@ -305,11 +305,8 @@ class Privacy:
             path = planner.draft(*ends, blocked=blocked).result().path
             if path is None or planner.guide is None:
                 return None
-            doors = [leg.door for leg in planner.guide.legs(path) if leg.door is not None]
             rooms = planner.topology.rooms.labels
-            labels = rooms.label_of[tuple(path.cells.T)].tolist()
-            inner = [label for label in labels if label not in {labels[0], labels[-1]}]
-            return in_the_way(self.profile, rooms, inner, doors)
+            return in_the_way(self.profile, rooms, planner.guide, path)
 
         facts = {"name": self.profile.name, "asks": self.profile.described}
         if not result.solved and not isinstance(blocked, ClosedCells):

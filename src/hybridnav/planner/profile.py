@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planner import PlannerSettings, Preset
+    from hybridnav.planner.guide.itinerary import Guide
+    from hybridnav.planner.path import Path
     from hybridnav.search.found import ClosedCells
-    from hybridnav.topology.rooms import Door
 
 _MOST_ELSEWHERE, _MOST_M = 10.0, 100.0
 _ROUNDING_M = 1e-6
@@ -141,6 +142,20 @@ def layer_of(profile: Profile, rooms: RoomLabels | None, grid: OccupancyGrid) ->
     return CostLayer(factors, source={"kind": "profile", "name": profile.name})
 
 
+def rebuilt(topology: TopologicalMap, grid: OccupancyGrid) -> TopologicalMap:
+    """Return a topological map of another grid, built with the settings and rooms of this one."""
+    built = topology.pyramid
+    return TopologicalMap(
+        DualGraphPyramid.build(
+            grid,
+            merge_distance_m=built.merge_distance_m,
+            linkage=built.linkage,
+            seed=built.seed,
+            rooms=built.rooms,
+        )
+    )
+
+
 def under_profile(
     topology: TopologicalMap,
     preset: Preset,
@@ -162,21 +177,13 @@ def under_profile(
         Whether it plans by costs, also where each metre counts one: floors of a building plan by
         one method. Where the preset knows lengths only, the cells of the whole map are searched.
     """
-    grid, built = topology.grid, topology.pyramid
+    grid, rooms = topology.grid, topology.pyramid.rooms
     if profile.width_m is not None:
         radius_m = max(profile.width_m / 2 - _ROUNDING_M, 0.0)
         grid = replace(grid, robot_radius_m=radius_m, radius_is_default=False)
-        topology = TopologicalMap(
-            DualGraphPyramid.build(
-                grid,
-                merge_distance_m=built.merge_distance_m,
-                linkage=built.linkage,
-                seed=built.seed,
-                rooms=built.rooms,
-            )
-        )
+        topology = rebuilt(topology, grid)
     if by_costs:
-        layer = layer_of(profile, built.rooms, grid)
+        layer = layer_of(profile, rooms, grid)
         given = layer if given is None else given * layer
         if preset.planner.refusal_of_costs():
             allowed = preset.planner.allow_unexplored
@@ -229,7 +236,6 @@ class ProfiledFloor:
         """Return the cells that may be entered, bool (rows, cols)."""
         is_open = self.grid.enterable(allow_unexplored=self.allow_unexplored)
         if shut is not None:
-            is_open = is_open.copy()
             is_open.ravel()[shut.flat] = False
         return is_open
 
@@ -274,7 +280,12 @@ def forbidden(profile: Profile, passed: Callable[[Profile], list[str] | None]) -
 
 
 def in_the_way(
-    profile: Profile, rooms: RoomLabels, labels: Iterable[int], doors: Iterable[Door]
+    profile: Profile,
+    rooms: RoomLabels,
+    guide: Guide,
+    path: Path,
+    *,
+    whole: tuple[bool, bool] = (True, True),
 ) -> list[str]:
     """Return what a path passes that a profile does not allow: private rooms, narrow doors.
 
@@ -282,16 +293,20 @@ def in_the_way(
     ----------
     profile
         The profile.
-    rooms
-        The rooms of the map.
-    labels
-        The rooms that a path under another profile passes, -1 for none, without those in which it
-        starts and ends.
-    doors
-        The doors that it passes.
+    rooms, guide
+        The rooms of the map, and what tells the doors of a path.
+    path
+        A path under another profile.
+    whole
+        Whether the route begins where the path begins, and ends where it ends: it may do so in any
+        room.
     """
-    names = [rooms.names[label] for label in dict.fromkeys(labels) if label != NO_ROOM]
+    labels = rooms.label_of[tuple(path.cells.T)].tolist()
+    own = {labels[place] for place, is_end in zip((0, -1), whole, strict=True) if is_end}
+    inner = [label for label in labels if label != NO_ROOM and label not in own]
+    names = [rooms.names[label] for label in dict.fromkeys(inner)]
     private = [name for name in names if rooms.uses.get(name, RoomUse()).private]
+    doors = [leg.door for leg in guide.legs(path) if leg.door is not None]
     narrow = [
         f"{door.kind} {door.number}, {door.width_m:.2f} m wide"
         for door in doors

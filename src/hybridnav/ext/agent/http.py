@@ -110,5 +110,5 @@ def description() -> dict[str, Any]:
 
 
 def _content(model: type[BaseModel]) -> dict[str, Any]:
-    """Return what OpenAPI says of JSON of a model; definitions stay inside its schema."""
+    """Return the OpenAPI content of a JSON body of this model, with its definitions inside."""
     return {"application/json": {"schema": schema_of(model)}}

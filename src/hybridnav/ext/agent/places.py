@@ -14,8 +14,7 @@ from hybridnav.errors import HybridNavError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key
 from hybridnav.planner import Blocked, HybridPlanner
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.topology import TopologicalMap
+from hybridnav.planner.profile import rebuilt
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -183,8 +182,4 @@ def tight_of(why: Explanation) -> dict[str, Any]:
 def narrowed(planner: HybridPlanner, radius_m: float) -> HybridPlanner:
     """Return the planner of a robot of another radius on the same map, with the same rooms."""
     grid = replace(planner.grid, robot_radius_m=radius_m)
-    before = planner.topology.pyramid
-    pyramid = DualGraphPyramid.build(
-        grid, merge_distance_m=before.merge_distance_m, rooms=before.rooms
-    )
-    return HybridPlanner(TopologicalMap(pyramid), preset=planner.preset)
+    return HybridPlanner(rebuilt(planner.topology, grid), preset=planner.preset)

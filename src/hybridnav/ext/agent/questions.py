@@ -121,7 +121,7 @@ class Answer(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     ok: bool
-    """Whether the question was answered; if not, `text` says what to do."""
+    """False if there is no answer; `text` then says what to ask or to change."""
     text: str
     """The answer in words."""
     choices: list[Room | dict[str, str]] | None = None
@@ -280,7 +280,7 @@ class Tool(NamedTuple):
 
     name: str
     asks: type[BaseModel]
-    """Its arguments; the docstring says what it is for."""
+    """The model of its arguments. The docstring of the model describes the tool to its callers."""
     gives: type[Answer]
     """What it returns."""
     edits: bool = False

@@ -124,12 +124,8 @@ def reason_under(
             guide, rooms = on[name].planner.guide, on[name].rooms
             if guide is None or rooms is None or result.path is None:
                 continue
-            labels = rooms.label_of[tuple(result.path.cells.T)].tolist()
-            own = {labels[0]} if number == 0 else set()
-            own |= {labels[-1]} if number == last else set()
-            doors = [leg.door for leg in guide.legs(result.path) if leg.door is not None]
-            inner = [label for label in labels if label not in own]
-            words += in_the_way(profile, rooms, inner, doors)
+            whole = number == 0, number == last
+            words += in_the_way(profile, rooms, guide, result.path, whole=whole)
         half_m = (profile.width_m or 0.0) / 2
         taken = [
             ride.link for ride in plan.rides if not ride.link.admits(half_m, stairs=profile.stairs)

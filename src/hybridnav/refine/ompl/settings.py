@@ -238,7 +238,7 @@ class OmplSettings(BaseModel):
         if self.space == "dubins" and self.planner in ROADMAPS:
             # Their roadmap is undirected: a motion checked one way would be driven the other.
             raise PydanticCustomError(
-                "roadmap", "space: dubins, whose curves run one way, goes not with PRM or PRMstar"
+                "roadmap", "PRM and PRMstar refuse space: dubins, whose curves run one way"
             )
         if self.smooth and self.space not in {"r2", "se2"}:
             raise PydanticCustomError("smooth", "smooth: true goes with space: r2 or se2")
@@ -272,7 +272,7 @@ class OmplSettings(BaseModel):
         if self.parameters.get("intermediate_states"):
             # OMPL puts them on the straight interpolation, which the robot does not drive.
             raise PydanticCustomError(
-                "parameter", "intermediate_states: true goes not with space: differential"
+                "parameter", "space: differential refuses intermediate_states: true"
             )
         return self
 
