@@ -158,8 +158,7 @@ def check_chain(walls, proof, ends):
     need(walls[tuple(chain.T)].all() and (chain[0] == chain[-1]).all(), "no closed chain of walls")
     lower = np.where(chain[:-1, :1] < chain[1:, :1], chain[:-1], chain[1:])
     lower = lower[chain[:-1, 0] != chain[1:, 0]]
-    cells = np.floor(ends + 1e-9)
-    right = [((lower[:, 0] == row) & (lower[:, 1] > col)).sum() for row, col in cells]
+    right = [((lower == row)[:, 0] & (lower > col)[:, 1]).sum() for row, col in (ends + 1e-9) // 1]
     need(sum(right) % 2 == 1, "the chain does not part start and goal")
 
 
