@@ -172,12 +172,12 @@ def draw_potential(file: Path) -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     proof = hn.HybridPlanner(topology, preset="octile").plan(START, GOAL).proof()
     walls = np.pad(~grid.enterable(), 1, constant_values=True)
-    ends = np.array(proof["ends"]) // 2 + 1
     factors = np.full(walls.shape, check_proof.ONE)
-    bound = int(proof["bound"] / grid.resolution_m * (1 - 1e-9) * check_proof.UNIT)
-    p, tree, (top, left) = check_proof.check_potential(
-        check_proof.costs_of_cells, walls, factors, proof, ends, bound
+    path = check_proof.walk(*proof["path"])
+    p, tree = check_proof.check_cells(
+        walls, factors, proof, path[[0, -1]], proof["bound"] / grid.resolution_m * (1 - 1e-9)
     )
+    top, left = proof["box"][:2]
     outside = tree == 9  # noqa: PLR2004 - the mark of cells that the tree leaves out
     metres = np.where(outside, np.nan, p / check_proof.UNIT * grid.resolution_m)
     rows, cols = metres.shape
@@ -189,8 +189,7 @@ def draw_potential(file: Path) -> None:
     at = np.linspace(x, x_end, cols), np.linspace(y, y_end, rows)
     levels = np.arange(0, proof["bound"], 2)
     ax.contour(*at, metres, levels=levels, colors="white", linewidths=0.5, zorder=3)
-    path = grid.frame.points_of(check_proof.walk(*proof["path"]) - 1)
-    ax.plot(*path.T, color="crimson", linewidth=1.5, zorder=4)
+    ax.plot(*grid.frame.points_of(path - 1).T, color="crimson", linewidth=1.5, zorder=4)
     save_figure(ax, file, dpi=130)
 
 

@@ -4,8 +4,8 @@ The robot is a disc, or a point. Its centre moves over the *free* cells of a map
 as free, the proof does not close them, and no occupied cell is within the radius, from centre to
 centre. All others, and the outside, are *walls*: it may touch them, but not enter them, nor pass
 between two that meet at a corner. Accepted means: the path of the proof is free, it costs what is
-stated, and none costs less than the stated bound, to 1 part in 10^9 (or 10^-7 of a cell, to which
-the ends of lines are rounded). All else is decided in whole numbers, or rounded so that it rejects.
+stated, and none costs less than the stated bound, to 1 part in 10^9 (or 10^-6 of a cell, to which
+ends are rounded that are no centres). The rest is decided in whole numbers.
 MAP is a YAML file of ROS beside a PGM image, or a MovingAI map; the proof must be about that map.
 """
 
@@ -23,9 +23,13 @@ from pathlib import Path
 import numpy as np
 
 MOVES = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
-STRAIGHT, DIAGONAL = 195025, 275807  # the ratio is below sqrt(2), by 7 parts in 10^12
 ONE = 2**14  # the factor 1: a metre costs a metre
-UNIT = 2 * ONE * STRAIGHT
+# Costs of moves, straight and diagonal, and of a king with a tilt from 0 to 45 degrees.
+PLAIN = 195025, 275807  # the ratio is below sqrt(2), by 7 parts in 10^12
+UNIT = 2 * ONE * PLAIN[0]
+COS, SIN = np.cos(np.arange(17) * math.pi / 64), np.sin(np.arange(17) * math.pi / 64)
+TILTED = np.floor(PLAIN[0] * np.stack([COS, COS + SIN])).astype(int)
+LEVEL = 8  # the tilt that is taken where none is stated
 MOST = 1000  # cells that a radius has, lest a file takes hours
 
 
@@ -58,9 +62,8 @@ def read_map(path, thresholds):
     level = level if value["negate"].strip().lower() in {"1", "true", "yes", "on"} else level[::-1]
     occupancy, (low, high) = (level / 255).astype(np.float32), np.float32(thresholds)
     kinds = np.where(occupancy >= high, 0, np.where(occupancy <= low, 1, 2)).astype(np.uint8)
-    return kinds[pixels[: rows * cols].reshape(rows, cols)[::-1]], [
-        *map(float, [value["resolution"], *pose])
-    ]
+    frame = [float(number) for number in (value["resolution"], *pose)]
+    return kinds[pixels[: rows * cols].reshape(rows, cols)[::-1]], frame
 
 
 def squares(occupied, reach):
@@ -79,13 +82,15 @@ def squares(occupied, reach):
 def walls_of(measured, proof, side):
     """Return the walls, bool, with a rim round the map."""
     free = (measured == 1) | (measured == 2) & (proof["allow_unexplored"] is True)
-    if (radius := proof["radius_m"] / side) >= 1:
-        need(radius < MOST, "a radius of too many cells")
+    radius = proof["radius_m"] / side
+    need(0 <= radius < MOST, "a radius of too many cells, or none")
+    if radius >= 1:
         most = math.floor(radius * radius * (1 + 1e-9))
         free &= squares(measured == 0, math.isqrt(most)) > most
+    last = -1
     for first, end in proof["closed"]:
-        need(0 <= first < end <= free.size, "a closed cell is outside the map")
-        free.ravel()[first:end] = False
+        need(last < first < end <= free.size, "a closed cell is outside the map, or closed twice")
+        free.ravel()[first:end], last = False, end
     digest = hashlib.sha256(np.packbits(free).tobytes()).hexdigest()
     need(digest == proof["free_sha256"], "map, radius and closed cells leave other cells free")
     return np.pad(~free, 1, constant_values=True)
@@ -110,7 +115,32 @@ def factors_of(measured, costs, side):
 def walk(start, digits):
     """Return the cells of a walk, whose moves are digits from 0 to 7."""
     steps = MOVES[np.frombuffer(digits.encode(), np.uint8) - ord("0")]
-    return np.cumsum(np.concatenate([[start], steps]), axis=0) + 1
+    return np.cumsum(np.concatenate([np.array([start], int), steps]), axis=0) + 1
+
+
+def near(points):
+    """Return the cells (4, n) that points lie in, or between."""
+    return np.floor(points + 1e-7 * MOVES[1::2, None]).astype(int).transpose(2, 0, 1)
+
+
+def cost_of(walls, factors, line, is_strict):
+    """Return the cost of a chain of lines, infinite where it meets a wall. Cut where it enters
+    another cell, each part lies in a free cell, or beside one; cells in a row share a side, or a
+    corner and one free cell at it; two if it is strict."""
+    cost, middles = 0.0, [line[:1]]
+    for first, last in itertools.pairwise(line):
+        cuts = [np.arange(math.ceil(min(p)), max(p)) for p in zip(first, last, strict=True)]
+        parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
+        parts = np.sort(np.concatenate([[0.0, 1.0], *parts]))
+        lengths = np.diff(parts) * math.dist(first, last)
+        middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
+        cost += (factors[tuple(near(middle))].max(axis=0) * lengths).sum() / ONE
+        middles.append(middle[lengths > 1e-6])
+    row, col = near(np.concatenate(middles))
+    free, before = ~walls[row, col], np.maximum(np.arange(row.shape[1]) - 1, 0)
+    beside = ~walls[row, col[:, before]], ~walls[row[:, before], col]
+    by = beside[0] & beside[1] if is_strict else beside[0] | beside[1]
+    return cost if (free & free[:, before] & by).any(axis=0).all() else math.inf
 
 
 # NO PATH. A closed chain of walls, each beside the next by a side or a corner, goes round one end
@@ -121,74 +151,65 @@ def walk(start, digits):
 # one: one lies inside and one outside, and no path joins them.
 
 
-def check_no_path(walls, factors, proof, ends):
+def check_chain(walls, proof, ends):
     """Check that a chain of walls parts the ends."""
     chain = walk(*proof["chain"])
     need((chain >= 0).all() and (chain < walls.shape).all(), "the chain leaves the rim of the map")
     need(walls[tuple(chain.T)].all() and (chain[0] == chain[-1]).all(), "no closed chain of walls")
     lower = np.where(chain[:-1, :1] < chain[1:, :1], chain[:-1], chain[1:])
     lower = lower[chain[:-1, 0] != chain[1:, 0]]
-    right = [
-        ((lower[:, 0] == row) & (lower[:, 1] > col)).sum() for row, col in ends // proof["grain"]
-    ]
+    right = [((lower == row)[:, 0] & (lower > col)[:, 1]).sum() for row, col in (ends + 1e-9) // 1]
     need(sum(right) % 2 == 1, "the chain does not part start and goal")
-    return math.inf
 
 
 # A POTENTIAL is a number p for each node of a graph, so that no move raises p by more than it
 # costs. The moves of a path raise p by p(goal) - p(start) in all, so every path costs at least
 # that. Any such numbers prove. Here p is the cost of a walk back to the start, one move after the
 # other as the proof states them for some nodes, its tree. All others have p = bound - (the least
-# cost from there to the goal on an empty map), which no move raises by more than it costs: so only
-# moves from or to the tree are to be looked at, and all of them are. Costs are whole numbers, UNIT
-# a cell.
+# cost from there to the goal on an empty map), and the same holds outside of the box of the tree.
 
 
-def check_potential(costs_of, walls, factors, proof, ends, bound):
-    """Check a potential on a grid, from the costs of four of the MOVES, 0 where there is none;
-    return it, and where it begins."""
-    top, left, rows, cols = proof["box"]
-    part = np.s_[top : top + rows + 2, left : left + cols + 2]
-    costs = costs_of(walls[part], factors[part])
-    raw = zlib.decompressobj().decompress(base64.b85decode(proof["tree"]), rows * cols + 1)
-    tree = np.pad(np.frombuffer(raw, np.uint8).reshape(rows, cols), 1, constant_values=9)
-    need(
-        min(top, left) >= 0 and tree.shape == costs.shape[1:] and (tree < 10).all(), "a wrong tree"
-    )
-    (start, goal) = ends = ends - (top, left)
-    need(((ends > 0) & (ends <= (rows, cols))).all(), "an end is not in the box of the tree")
+def check_moves(costs, ahead, proof, ends, bound):
+    """Check a potential on the box of a tree with its rim, from the costs of four of the MOVES, 0
+    where there is none, and the costs of moves on an empty map; return it, and the tree."""
+    shape = costs.shape[1:]
+    tree = np.pad(unpacked(proof["tree"], np.subtract(shape, 2)), 1, constant_values=9)
+    start, goal = map(tuple, ends)
+    need((tree < 10).all() and (ends > 0).all() and (ends < np.subtract(shape, 1)).all(), "no tree")
     inside, before = np.flatnonzero(tree < 8), np.arange(tree.size)
     move = tree.ravel()[inside]
-    before[inside] += MOVES[move] @ [tree.shape[1], 1]
+    before[inside] += MOVES[move] @ [shape[1], 1]
     back = np.zeros(tree.size, np.int64)
     back[inside] = costs.reshape(4, -1)[move % 4, np.where(move < 4, inside, before[inside])]
     need((back[inside] > 0).all(), "a move of the tree meets a wall")
-    while len(inside) and (tree.ravel()[before[inside]] < 8).any():  # twice as far with each turn
+    while (tree.ravel()[before[inside]] < 8).any():  # twice as far with each turn
         need(back.max() < 2**61, "the tree has a cycle")
         back, before = back + back[before], before[before]
     need((tree.ravel()[before[inside]] == 8).all(), "a branch of the tree does not end at a root")
-    down, across = (abs(np.arange(n) - at) for n, at in zip(tree.shape, goal, strict=True))
-    ahead = np.maximum(down[:, None], across) * STRAIGHT
-    ahead += np.minimum(down[:, None], across) * (DIAGONAL - STRAIGHT)
-    p = np.where(tree == 9, bound - 2 * ONE * ahead, back.reshape(tree.shape))
+    costs[1:, -1] = costs[:2, :, -1] = costs[3, :, 0] = 0  # nodes beyond the rim
+    down, across = (abs(np.arange(n) - at) for n, at in zip(shape, goal, strict=True))
+    least = np.maximum(down[:, None], across) * ahead[0]
+    least += np.minimum(down[:, None], across) * (ahead[1] - ahead[0])
+    p = np.where(tree == 9, bound - 2 * ONE * least, back.reshape(shape))
     for cost, step in zip(costs, MOVES, strict=False):
-        there = np.roll(p, -step, (0, 1))
-        looked_at = ((tree < 9) | np.roll(tree < 9, -step, (0, 1))) & (cost > 0)
-        need((abs(p - there) <= cost)[looked_at].all(), "a move raises p by more than it costs")
-    need(p[tuple(start)] <= 0 and p[tuple(goal)] >= bound, "p does not rise by the bound")
-    return p, tree, (top, left)
+        rise = abs(p - np.roll(p, -step, (0, 1)))
+        need((rise <= cost)[cost > 0].all(), "a move raises p by more than it costs")
+    need(p[start] <= 0 and p[goal] >= bound, "p does not rise by the bound")
+    return p, tree
 
 
-def check_cells(walls, factors, proof, ends):
-    """Check a path of cells, whose nodes are the cells: diagonals need both cells beside them."""
-    path, ends = walk(*proof["path"]), ends // proof["grain"]
-    need((path[[0, -1]] == ends).all(), "the path has other ends")
-    beside = [path[1:] * (0, 1) + path[:-1] * (1, 0), path[1:] * (1, 0) + path[:-1] * (0, 1)]
-    need(not any(walls[tuple(cells.T)].any() for cells in (path, *beside)), "the path meets a wall")
-    bound = math.floor(proof["bound"] / proof["side_m"] * (1 - 1e-9) * UNIT)
-    check_potential(costs_of_cells, walls, factors, proof, ends, bound)
-    weights = factors[tuple(path.T)]
-    return (np.hypot(*np.diff(path, axis=0).T) * (weights[1:] + weights[:-1])).sum() / (2 * ONE)
+def unpacked(text, shape):
+    """Return an array of bytes from its text."""
+    size = math.prod(int(n) for n in shape)
+    raw = zlib.decompressobj().decompress(base64.b85decode(text), size + 1)
+    return np.frombuffer(raw, np.uint8).reshape(shape)
+
+
+def boxed(array, proof):
+    """Return the part of an array over nodes that the box of a tree has, with a rim."""
+    top, left, rows, cols = proof["box"]
+    need(min(proof["box"]) >= 0, "a wrong box")
+    return array[top : top + rows + 2, left : left + cols + 2]
 
 
 def costs_of_cells(walls, factors):
@@ -198,148 +219,162 @@ def costs_of_cells(walls, factors):
         by = [(0, 0), (down, across), (down, 0), (0, across)]
         shut = np.any([np.roll(walls, (-row, -col), (0, 1)) for row, col in by], axis=0)
         weight = factors + np.roll(factors, (-down, -across), (0, 1))
-        costs[n] = np.where(shut, 0, weight * (DIAGONAL if down * across else STRAIGHT))
+        costs[n] = np.where(shut, 0, weight * PLAIN[abs(down * across)])
     return costs
 
 
-# A LINE BY COSTS. Let a line cost K. Cut it where it enters another cell, and measure each part as
-# a king would walk it, along sides and diagonals: at most 1.0824 times as far. Slide the cuts along
-# their sides: the sum of these measures is linear but where two cuts lie opposite each other, so it
-# is least with all cuts at corners. Then it is the cost of moves along sides, by the cheaper of the
-# two cells, and across cells. So K is at least the least cost of such moves, over 1.0824, between
-# two corners near the ends, less the cost from the ends to these corners.
+def check_cells(walls, factors, proof, ends, bound):
+    """Check a potential that bounds all paths of cells; return it, and the tree."""
+    costs = costs_of_cells(boxed(walls, proof), boxed(factors, proof))
+    cells = np.floor(ends).astype(int) - proof["box"][:2]
+    return check_moves(costs, PLAIN, proof, cells, math.floor(bound * UNIT))
 
 
-def costs_of_corners(walls, factors):
+# A KING. By costs, take numbers a, b in each cell, the cosine and sine of a tilt times its factor.
+# Let a line cost K. Cut it where it enters another cell, and measure each part: a for the longer of
+# its two sides, along rows and columns, and b for the shorter one. That is no more than its cost,
+# as a^2 + b^2 is the square of the factor. Slide the cuts along the sides of cells: the sum of the
+# measures is linear but where two cuts lie opposite each other, so it is least with all cuts at
+# corners of cells. Then it is the cost of moves of a king over corners: along sides, by the cheaper
+# of two cells, and across cells. So K is at least the least cost of such moves between a corner of
+# the cell of each end, less the cost of straight lines from the ends to these corners.
+
+
+def costs_of_corners(walls, factors, tilts):
     """Return the costs of moves between corners of cells; corner (r, c) is below cell (r, c)."""
-    price = np.where(walls, 2**62, 2 * factors)
-    east, north = np.minimum(price, np.roll(price, 1, 0)), np.minimum(price, np.roll(price, 1, 1))
-    costs = np.stack([east, price, north, np.roll(price, 1, 1)])
-    return np.where(costs == 2**62, 0, costs) * np.array([STRAIGHT, DIAGONAL] * 2)[:, None, None]
+    side, across = np.where(walls, 2**62, 2 * factors * TILTED[:, tilts])
+    east, north = np.minimum(side, np.roll(side, 1, 0)), np.minimum(side, np.roll(side, 1, 1))
+    return np.stack([east, across, north, np.roll(across, 1, 1)]) % 2**62
 
 
-def check_line_by_costs(walls, factors, proof, ends):
-    """Check a line, its cost, and a potential of corners that bounds all others."""
-    line = free_line(walls, proof, ends).astype(float) / proof["grain"]
-    cost = 0.0
-    for first, last in itertools.pairwise(line):
-        cuts = [
-            np.arange(math.ceil(min(pair)), max(pair)) for pair in zip(first, last, strict=True)
-        ]
-        parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
-        parts = np.sort(np.concatenate([[0.0, 1.0], *parts]))
-        middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
-        cost += np.hypot(*(last - first)) * (dearest(factors, middle) * np.diff(parts)).sum() / ONE
-    ends, corners = line[[0, -1]], np.floor(line[[0, -1]] + 0.5).astype(int)
-    joins = (np.hypot(*(corners - ends).T) * dearest(factors, ends)).sum() / ONE
-    least = (proof["bound"] / proof["side_m"] * (1 - 1e-9) + joins) * math.sqrt(4 - math.sqrt(8))
-    wider = [np.pad(array, (0, 1), constant_values=1) for array in (walls, factors)]  # for the rim
-    if proof["bound"] > math.dist(*ends) * proof["side_m"]:  # as no factor is below 1
-        check_potential(costs_of_corners, *wider, proof, corners, math.floor(least * UNIT))
-    return cost
+def joins_of(factors, ends, corners):
+    """Return the cost from the ends of a line to corners of their cells."""
+    return (np.hypot(*(corners - ends).T) * factors[tuple(near(ends))].max(axis=0)).sum() / ONE
 
 
-def dearest(factors, points):
-    """Return the largest factor of the cells that points lie in, or between."""
-    near = [np.floor(points + off).astype(int).T for off in 1e-7 * MOVES[1::2]]
-    return np.max([factors[tuple(cells)] for cells in near], axis=0)
+def check_king(walls, factors, proof, ends, bound):
+    """Check a potential of corners that bounds all lines by their costs."""
+    corners = np.array(proof["corners"], int) + 1
+    need(corners.shape == ends.shape and (abs(corners - ends) < 1).all(), "corners of other cells")
+    bound += joins_of(factors, ends, corners)
+    walls, factors = (np.pad(array, (0, 1), constant_values=1) for array in (walls, factors))
+    walls, factors = boxed(walls, proof), boxed(factors, proof)
+    tilts = np.pad(unpacked(proof["tilts"], np.subtract(walls.shape, 2)), 1, constant_values=LEVEL)
+    costs, corners = costs_of_corners(walls, factors, tilts), corners - proof["box"][:2]
+    check_moves(costs, TILTED[:, LEVEL], proof, corners, math.floor(bound * UNIT))
 
 
-# A LINE. A shortest path is a chain of straight lines, like a taut string. It bends at *corners*
-# only, where one of four cells is a wall, and round that wall. Again p is a number, for start, goal
-# and each corner where a path that is shorter than the bound can be. If no line of such a chain
-# raises p by more than its length, no path is shorter than p(goal) - p(start). The proof states p
-# for some corners; elsewhere p = bound - (the distance to the goal), which rises by at most the
-# distance. So wherever two corners differ by more than their distance, and a string along the line
-# between them could bend at both, a wall must cut that line. That is decided in whole numbers.
+# STRINGS. A shortest path is a taut string: it bends at *corners* only, where one of four cells is
+# a wall, and round that wall. So a potential at start, goal and corners is enough: it must not rise
+# by more than the distance between two of them that see each other along a line that can bend round
+# both. The proof states p for some corners. Elsewhere, and where that is less, p = bound - (the
+# distance to the goal), which rises by at most the distance. So only what stated corners see is to
+# be looked at, what the start sees, and that the goal sees none whose p is too low.
+# What points see above them is swept up row by row: light from a point, between two directions,
+# falls through a run of free cells into the runs above it. A shaft of light is a point, a row of
+# cells and its height above the point, and two directions (rows, columns), all whole numbers. A
+# line that grazes walls is seen in parts, from corner to corner.
 
 
-def are_cut(walls, first, last, grain):
-    """Return which lines between points, whole numbers of 1 / grain of a cell, meet a wall."""
-    cut, left = np.zeros(len(first), np.bool_), np.arange(len(first))
-    for part in np.array([16, 8, 24, 4, 12, 20, 28, *range(2, 32, 4)]) / 32:
-        at = (first[left] * (1 - part) + last[left] * part).astype(float) / grain
-        inside = (abs(at % 1 - 0.5) < 0.499).all(axis=1)  # surely, as numbers are rounded
-        cut[left] = inside & walls[tuple(at.astype(int).T)]
-        left = left[~cut[left]]
-    down, across = abs(last - first)[left].T
-    is_steep = (across != 0) & (across < down) | (down == 0)
-    for grid, which, turn in ((walls, left[~is_steep], 1), (walls.T, left[is_steep], -1)):
-        cut[which] = cut_by_rows(grid, first[which][:, ::turn], last[which][:, ::turn], grain)
-    return cut
+def ranges(first, last):
+    """Return the numbers from each first to before its last, and the number of the range."""
+    count = np.maximum(last - first, 0)
+    of = np.repeat(np.arange(len(count)), count)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count - first, count)
 
 
-def cut_by_rows(walls, first, last, grain):
-    """Return the same from the columns that each line passes in each row of cells."""
-    is_up = (first[:, 0] < last[:, 0])[:, None]
-    first, last = np.where(is_up, first, last), np.where(is_up, last, first)
-    begin = (first[:, 0] // grain).astype(int)
-    count = (-(-last[:, 0] // grain)).astype(int) - begin
-    of = np.repeat(np.arange(len(first)), count)
-    row = np.arange(len(of)) - np.repeat(np.cumsum(count) - count - begin, count)
-    (low, col), (high, _), (rise, run) = first[of].T, last[of].T, (last - first)[of].T
-    ends = [np.maximum(low, row * grain), np.minimum(high, (row + 1) * grain)]
-    at = [col * rise + (end - low) * run for end in ends]
-    left = (np.minimum(*at) // (grain * rise)).astype(int)
-    right = (-(-np.maximum(*at) // (grain * rise))).astype(int)
-    before = np.pad(np.cumsum(walls, axis=1, dtype=np.int32), ((0, 0), (1, 0)))
-    on_side = walls[row, left - 1] & walls[row, left]  # a line between two columns
-    cut = np.where(left < right, before[row, right] > before[row, left], on_side)
-    corner = np.flatnonzero((ends[1] < high) & (at[1] % (grain * rise) == 0))
-    row, col, run = row[corner], (at[1] // (grain * rise))[corner].astype(int), run[corner]
-    cut[corner] |= (run >= 0) & walls[row, col] & walls[row + 1, col - 1]
-    cut[corner] |= (run <= 0) & walls[row, col - 1] & walls[row + 1, col]
-    return np.bincount(of[cut], minlength=len(first)) > 0
+def sights(walls, grain, points, sectors, corners, is_near):
+    """Yield numbers of points, and of the corners (flat, sorted) that each sees above it."""
+    width, edges = walls.shape[1], np.flatnonzero(np.diff(walls.ravel())) + 1
+    begin, end = edges[::2], edges[1::2]
+    number = np.flatnonzero((sectors != 0).any(axis=0))
+    shafts = np.stack([number, points[0, number] // grain, 0 * number, *sectors[:, number]])
+    while shafts.size:
+        point, row, base, low, across_low, high, across_high = shafts
+        col, start = points[1, point], row * width * grain
+        left = start + col + across_low * base // np.maximum(low, 1)
+        right = start + col - -across_high * base // np.maximum(high, 1)
+        first = np.searchsorted(end * grain, left, "left")
+        of, run = ranges(first, np.searchsorted(begin * grain, right, "right"))
+        shafts, col = shafts[:, of], col[of]
+        point, row, base = shafts[:3]
+        top = (row + 1) * grain - points[0, point]
+        for limit, side, sign in ((shafts[3:5], begin, 1), (shafts[5:], end, -1)):
+            across = (side[run] - row * width) * grain - col
+            up = np.where(sign * across > 0, base, top)
+            cuts = sign * (across * limit[0] - limit[1] * up) > 0
+            limit[:, cuts] = up[cuts], across[cuts]
+        shafts[1:3] = row + 1, top
+        is_open = shafts[6] * shafts[3] > shafts[4] * shafts[5]
+        shafts, col = shafts[:, is_open], col[is_open]
+        point, row, top, low, across_low, high, across_high = shafts
+        left = row * width - -(col * low + across_low * top) // (low * grain)
+        right = row * width + (col * high + across_high * top) // (high * grain)
+        first = np.searchsorted(corners, left, "left")
+        of, seen = ranges(first, np.searchsorted(corners, right, "right"))
+        yield point[of], seen
+        left, right = col + across_low * top / low, col + across_high * top / high
+        shafts = shafts[:, is_near(point, top / grain, left / grain, right / grain)]
 
 
-def free_line(walls, proof, ends):
-    """Return the points of a line in whole numbers, after a check that it is free."""
-    line = np.array(proof["line"], ends.dtype) + proof["grain"]
-    need((line[[0, -1]] == ends).all(), "the line has other ends")
-    is_cut = len(line) > 1 and are_cut(walls, line[:-1], line[1:], proof["grain"]).any()
-    need(not is_cut, "the line meets a wall")
-    return line
+def check_strings(walls, proof, ends, bound):
+    """Check a potential at corners that bounds the lengths of all lines."""
+    spare = (bound - abs(ends[1] - ends[0])) / 2 + 3  # nothing beyond is near enough
+    low = np.maximum(ends.min(axis=0) - spare, 0).astype(int)
+    high = (ends.max(axis=0) + spare).astype(int)
+    walls, ends = walls[low[0] : high[0], low[1] : high[1]].copy(), ends - low
+    walls[[0, -1]] = walls[:, [0, -1]] = True
+    heights = np.full(walls.shape, np.inf)
+    for row, col, height in proof["heights"]:
+        heights[row + 1 - low[0], col + 1 - low[1]] = height
+    if len(walls) > len(walls[0]):  # there are fewer columns than rows to sweep over
+        walls, ends, heights = walls.T, ends[:, ::-1], heights.T
+    four = walls[:-1].astype(np.uint8) + walls[1:]
+    corners = np.argwhere(four[:, :-1] + four[:, 1:] == 1) + 1
+    to_start, to_goal = (np.hypot(*(corners - end).T) for end in ends)
+    corners, to_goal = (one[to_start + to_goal < bound] for one in (corners, to_goal))
+    # The nodes are start, goal and corners. Above the map its mirror image is laid, with all nodes
+    # again: what they see below them in the one is above them in the other.
+    p = np.concatenate([[0, bound], bound - to_goal])
+    stated = np.concatenate([[-np.inf] * 2, heights[tuple(corners.T)]])
+    is_lower, p[2:] = stated < p, np.fmin(p, stated)[2:]
+    size, width, both = len(p), walls.shape[1], np.concatenate([walls, walls[::-1]])
+    node, places = np.arange(2 * size) % size, np.concatenate([ends, corners]).T
+    places = np.hstack([places, [[2 * len(walls)], [0]] + [[-1], [1]] * places])
+    grain = 2 ** (30 - max(both.shape).bit_length())  # products of two numbers fit into 62 bits
+    points, p = np.rint(places * grain).astype(np.int64), p[node]
+    row, col = points // grain
+    bend = np.where(both[row, col - 1] | both[row - 1, col], 1, -1) * (node > 1)  # right or left
+    sectors = np.stack([bend > 0, (bend > 0) - 1, bend < 0, bend >= 0]) * is_lower[node]
 
+    def compare(one, two, is_bend):
+        rise = np.where(node[one] == 1, p[one] - p[two], p[two] - p[one])
+        rise -= np.hypot(*(places[:, two] - places[:, one]))
+        need((rise[is_bend] < 1e-9).all(), "p rises too much in sight")
 
-def check_line(walls, factors, proof, ends):
-    """Check a line, and the potential at the corners that bounds all others."""
-    grain, bound = proof["grain"], proof["bound"] / proof["side_m"]
-    line = free_line(walls, proof, ends)
-    cost = np.hypot(*np.diff(line.astype(float), axis=0).T).sum() / grain
+    def is_near(point, up, left, right):
+        """Return whether a path over a lit part of a row can be shorter than the bound."""
+        is_goal = node[point] == 1
+        other = np.where(is_goal, point - 1, point - node[point] + 1)
+        (down, across), (far_down, far_across) = places[:, point], places[:, other]
+        ahead = abs(down + up - far_down)
+        best = np.clip((across * ahead + far_across * up) / (ahead + up), left, right)
+        length = np.hypot(up, best - across) + np.hypot(ahead, best - far_across)
+        return length < bound - np.where(is_goal, 0, p[point])
 
-    four = [walls[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)]
-    corners = np.argwhere(np.sum(four, axis=0) == 1) + 1
-    start, goal = ends.astype(float) / grain
-    to_goal = np.hypot(*(corners - goal).T)
-    near = np.hypot(*(corners - start).T) + to_goal < bound * (1 + 1e-9)
-    corners, p = corners[near], np.concatenate([[0, bound], bound - to_goal[near]])
-    nodes = np.concatenate([ends, corners.astype(ends.dtype) * grain])
-    bend = np.where(walls[tuple((corners - 1).T)] | walls[tuple(corners.T)], 1, -1)
-    bend = np.concatenate([[0, 0], bend])
-    numbers = {corner: n for n, corner in enumerate(map(tuple, corners.tolist()), start=2)}
-    stated = [0, *(numbers.get((row + 1, col + 1), 0) for row, col, _ in proof["corners"])]
-    p[stated[1:]] = [number for *_, number in proof["corners"]]
-    p[0] = 0.0
-    places = nodes.astype(float) / grain
-    for part in np.array_split(stated, 1 + len(stated) * len(nodes) // 10**6):
-        rows, cols = (places[part, None, axis] - places[:, axis] for axis in (0, 1))
-        turn = np.sign(rows * cols)
-        is_bend = (turn * bend <= 0) & (turn * bend[part, None] <= 0)
-        is_flat = abs(p[part, None] - p) <= np.hypot(rows, cols) * (1 + 1e-10) + 1e-7 * (bend == 0)
-        here, there = np.nonzero(is_bend & ~is_flat)
-        need(
-            are_cut(walls, nodes[part[here]], nodes[there], grain).all(),
-            "p rises too much in sight",
-        )
-    return cost
-
-
-CHECKS = {
-    "no path": check_no_path,
-    "cells": check_cells,
-    "line": check_line,
-    "line by costs": check_line_by_costs,
-}
+    order = np.argsort(np.where(node > 1, row * width + col, -1), kind="stable")[4:]
+    for one, seen in sights(both, grain, points, sectors, (row * width + col)[order], is_near):
+        two = order[seen]
+        compare(one, two, bend[two] * (points[1, two] - points[1, one]) >= 0)
+    # Along a row of corners, each sees the next one where a row of cells beside them is free.
+    order = np.lexsort(points[::-1, :size])
+    one, two, count = order[:-1], order[1:], np.cumsum(walls)
+    low, high = points[1, one] // grain - 1, -(-points[1, two] // grain) - 1
+    for row in (points[0, one] // grain, -(-points[0, one] // grain) - 1):
+        is_free = count[row * width + low] == count[row * width + high]
+        is_free &= points[0, one] == points[0, two]
+        compare(one, two, is_free)
+        compare(two, one, is_free)
 
 
 def check(measured, frame, proof):
@@ -347,27 +382,18 @@ def check(measured, frame, proof):
     try:
         need(frame == [proof["side_m"], *proof["origin"]], "another side of a cell, or origin")
         side, x, y, yaw = frame
-        digest = hashlib.sha256(np.ascontiguousarray(measured).tobytes()).hexdigest()
+        digest = hashlib.sha256(measured := np.ascontiguousarray(measured)).hexdigest()
         need(digest == proof["map_sha256"], "another map, or other thresholds")
-        walls, grain = walls_of(measured, proof, side), proof["grain"]
-        need(grain in {2, 2**24}, "a wrong grain")
-        ends = np.array(proof["ends"], np.int64)
-        need(
-            (ends >= 0).all() and (ends <= np.multiply(measured.shape, grain)).all(), "ends outside"
-        )
-        within = (
-            1e-6 if proof["kind"].startswith("line") else 0.5 + 1e-6
-        )  # or somewhere in the cell
-        for end, (to_x, to_y) in zip(ends / grain, (proof["start"], proof["goal"]), strict=True):
-            at = complex(to_x - x, to_y - y) * cmath.exp(-1j * yaw) / side
-            need((abs(end - (at.imag, at.real)) <= within).all(), "the ends are not start and goal")
-        exact = np.int64 if grain * max(walls.shape) < 2**30 else object  # for products of two
-        factors = factors_of(measured, proof["costs"], side)
-        cost = CHECKS[proof["kind"]](walls, factors, proof, ends.astype(exact) + grain) * side
-        if cost < math.inf:
-            near = 1e-9 * cost + 1e-7 * side
-            need(abs(cost - proof["cost"]) <= near, f"the path costs {cost:.9f} m")
-            need(0 <= proof["bound"] <= cost + near, "the bound is above the cost")
+        walls, kind, costs = walls_of(measured, proof, side), proof["kind"], proof["costs"]
+        turn = cmath.exp(-1j * yaw) / side
+        ends = [complex(u - x, v - y) * turn for u, v in (proof["start"], proof["goal"])]
+        ends = np.array([(end.imag, end.real) for end in ends]) + 1
+        need((ends > 1 - 1e-6).all() and (ends < walls.shape).all(), "ends outside the map")
+        if kind == "no path":
+            check_chain(walls, proof, ends)
+        else:
+            need(kind in {"cells", "line"}, "another kind of proof")
+            check_path(walls, factors_of(measured, costs, side), proof, ends)
     except Rejected:
         raise
     except Exception as error:  # whatever else a file may hold
@@ -375,10 +401,38 @@ def check(measured, frame, proof):
     ends = "from {start} to {goal}, radius {radius_m} m".format(**proof)
     closed = sum(end - first for first, end in proof["closed"])
     ends += f", {closed} cells closed" * (closed > 0) + f", {proof['costs']}" * bool(proof["costs"])
-    ends += ", unexplored cells too" * proof["allow_unexplored"]
-    if proof["kind"] == "no path":
-        return f"no path {ends}"
-    return f"path {ends}: costs {cost:.6f} m, none less than {proof['bound']:.6f} m"
+    ends += ", unexplored cells too" * (proof["allow_unexplored"] is True)
+    costs = ": costs {cost:.6f} m, none less than {bound:.6f} m" if kind != "no path" else ""
+    return f"{'path' if costs else kind} {ends}{costs.format(**proof)}"
+
+
+def check_path(walls, factors, proof, ends):
+    """Check a path, its cost, and the bound on all others."""
+    is_cells, bound = proof["kind"] == "cells", proof["bound"] / proof["side_m"] * (1 - 1e-9)
+    if is_cells:
+        line = walk(*proof["path"])
+        is_turn = np.diff(line, 2, axis=0, prepend=line[:1] - 9, append=line[-1:] - 9).any(axis=1)
+        line = line[is_turn] + 0.5
+    else:
+        line = np.array(proof["line"], float) + 1
+    need((line >= 1).all() and (line < walls.shape).all(), "the path leaves the map")
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    need(len(line) <= 10**5 and (steps > 1e-5).all(), "steps too many or too short")
+    within = (abs(line[[0, -1]] - ends) <= 0.5 * is_cells + 1e-6).all()  # anywhere in a cell
+    need(within, "the ends are not start and goal")
+    cost = cost_of(walls, factors, line, is_cells) * proof["side_m"]
+    need(cost < math.inf, "the path meets a wall")
+    spare = 1e-9 * cost + 1e-7 * proof["side_m"]
+    need(abs(cost - proof["cost"]) <= spare, f"the path costs {cost:.9f} m")
+    need(0 <= proof["bound"] <= cost + spare, "the bound is above the cost")
+    if is_cells:
+        check_cells(walls, factors, proof, line[[0, -1]], bound)
+    elif bound > math.dist(*line[[0, -1]]):  # as no factor is below 1
+        if proof["costs"] is None:
+            need(cost_of(walls, factors, line[[0, -1]], False) == math.inf, "a line is shorter")
+            check_strings(walls, proof, line[[0, -1]], bound)
+        else:
+            check_king(walls, factors, proof, line[[0, -1]], bound)
 
 
 def main(arguments):

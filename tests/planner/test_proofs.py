@@ -1,9 +1,9 @@
 """Proofs of results: the checker accepts the true ones, and none that was altered."""
 
+import base64
 import json
 import pickle
-from fractions import Fraction
-from itertools import pairwise
+import zlib
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ import hybridnav as hn
 from benchmarks.subjects.proofs import false_proofs, frame_of, is_accepted
 from hybridnav import check_proof
 from hybridnav.errors import PlanError
-from hybridnav.search.proofs import parting_chain
+from hybridnav.search.proofs import parting_chain, strings_near
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
 from tests.strategies import examples
@@ -65,49 +65,88 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
     assert planted | ({"forged bound"} if preset != "robot" else set()) <= kinds.keys()
 
 
-def is_free(walls, first, last):
-    """Whether a line between two corners stays free, by exact fractions, cell by cell."""
-    (a_row, a_col), (rows, cols) = first, np.subtract(last, first).tolist()
-    at = {Fraction(0), Fraction(1)}
-    at |= {Fraction(n - a, d) for a, d in ((a_row, rows), (a_col, cols)) if d
-             for n in range(min(a, a + d), max(a, a + d) + 1)}  # fmt: skip
-    cuts = sorted(at)
+def forged(proof, grid, rng):
+    """Return a proof of a bound that is too high, with a longer path and other heights."""
+    more = float(rng.choice([1e-6, 1e-3, 0.1, 1.0]))
+    line = np.array(proof["line"])
+    start, last, goal = line[0], line[-2], line[-1]
+    length = np.hypot(*(goal - last))
+    back = goal - (goal - last) / length * min(more / 2, length)
+    bend = [] if len(line) > 2 else [((start + goal) / 2).tolist()]
+    longer = [*proof["line"][:-1], *bend, goal.tolist(), back.tolist(), goal.tolist()]
+    bound = proof["bound"] / grid.resolution_m + more
+    reach = bound * float(rng.choice([1, 1, 1.2]))
+    heights = strings_near(grid.enterable(), np.array([start, goal]), reach)
+    for _ in range(int(rng.integers(4))):
+        if heights:
+            n = int(rng.integers(len(heights)))
+            kind = int(rng.integers(6))
+            if kind == 0:
+                del heights[n]
+            elif kind == 1:
+                heights[n][int(rng.integers(2))] += int(rng.choice([-1, 1]))
+            elif kind == 2:
+                heights[n][2] += float(rng.choice([more, -more, 1e9, -1e9, np.nan]))
+            elif kind == 3:
+                heights = heights[:n]
+            elif kind == 4:
+                heights.append([*heights[n][:2], heights[n][2] + more])
+            else:
+                share = float(rng.choice([1 + more / bound, bound]))
+                heights = [[row, col, share * p] for row, col, p in heights]
+    metres = bound * grid.resolution_m
+    return {**proof, "line": longer, "heights": heights, "bound": metres, "cost": metres}
 
-    def cells_at(t):
-        row, col = a_row + t * rows, a_col + t * cols
-        return [
-            (r, c)
-            for r in {int(row), int(row) - (row.denominator == 1)}
-            for c in {int(col), int(col) - (col.denominator == 1)}
-        ]
 
-    for low, high in pairwise(cuts):
-        if all(walls[cell] for cell in cells_at((low + high) / 2)):
-            return False
-    for t in cuts[1:-1]:
-        cells = cells_at(t)
-        if len(cells) == 4:
-            r, c = max(cells)
-            turn = rows * cols
-            if turn >= 0 and walls[r - 1, c] and walls[r, c - 1]:
-                return False
-            if turn <= 0 and walls[r - 1, c - 1] and walls[r, c]:
-                return False
-    return True
+@pytest.mark.parametrize("seed", range(examples(6, 120)))
+def test_no_heights_prove_a_length_that_is_too_high(seed):
+    rng = np.random.default_rng(seed)
+    count = 0
+    while count < 60:
+        shape = tuple(rng.integers(8, 30, 2).tolist())
+        grid = random_grid(rng, shape)
+        planner = hn.HybridPlanner(map_of(grid))
+        for pair in points_in(grid, rng, 4):
+            if rng.random() < 0.5:  # centres of cells
+                pair = grid.frame.points_of(grid.frame.cells_of(pair))  # noqa: PLW2901
+            result = planner.plan(*pair)
+            if not result.solved or result.cost == 0:
+                continue
+            proof = result.proof()
+            assert is_accepted(grid, proof)
+            for _ in range(12):
+                count += 1
+                assert not is_accepted(grid, forged(proof, grid, rng))
 
 
-@pytest.mark.parametrize("grain", [2, 2**24])
-def test_lines_are_cut_where_fractions_say_so(grain):
-    rng = np.random.default_rng(grain)
-    kind = object if grain > 2 else np.int64
-    for _ in range(20):
-        walls = np.pad(rng.random((7, 8)) < rng.uniform(0.1, 0.5), 1, constant_values=True)
-        ends = rng.integers(1, (8, 9), (2, 60, 2))
-        ends = ends[:, (ends[0] != ends[1]).any(axis=1)]
-        first, last = (end.astype(kind) * grain for end in ends)
-        cut = check_proof.are_cut(walls, first, last, grain)
-        free = [is_free(walls, a.tolist(), b.tolist()) for a, b in zip(*ends, strict=True)]
-        assert (cut == ~np.array(free)).all()
+SLITS = ["....", "..#.", ".#..", "...."]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        [[1.5, 1.5], [2.5, 2.5]],  # between two walls that meet at a corner
+        [[1.5, 1.5], [2, 2], [2.5, 2.5]],
+        [[1.5, 1.5], [2 - 1e-9, 2 - 1e-9], [2 + 1e-9, 2 + 1e-9], [2.5, 2.5]],
+        [[1.5, 1.5], [2, 2 + 1e-7], [2.5, 2.5]],
+        [[1.5, 1.5], [1.5, 2.5]],  # through a wall
+        [[1.5, 1.5], [1.5, 1.999999], *([1.5, 2 + n * 4e-6] for n in range(250_000)), [1.5, 3.5]],
+        [[1.5, 1.5], [1.5, 1e9], [2.5, 2.5]],  # more cells than memory has
+        [[1.5, 1.5], [1.5, np.nan], [2.5, 2.5]],
+        [[1.5, 1.5], [-5.0, 1.5], [-5.0, 5.0], [2.5, 2.5]],
+    ],
+)
+def test_no_line_slips_through_a_wall(line):
+    kinds = np.array([[cell == "." for cell in row] for row in SLITS], np.uint8)
+    grid = grid_of(kinds)
+    ends = grid.frame.points_of([[1, 1], [2, 2]])
+    proof = hn.HybridPlanner(map_of(grid)).plan(*ends).proof()
+    assert is_accepted(grid, proof)
+    assert proof["line"][0] == pytest.approx([1.5, 1.5])
+    length = float(np.hypot(*np.diff(np.array(line), axis=0).T).sum()) * grid.resolution_m
+    false = {**proof, "line": line, "cost": length, "bound": 0.0}
+    with np.errstate(all="ignore"):
+        assert not is_accepted(grid, false)
 
 
 def test_a_chain_parts_an_island_from_the_rest_and_both_ways_round():
@@ -176,21 +215,28 @@ def test_no_proof_is_made_of_what_has_none():
     ("key", "value", "why"),
     [
         ("radius_m", 1e9, "a radius of too many cells"),
-        ("radius_m", float("nan"), "leave other cells free"),
+        ("radius_m", float("nan"), "or none"),
+        ("radius_m", -0.1, "or none"),
         ("costs", {"multiplier": -1}, "a factor is not from 1 to 1000"),
         ("costs", {"multiplier": float("nan")}, "a factor is not from 1 to 1000"),
         ("costs", {"inflation_radius_m": 1e9}, "costs that reach too far"),
-        ("bound", float("nan"), "this is no proof"),
-        ("bound", 1e300, "this is no proof"),
-        ("bound", -1.0, "a move raises p"),
+        ("bound", float("nan"), "above the cost"),
+        ("bound", 1e300, "above the cost"),
+        ("bound", -1.0, "above the cost"),
         ("cost", float("nan"), "the path costs"),
-        ("grain", 3, "a wrong grain"),
-        ("ends", [[-1, -1], [-1, -1]], "ends outside"),
+        ("kind", "line of sight", "another kind"),
+        ("goal", [1e9, 1e9], "ends outside"),
+        ("goal", [2.0], "this is no proof"),
+        ("start", [float("nan"), 0.5], "ends outside"),
         ("box", [0, 0, 10**9, 10**9], "this is no proof"),
         ("box", [-1, 0, 3, 3], "."),
         ("tree", "", "this is no proof"),
         ("path", [[0, 0], "89"], "this is no proof"),
+        ("path", [[0, 0], "0" * 10**6], "leaves the map"),
+        ("path", [[0, 0], "04" * 10**6], "other ends|not start|too many"),
+        ("tree", base64.b85encode(zlib.compress(bytes(10**8))).decode(), "this is no proof"),
         ("closed", [[0, 10**12]], "a closed cell is outside the map"),
+        ("closed", [[0, 5], [0, 5]], "closed twice"),
     ],
 )
 def test_hostile_values_are_rejected(key, value, why):
@@ -199,7 +245,8 @@ def test_hostile_values_are_rejected(key, value, why):
         map_of(grid), preset="grid-astar", costs=hn.CostLayer.clearance(grid)
     )
     proof = planner.plan((0.5, 0.5), (2.0, 2.5)).proof()
-    assert is_accepted(grid, proof)
+    said = check_proof.check(grid.measured, frame_of(grid), {**proof, "allow_unexplored": 1})
+    assert "unexplored" not in said  # as only `true` lets paths through them
     value = proof["costs"] | value if key == "costs" else value
     with np.errstate(all="ignore"), pytest.raises(check_proof.Rejected, match=why):
         check_proof.check(grid.measured, frame_of(grid), {**proof, key: value})
@@ -210,6 +257,14 @@ def test_any_other_json_is_rejected_in_one_line(text):
     grid = hn.example_map("figure1")
     with pytest.raises(check_proof.Rejected, match="this is no proof"):
         check_proof.check(grid.measured, frame_of(grid), json.loads(text))
+
+
+def test_the_proof_of_robot_is_as_good_as_its_bound():
+    grid = hn.example_map("office", robot_radius_m=0.25)
+    result = hn.HybridPlanner(map_of(grid), preset="robot").plan((1.0, 13.2), (40.6, 19.4))
+    proof = result.proof()
+    assert is_accepted(grid, proof)
+    assert proof["bound"] >= result.lower_bound > 48
 
 
 def test_no_bound_of_a_line_by_costs_is_above_the_cheapest_path_by_brute_force():

@@ -11,22 +11,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.moves import COL_STEP, ROW_STEP
-from hybridnav.check_proof import ONE, UNIT, costs_of_cells, costs_of_corners, dearest
+from hybridnav.check_proof import ONE, UNIT, cost_of, joins_of
 from hybridnav.errors import PlanError
 from hybridnav.maps.cells import CellClass
 from hybridnav.maps.clearance import within_radius
-from hybridnav.maps.costs import cost_along
-from hybridnav.search.proofs import CostTree, corners_near, parting_chain
+from hybridnav.search.proofs import (
+    grid_near,
+    moves_of_cells,
+    moves_of_king,
+    parting_chain,
+    strings_near,
+)
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import Frame, OccupancyGrid
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.planner import PlanResult
     from hybridnav.planner.costs import PlannerCosts
     from hybridnav.search.found import ClosedCells
 
-_CENTRED, _FINE = 2, 2**24
-"""Parts of a cell in which ends are counted: those of centres, and of exact tests."""
 _RATIO = math.sqrt(4 - math.sqrt(8))
 """Most by which moves between corners of cells are dearer than a line."""
 
@@ -136,83 +139,73 @@ def _no_path(problem: _Problem) -> dict[str, Any]:
     first, second = chains
     if first is None or second is None:
         raise PlanError("the two ends are connected: there is no proof that there is no path")
-    chain = min(first, second, key=len)
-    ends = [[2 * row + 1, 2 * col + 1] for row, col in (start, goal)]
-    return {"kind": "no path", "grain": _CENTRED, "ends": ends, "chain": _walk(chain)}
+    return {"kind": "no path", "chain": _walk(min(first, second, key=len))}
 
 
 def _cells(problem: _Problem) -> dict[str, Any]:
     result, per_cell = problem.result, problem.grid.resolution_m
     assert result.path is not None  # noqa: S101 - it is solved
     cells = result.path.cells
-    length = result.cost / per_cell
-    tree = CostTree(problem.free, problem.units, costs_of_cells, cells[[0, -1]], length)
+    grid = grid_near(problem.free, problem.units, cells[[0, -1]], result.cost / per_cell)
     limit = math.floor(result.lower_bound / per_cell * (1 - 1e-9) * UNIT)
     return {
         "kind": "cells",
-        "grain": _CENTRED,
-        "ends": (2 * cells[[0, -1]] + 1).tolist(),
         "cost": result.cost,
         "bound": result.lower_bound,
         "path": _walk(cells),
-        **tree.stated(limit),
+        **moves_of_cells(grid, limit),
     }
 
 
 def _line_by_costs(problem: _Problem) -> dict[str, Any]:
-    result, frame, layer = problem.result, problem.grid.frame, problem.costs.layer
+    result, per_cell, layer = problem.result, problem.grid.resolution_m, problem.costs.layer
     assert result.path is not None  # noqa: S101 - it is solved
     assert layer is not None  # noqa: S101 - as the metric says
     points = result.path.points if result.line is None else result.line
     if result.line is None and result.path.is_curved:
         raise PlanError("no proof is known of arcs along cells: take smooth='line-of-sight'")
-    stated = _stated_line(frame, points)
-    line = np.array(stated["line"]) / stated["grain"]
-    cost = cost_along(problem.grid, layer, points)
-    corners = np.floor(line[[0, -1]] + 0.5).astype(np.int64)  # as the checker rounds
+    line = _distinct(problem.grid.frame.positions_of(points))
+    walls = np.pad(~problem.free, 1, constant_values=True)
     units = np.pad(layer.units, 1, constant_values=ONE)
-    apart = np.hypot(*(corners - line[[0, -1]]).T)
-    joins = (apart * dearest(units, line[[0, -1]] + 1)).sum() / ONE
-    length = (cost / frame.resolution_m + joins) * _RATIO
-    tree = CostTree(problem.free, problem.units, costs_of_corners, corners, length)
-    _, least = tree.grown(math.floor(length * UNIT))
-    bound = max(least / UNIT / _RATIO - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
-    limit = math.floor((bound * (1 - 1e-9) + joins) * _RATIO * UNIT)
+    cost = cost_of(walls, units, line + 1, False) * per_cell
+    # The corners of the cells of the ends that lie furthest from the other end.
+    ahead = line[[0, -1]] - line[[1, -2]] if len(line) > 1 else np.zeros((2, 2))
+    corners = np.where(ahead > 0, np.ceil(line[[0, -1]]), np.floor(line[[0, -1]])).astype(np.int64)
+    joins = joins_of(units, line[[0, -1]] + 1, corners + 1)
+    known = cost / per_cell + joins
+    grid = grid_near(problem.free, problem.units, corners, known * _RATIO)
+    ends, cells = line[[0, -1]].tolist(), result.path.cells[[0, -1]].tolist()
+    given = problem.free, layer.factors, ends, cells, cost / per_cell
+    proof, least = moves_of_king(grid, math.floor(known * UNIT), given)
+    bound = max(least / UNIT - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
     return {
-        "kind": "line by costs",
-        **stated,
+        "kind": "line",
         "cost": cost,
-        "bound": bound * frame.resolution_m,
-        **tree.stated(limit),
+        "bound": bound * per_cell,
+        "line": line.tolist(),
+        "corners": corners.tolist(),
+        **proof,
     }
-
-
-def _stated_line(frame: Frame, points: FloatArray) -> dict[str, Any]:
-    """Return points of a line in whole numbers of a part of a cell."""
-    fine = np.rint(frame.positions_of(points) * _FINE).astype(np.int64)
-    grain = _FINE if (fine % (_FINE // _CENTRED)).any() else _CENTRED
-    line = fine // (_FINE // grain)
-    return {"grain": grain, "ends": line[[0, -1]].tolist(), "line": line.tolist()}
 
 
 def _line(problem: _Problem) -> dict[str, Any]:
-    result, frame = problem.result, problem.grid.frame
+    result = problem.result
     assert result.path is not None  # noqa: S101 - it is solved
-    stated = _stated_line(frame, result.path.points)
-    ends = np.array(stated["ends"]) / stated["grain"]
-    bound = result.lower_bound / frame.resolution_m
-    cells = result.path.cells[[0, -1]]
-    corners, distances = corners_near(problem.free, ends, cells, bound)
+    line = _distinct(problem.grid.frame.positions_of(result.path.points))
+    bound = result.lower_bound / problem.grid.resolution_m * (1 - 1e-9)
     return {
         "kind": "line",
-        **stated,
         "cost": result.cost,
         "bound": result.lower_bound,
-        "corners": [
-            [row, col, p]
-            for (row, col), p in zip(corners.tolist(), distances.tolist(), strict=True)
-        ],
+        "line": line.tolist(),
+        "heights": strings_near(problem.free, line[[0, -1]], bound),
     }
+
+
+def _distinct(line: FloatArray) -> FloatArray:
+    """Return a line without points that repeat the one before."""
+    distinct: FloatArray = line[np.append([True], (np.diff(line, axis=0) != 0).any(axis=1))]
+    return distinct
 
 
 def _walk(cells: LongArray) -> list[Any]:

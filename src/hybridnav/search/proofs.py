@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import base64
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
-from hybridnav.search.kernels.proofs import ONE, OUTSIDE, tree_of, walls_round
-from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
+from hybridnav.check_proof import (
+    COS,
+    LEVEL,
+    ONE,
+    PLAIN,
+    SIN,
+    TILTED,
+    costs_of_cells,
+    costs_of_corners,
+)
+from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
+from hybridnav.search.lattice import slopes_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._base.typing import (
         AnyArray,
         BoolArray,
@@ -25,8 +33,22 @@ if TYPE_CHECKING:
     )
 
 
-class CostTree:
-    """The tree of cheapest paths between two nodes, cells or corners of cells.
+class Grid(NamedTuple):
+    """The part of a map that a proof by moves is about, with a rim of walls."""
+
+    walls: BoolArray
+    factors: LongArray
+    """In units, one where there is none."""
+    low: LongArray
+    """int64 (2,), what rows and columns of the map have more."""
+    ends: LongArray
+    """int64 (2, 2), the nodes (row, col) here."""
+
+
+def grid_near(
+    free: BoolArray, units: IntArray | None, ends: LongArray, length_cells: float
+) -> Grid:
+    """Return the part of a map where a path between two nodes may be shorter than a length.
 
     Parameters
     ----------
@@ -34,46 +56,81 @@ class CostTree:
         bool (rows, cols), cells that may be entered.
     units
         int32 (rows, cols), the factors of the cells in units of 2^-14; None for 1.
-    costs_of
-        Returns the costs of moves between nodes, from walls and factors with a rim.
     ends
-        int64 (2, 2), the nodes (row, col).
+        int64 (2, 2), the nodes (row, col), cells or corners of cells.
     length_cells
         Length that no path of interest has.
     """
+    low, high = _box_of(free, (ends[0], ends[1]), length_cells)
+    part = np.s_[low[0] : high[0], low[1] : high[1]]
+    # There are more corners than cells in a row.
+    walls = np.pad(~free[part], (1, 2), constant_values=True)
+    factors = np.full(walls.shape, ONE)
+    if units is not None:
+        factors[1:-2, 1:-2] = units[part]
+    return Grid(walls, factors, low - 1, ends - low + 1)
 
-    def __init__(
-        self,
-        free: BoolArray,
-        units: IntArray | None,
-        costs_of: Callable[[BoolArray, AnyArray], LongArray],
-        ends: LongArray,
-        length_cells: float,
-    ) -> None:
-        self._low, high = _box_of(free, (ends[0], ends[1]), length_cells)
-        part = np.s_[self._low[0] : high[0], self._low[1] : high[1]]
-        # There are more corners than cells in a row.
-        walls = np.pad(~free[part], (1, 2), constant_values=True)
-        factors = np.full(walls.shape, ONE)
-        if units is not None:
-            factors[1:-2, 1:-2] = units[part]
-        self._costs = costs_of(walls, factors)
-        self._ends = ends - self._low + 1
 
-    def grown(self, limit: int) -> tuple[ByteArray, int]:
-        """Return the tree up to a limit, with a rim, and the least cost of the second node."""
-        start, goal = map(tuple, self._ends.tolist())
-        tree, cost = tree_of(self._costs, start, goal, limit)
-        return tree, int(cost)
+def moves_of_cells(grid: Grid, limit: int) -> dict[str, Any]:
+    """Return the proof that no path of cells costs less than a limit, in units."""
+    costs = costs_of_cells(grid.walls, grid.factors)
+    start, goal = map(tuple, grid.ends.tolist())
+    tree, _ = tree_of(costs, start, goal, limit, PLAIN)
+    return _stated(grid, tree)
 
-    def stated(self, limit: int) -> dict[str, Any]:
-        """Return the part of the tree that proves that no path costs less than a limit."""
-        tree, _ = self.grown(limit)
-        shown = np.concatenate([np.argwhere(tree < OUTSIDE), self._ends])
-        first, last = shown.min(axis=0), shown.max(axis=0) + 1
-        kept = tree[first[0] : last[0], first[1] : last[1]]
-        text = base64.b85encode(zlib.compress(kept.tobytes(), 9)).decode()
-        return {"box": [*(first + self._low - 1).tolist(), *kept.shape], "tree": text}
+
+def moves_of_king(grid: Grid, limit: int, known: tuple[Any, ...]) -> tuple[dict[str, Any], int]:
+    """Return the proof that no line costs less than a bound, and that bound, in units.
+
+    The tilts of cells are those of the direction in which costs grow, where all four corners
+    belong to the tree, and elsewhere the one of an empty map. `known` is for `slopes_of`.
+    """
+    start, goal = map(tuple, grid.ends.tolist())
+    shape = grid.walls.shape
+    down, across = (abs(np.arange(n) - at) for n, at in zip(shape, goal, strict=True))
+    plain = TILTED[:, LEVEL].tolist()
+    ahead = np.maximum(down[:, None], across) * plain[0]
+    ahead += np.minimum(down[:, None], across) * (plain[1] - plain[0])
+    ahead *= 2 * ONE
+    tilts = np.full(shape, LEVEL, np.uint8)
+    least_moves = int(TILTED[0].min()), int(TILTED[1].min())
+    cells, rises = slopes_of(*known)
+    steep, flat = np.sort(abs(rises), axis=1).T[::-1]
+    found = np.argmax(steep * COS[:, None] + flat * SIN[:, None], axis=0)
+    tilts[tuple((cells - grid.low).T)] = found
+    while True:
+        costs = costs_of_corners(grid.walls, grid.factors, tilts)
+        tree, cost = tree_of(costs, start, goal, limit, least_moves)
+        bound = int(cost[goal])
+        outside = cost + ahead >= bound
+        out = np.zeros(shape, np.bool_)
+        out[:-1, :-1] = np.max(
+            [outside[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)], axis=0
+        )
+        if not (out & (tilts != LEVEL)).any():
+            break
+        tilts[out] = LEVEL  # fewer with each turn
+    tree[outside] = OUTSIDE
+    return _stated(grid, tree, tilts), bound
+
+
+def _stated(grid: Grid, tree: ByteArray, tilts: ByteArray | None = None) -> dict[str, Any]:
+    """Return the box of a tree, and what is in it."""
+    is_shown = tree < OUTSIDE
+    if tilts is not None:
+        is_shown |= tilts != LEVEL
+    shown = np.concatenate([np.argwhere(is_shown), grid.ends])
+    first, last = shown.min(axis=0), shown.max(axis=0) + 1
+    part = np.s_[first[0] : last[0], first[1] : last[1]]
+    stated = {
+        "box": [*(first + grid.low).tolist(), *(last - first).tolist()],
+        "tree": _packed(tree[part]),
+    }
+    return stated if tilts is None else stated | {"tilts": _packed(tilts[part])}
+
+
+def _packed(array: ByteArray) -> str:
+    return base64.b85encode(zlib.compress(array.tobytes(), 9)).decode()
 
 
 def _box_of(
@@ -122,28 +179,31 @@ def parting_chain(
     return found
 
 
-def corners_near(
-    free: BoolArray, ends: FloatArray, cells: LongArray, bound_cells: float
-) -> tuple[LongArray, FloatArray]:
-    """Return the corners (row, col) over which a path may be shorter than the bound, as far as
-    their distances from the start and the straight way to the goal tell, and these distances."""
+def strings_near(free: BoolArray, ends: FloatArray, bound_cells: float) -> list[Any]:
+    """Return the corners over which a path may be shorter than a bound, as far as the straight way
+    to the goal tells.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols), cells that may be entered.
+    ends
+        float64 (2, 2), positions (row, col) of start and goal in grid units.
+    bound_cells
+        Length in cells.
+
+    Returns
+    -------
+    list
+        Of (row, col, distance from the start in cells).
+    """
+    cells = np.floor(ends).astype(np.int64)
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
-    part = np.pad(free[low[0] : high[0], low[1] : high[1]], 1)
-    walls = [~part[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)]
-    corners = np.argwhere(np.sum(walls, axis=0) == 1)
-    to_goal = np.hypot(*(corners + low - ends[1]).T)
-    is_near = np.hypot(*(corners + low - ends[0]).T) + to_goal < bound_cells
-    corners, to_goal = corners[is_near], to_goal[is_near]
-    if not len(corners):
-        return corners, to_goal
-    # Of the three free cells at a corner, the one below it on the left or the one above that.
-    at = corners - 1
-    at[~part[tuple(corners.T)]] += (1, 0)
-    count = len(corners)
-    found = shortest_paths(
-        MeshSearch(build_mesh(np.ascontiguousarray(part[1:-1, 1:-1]))),
-        (np.tile(cells[0] - low, (count, 1)), at),
-        (np.tile(ends[0] - low, (count, 1)), corners.astype(np.float64)),
-    ).length_cells
-    is_near = found + to_goal < bound_cells
-    return corners[is_near] + low, found[is_near]
+    walls = np.pad(~free[low[0] : high[0], low[1] : high[1]], 1, constant_values=True)
+    inside = ends - low + 1
+    grain = 2 ** (30 - max(walls.shape).bit_length())
+    points = np.rint(inside * grain).astype(np.int64)
+    found = strings_of(walls, grain, inside, points, bound_cells).tolist()
+    return [
+        [int(row) + int(low[0]), int(col) + int(low[1]), round(far, 10)] for row, col, far in found
+    ]

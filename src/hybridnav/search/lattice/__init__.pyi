@@ -1,4 +1,4 @@
-from .bound import cost_bound as cost_bound
+from .bound import cost_bound as cost_bound, slopes_of as slopes_of
 from .lattice import (
     Lattice as Lattice,
     build_lattice as build_lattice,

@@ -79,8 +79,32 @@ def cost_bound(
     >>> 19.3 < cost_bound(free, factors, ends, cells, 20) < 19.7  # the line costs 19.70
     True
     """
+    return _bound_of(free, factors, ends, cells, known)[0]
+
+
+def slopes_of(
+    free: AnyArray,
+    factors: AnyArray,
+    ends: tuple[Position, Position],
+    cells: tuple[Cell, Cell],
+    known: float,
+) -> tuple[LongArray, FloatArray]:
+    """Return the slopes of the potential that `cost_bound` finds: int64 (n, 2), the cells (row,
+    col) that it covers, and float64 (n, 2), by how much it rises up and to the right in them."""
+    return _bound_of(free, factors, ends, cells, known)[1:]
+
+
+def _bound_of(
+    free: AnyArray,
+    factors: AnyArray,
+    ends: tuple[Position, Position],
+    cells: tuple[Cell, Cell],
+    known: float,
+) -> tuple[float, LongArray, FloatArray]:
+    """Return the bound, and cells and slopes of its potential."""
     corners: list[Any] = []
     joins = 0.0
+    covered, slopes = np.empty((0, 2), np.int64), np.empty((0, 2))
     for (row, col), cell in zip(ends, cells, strict=True):
         corner = round(row), round(col)
         joins += float(factors[tuple(cell)]) * math.dist((row, col), corner)
@@ -106,13 +130,17 @@ def cost_bound(
     forth = kernels.costs_over_corners(free, factors, start, goal, most, nothing)
     over_corners = int(forth[goal])
     if over_corners > most:
-        return known
+        return known, covered, slopes
     found = over_corners / kernels.UNITS / _RATIO - joins
     if math.isfinite(known):
         back = kernels.costs_over_corners(free, factors, goal, start, most, forth)
         band = kernels.band_of(free, forth, back, most)
-        found = max(found, _by_potential(factors, band, (forth, back), inside, known))
-    return min(max(found, math.dist(*ends)), known)
+        by_potential, four = _by_potential(factors, band, (forth, back), inside, known)
+        found = max(found, by_potential)
+        covered = np.stack(np.divmod(band[0], factors.shape[1]), axis=1) + low
+        slopes = np.stack([four[:, 2] + four[:, 3], four[:, 1] + four[:, 3]], axis=1)
+        slopes -= np.stack([four[:, 0] + four[:, 1], four[:, 0] + four[:, 2]], axis=1)
+    return min(max(found, math.dist(*ends)), known), covered, slopes / 2
 
 
 def _by_potential(
@@ -121,13 +149,14 @@ def _by_potential(
     costs: tuple[LongArray, LongArray],
     ends: Sequence[tuple[Position, Cell]],
     known: float,
-) -> float:
-    """Return the bound of a potential on some cells, on paths that stay in them."""
+) -> tuple[float, FloatArray]:
+    """Return the bound of a potential on some cells, on paths that stay in them, and its values at
+    their corners."""
     flat, corners, flat_corners = band
     flat_ends = [row * factors.shape[1] + col for _, (row, col) in ends]
     own = np.searchsorted(flat, flat_ends)
     if len(flat) == 0 or (flat.take(own, mode="clip") != flat_ends).any():
-        return 0.0
+        return 0.0, np.zeros((len(flat), 4))
     of_cells = factors.ravel()[flat].astype(np.float64)
     waves, joints = [], np.empty((2, 5))
     for k, (from_end, (position, cell)) in enumerate(zip(costs, ends, strict=True)):
@@ -143,7 +172,7 @@ def _by_potential(
     found: float = kernels.raise_potential(
         corners, of_cells, potential, joints, iterations, _ENOUGH * known
     )
-    return found * (1 - _ROUNDING) - _ROUNDING
+    return found * (1 - _ROUNDING) - _ROUNDING, potential[corners]
 
 
 def _weights_of(inside: FloatArray) -> tuple[int, float, float, float]:
