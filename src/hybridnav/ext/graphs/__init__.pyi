@@ -17,7 +17,6 @@ from .judge import (
 from .lane_graph import build_lane_graph as build_lane_graph
 from .lanes import keep_right as keep_right
 from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
-from .lanes import merge_bends as merge_bends
 from .route_messages import route_messages as route_messages
 from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
 from .files import (

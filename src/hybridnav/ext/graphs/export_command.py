@@ -38,12 +38,9 @@ from hybridnav.ext.graphs.fleet_options import (
     NodesOption,
     NoDoorsOption,
     OperationsOption,
-    PolylinesOption,
     ReportOption,
-    StretchOption,
     StyleOption,
     VehiclesOption,
-    check_polylines,
     check_style,
     warn_of_loss,
 )
@@ -51,7 +48,7 @@ from hybridnav.ext.graphs.fleet_options import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
+    from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph
 
 _ENDINGS = {
     "nav2": (".geojson", ".json"),
@@ -64,7 +61,6 @@ _PARTS = ("rooms", "places")
 """Formats without a graph."""
 _SHOWN = 8
 """Ids in a line about changes."""
-_STRETCH = 1.05
 _NEAR_M, _FAR_M = 1.0, 2.0
 """Spacing of roadmaps for Nav2, which joins them at the nearest node; and of all other
 roadmaps: one-way lanes need long edges."""
@@ -101,9 +97,7 @@ def export(
     keep: KeepOption = None,
     nodes: NodesOption = None,
     spacing_m: SpacingOption = None,
-    stretch: StretchOption = _STRETCH,
     lanes_m: LanesOption = None,
-    polylines: PolylinesOption = False,
     frame: options.FrameOption[str] = "map",
     floor: options.GraphFloorOption = None,
     anchor: AnchorOption = None,
@@ -124,10 +118,9 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
+    others = {"--out": out, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
     out = bundle or _checked_out(kind, out)
-    check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     if kind in _PARTS:
@@ -138,15 +131,12 @@ def export(
                 "--keep": keep is not None,
                 "--nodes": nodes is not None,
                 "--spacing": spacing_m is not None,
-                "--stretch": stretch != _STRETCH,
                 "--lanes": lanes_m is not None,
-                "--polylines": polylines,
                 "--report": report is not None,
                 "--plot": plot is not None,
             },
         )
-    of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
-    check_style(style, of_roadmaps, {"--keep": keep})
+    check_style(style, {"--nodes": nodes}, {"--keep": keep})
     _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
@@ -167,7 +157,6 @@ def export(
         nodes,
         spacing_m,
         is_near=kind == "nav2" and lanes_m is None,
-        stretch=stretch,
         seed=settings.pyramid.seed,
     )
     with progress_bar("building the graph") as advance:
@@ -176,18 +165,17 @@ def export(
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
-        left_out = _write_graph(topology, (graph, written), fleet or robot, out, frame)
-    is_few = (fleet is not None or nodes is not None) and not polylines
+        left_out = _write_graph(topology, graph, fleet or robot, out, frame)
+    is_few = fleet is not None or nodes is not None
     pairs = LOSS_PAIRS if report is None and is_few else report
     judged = None
     if pairs is not None:
         with stage("comparing routes", seconds, "report"):
             judged = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
-    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
-    lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
-    lines += _ids_line(written) if fleet is None else []
+    lines = [*_summary(out, graph, judged), *_left_out_lines(left_out)]
+    lines += _ids_line(graph) if fleet is None else []
     # A bundle leaves out edges in keepout zones.
     after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
@@ -206,7 +194,6 @@ def _builder(
     spacing_m: float | None,
     *,
     is_near: bool,
-    stretch: float,
     seed: int,
 ) -> Callable[..., RouteGraph]:
     """Return what builds the graph of a map in a style; see `export`."""
@@ -216,7 +203,6 @@ def _builder(
         hn.ext.graphs.build_route_graph,
         nodes=nodes,
         spacing_m=_spacing(spacing_m, is_near=is_near),
-        stretch=stretch,
         seed=seed,
     )
 
@@ -230,7 +216,6 @@ def _export_over_floors(
     style: str,
     nodes: int | None,
     spacing_m: float | None,
-    stretch: float,
     anchor: str | None,
     vehicles: list[str] | None,
     no_doors: bool,
@@ -239,7 +224,7 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     out = _checked_out(kind, out)
-    check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
+    check_style(style, {"--nodes": nodes}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
@@ -251,7 +236,7 @@ def _export_over_floors(
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
     seed = reading.seed or 0
-    build = _builder(style, nodes, spacing_m, is_near=False, stretch=stretch, seed=seed)
+    build = _builder(style, nodes, spacing_m, is_near=False, seed=seed)
     reports: list[GraphReport] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
@@ -343,17 +328,17 @@ def _check_plain(kind: str, given: dict[str, bool]) -> None:
 
 def _write_graph(
     topology: hn.TopologicalMap,
-    graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
+    graph: RouteGraph,
     aim: Fleet | Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
     if isinstance(aim, Fleet):
-        return aim.write(topology, graphs[0], out)
+        return aim.write(topology, graph, out)
     if aim is not None:
-        return hn.ext.graphs.export_bundle(topology, graphs[0], out, frame=frame, **aim._asdict())
-    hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
+        return hn.ext.graphs.export_bundle(topology, graph, out, frame=frame, **aim._asdict())
+    hn.ext.graphs.export_nav2(graph, out, frame=frame)
     return ()
 
 
@@ -384,11 +369,10 @@ def _parts_answer(
 
 def _summary(
     out: Path,
-    graph: RouteGraph | WaypointGraph,
-    grid: hn.OccupancyGrid,
+    graph: RouteGraph,
     judged: GraphReport | None,
 ) -> list[str]:
-    counts = _counts(graph)
+    grid, counts = graph.grid, _counts(graph)
     lines = [
         f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",
         f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
@@ -403,13 +387,11 @@ def _summary(
     return lines
 
 
-def _ids_line(graph: RouteGraph | WaypointGraph) -> list[str]:
+def _ids_line(graph: RouteGraph) -> list[str]:
     """Return a line if Nav2's messages cannot hold all ids of a graph."""
     from hybridnav._base.messages import MOST_ID  # noqa: PLC0415 - on demand
 
-    most = graph.n_nodes + graph.n_edges - 1
-    if isinstance(graph, hn.ext.graphs.RouteGraph):
-        most = max(int(ids.max(initial=0)) for ids in graph.ids)
+    most = max(int(ids.max(initial=0)) for ids in graph.ids)
     if most <= MOST_ID:
         return []
     held = f"messages of ComputeRoute hold {MOST_ID:,}"
@@ -423,15 +405,11 @@ def _line(excess: Excess) -> str:
     )
 
 
-def _counts(graph: RouteGraph | WaypointGraph) -> dict[str, int]:
-    if isinstance(graph, hn.ext.graphs.WaypointGraph):
-        kinds = [facts["metadata"]["class"] for facts in graph.node_facts.values()]
-    else:
-        kinds = list(graph.kinds)
-    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+def _counts(graph: RouteGraph) -> dict[str, int]:
+    return {kind: graph.kinds.count(kind) for kind in dict.fromkeys(graph.kinds)}
 
 
-def _figures(graph: RouteGraph | WaypointGraph, judged: GraphReport | None) -> dict[str, Any]:
+def _figures(graph: RouteGraph, judged: GraphReport | None) -> dict[str, Any]:
     report = None if judged is None else asdict(judged)
     return {
         "nodes": graph.n_nodes,

@@ -53,14 +53,6 @@ NodesOption = Annotated[
         help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
     ),
 ]
-StretchOption = Annotated[
-    float,
-    typer.Option(
-        "--stretch",
-        metavar="S",
-        help="Most by which routes between nodes in sight are longer, as a factor.",
-    ),
-]
 LanesOption = Annotated[
     float | None,
     typer.Option(
@@ -68,13 +60,6 @@ LanesOption = Annotated[
         metavar="APART",
         help="Where two robots fit side by side, a lane on the right for each direction; APART is "
         "the distance in metres between the robots.",
-    ),
-]
-PolylinesOption = Annotated[
-    bool,
-    typer.Option(
-        "--polylines",
-        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
     ),
 ]
 ReportOption = Annotated[
@@ -218,17 +203,6 @@ class Fleet:
         if self.anchor is not None:
             return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
-
-
-def check_polylines(kind: str, *, given: bool, straight: bool) -> None:
-    """Refuse the option with others that are for straight edges, and for other formats."""
-    if given and straight:
-        raise UsageError(
-            "--polylines does not go with --report, --plot and --lanes, which are for straight "
-            "edges: leave them out"
-        )
-    if given and kind in ENDINGS:
-        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
 
 
 def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
