@@ -92,6 +92,35 @@ def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
     assert cli(*given, "--keep", tmp_path / "no.geojson").refuses(3, "no.geojson")
 
 
+def test_named_points_come_from_a_file(cli, tmp_path):
+    out, again = tmp_path / "a.geojson", tmp_path / "b.geojson"
+    (tmp_path / "points.yaml").write_text(
+        "dock: [1.5, 2.5]\n'shelf 7': {position: {x: 0.35, y: 1.5, z: 0.0}, orientation: {w: 1.0}}\n"
+    )
+    given = ("export", FIGURE, *SMALL[:2], "--points", tmp_path / "points.yaml")
+    done = cli(*given, "-o", out, "--json")
+    assert (done.code, done.err) == (0, "")
+    named = {
+        facts["name"]: read_nav2(out).points[n]
+        for n, facts in read_nav2(out).node_facts.items()
+        if "name" in facts
+    }
+    assert named["dock"] == pytest.approx((1.5, 2.5), abs=0.01)
+    assert named["shelf 7"] == pytest.approx((0.35, 1.5), abs=0.01)
+    assert cli(*given, "-o", again, "--keep", out).code == 0
+    assert out.read_bytes() == again.read_bytes()
+    # Through the file of a fleet, nodes keep their ids, too.
+    fleet = ("--format", "rmf", "-o", tmp_path / "a.yaml", "--floor", "2")
+    assert cli(*given, *fleet, "--keep", out).code == 0
+    done = cli(*given, *fleet, "--keep", tmp_path / "a.yaml", "--force", "--json")
+    assert (done.code, set(map(len, done.answer["changes"]["nodes"].values()))) == (0, {0})
+    for text in ("dock: [1.5]\n", "dock: here\n", "dock: {x: a, y: 1}\n"):
+        (tmp_path / "points.yaml").write_text(text)
+        assert cli(*given, "-o", out, "--force").refuses(2, "'dock' must be [x, y] in metres")
+    refused = cli(*given, "-o", out, "--force", "--style", "roadmap")
+    assert refused.refuses(2, "--points is for --style lanes")
+
+
 def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
     folder = tmp_path / "robot"
     given = ("export", FIGURE, *SMALL[:2], "--bundle", folder)

@@ -117,7 +117,7 @@ def first_broken_edge(
         if not isinstance(graph, RouteGraph):
             raise InvalidValueError("a graph from a file knows no map: give grid, the map now")
         grid = graph.grid
-    (nodes, edges), ends = _ids(graph), [*map(tuple, graph.edges.tolist())]
+    (nodes, edges), ends = ids_of(graph), [*map(tuple, graph.edges.tolist())]
     edge_of = dict(zip(edges, ends, strict=True))
     if by == "nodes":
         edge_of = {(nodes[tail], nodes[head]): (tail, head) for tail, head in ends}
@@ -134,16 +134,16 @@ def first_broken_edge(
     return None
 
 
-def _ids(graph: Graph) -> tuple[list[Any], list[Any]]:
+def ids_of(graph: Graph) -> tuple[list[Any], list[Any]]:
     """Return the ids of nodes and edges."""
     if isinstance(graph, RouteGraph):
         return graph.ids[0].tolist(), graph.ids[1].tolist()
-    return list(graph.names), list(graph.edge_names)
+    return graph.ids
 
 
 def _by_id(graph: Graph) -> tuple[dict[Any, tuple[float, float]], dict[Any, tuple[Any, Any]]]:
     """Return the points of nodes and the ends of edges, by their ids."""
-    nodes, edges = _ids(graph)
+    nodes, edges = ids_of(graph)
     points = dict(zip(nodes, map(tuple, graph.points.tolist()), strict=True))
     pairs = [(nodes[tail], nodes[head]) for tail, head in graph.edges.tolist()]
     return points, dict(zip(edges, pairs, strict=True))

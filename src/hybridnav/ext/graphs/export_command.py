@@ -38,10 +38,12 @@ from hybridnav.ext.graphs.fleet_options import (
     NodesOption,
     NoDoorsOption,
     OperationsOption,
+    PointsOption,
     ReportOption,
     StyleOption,
     VehiclesOption,
     check_style,
+    read_points,
     warn_of_loss,
 )
 
@@ -94,6 +96,7 @@ def export(
     operations: OperationsOption = False,
     kind: FormatOption = "nav2",
     style: StyleOption = "lanes",
+    points: PointsOption = None,
     keep: KeepOption = None,
     nodes: NodesOption = None,
     spacing_m: SpacingOption = None,
@@ -128,6 +131,7 @@ def export(
             kind,
             {
                 "--style": style != STYLES[0],
+                "--points": points is not None,
                 "--keep": keep is not None,
                 "--nodes": nodes is not None,
                 "--spacing": spacing_m is not None,
@@ -136,7 +140,7 @@ def export(
                 "--plot": plot is not None,
             },
         )
-    check_style(style, {"--nodes": nodes}, {"--keep": keep})
+    check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
     _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
@@ -150,7 +154,10 @@ def export(
             _write_parts(topology, kind, out, frame)
         _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
         return
-    before = None if keep is None else hn.ext.graphs.load_graph(keep)
+    own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
+    before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
+    for_lanes: dict[str, Any] = {"keep": before} if before else {}
+    for_lanes |= {"points": read_points(points)} if points else {}
     began = time.perf_counter()
     build = _builder(
         style,
@@ -160,7 +167,7 @@ def export(
         seed=settings.pyramid.seed,
     )
     with progress_bar("building the graph") as advance:
-        graph = build(topology, progress=advance, **({"keep": before} if before else {}))
+        graph = build(topology, progress=advance, **for_lanes)
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)

@@ -11,7 +11,10 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav._base.yaml_file import read_yaml
 from hybridnav.cli.common import UsageError, complain
+from hybridnav.errors import MapError, brief
+from hybridnav.ext.graphs.gather import pair_of
 
 if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
@@ -42,6 +45,15 @@ KeepOption = Annotated[
         "--keep",
         metavar="FILE",
         help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
+    ),
+]
+PointsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--points",
+        metavar="FILE",
+        help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
+        "get a node with the name at each.",
     ),
 ]
 NodesOption = Annotated[
@@ -203,6 +215,27 @@ class Fleet:
         if self.anchor is not None:
             return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
+
+
+def read_points(path: Path) -> dict[str, tuple[float, float]]:
+    """Return the named points of a YAML file, in metres.
+
+    Raises
+    ------
+    UsageError
+        When it is no mapping of names to points or poses.
+    """
+    found = {}
+    for name, value in read_yaml(path, what="points", error=MapError).items():
+        pose = value.get("pose", value) if isinstance(value, dict) else value
+        at = pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
+        if at is None:
+            raise UsageError(
+                f"points {printable(path)}: {brief(name)} must be [x, y] in metres or a pose with "
+                f"a position, got {brief(value)}"
+            )
+        found[str(name)] = at
+    return found
 
 
 def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,9 +29,10 @@ if TYPE_CHECKING:
 
 
 def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:
-    """Return what is known of a node: `class`, `room`, `door`."""
-    door = int(graph.doors[node])
-    return _known({"class": graph.kinds[node], "room": graph.rooms[node], "door": door or None})
+    """Return what is known of a node: `class`, `name`, `room`, `door`."""
+    door = int(graph.doors[node]) or None
+    known = {"class": graph.kinds[node], "name": graph.names[node]}
+    return _known(known | {"room": graph.rooms[node], "door": door})
 
 
 def edge_metadata(graph: RouteGraph, chain: Sequence[int]) -> dict[str, Any]:
@@ -113,6 +115,7 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
         kinds=tuple(nodes.kinds),
         rooms=tuple(_room_of(rooms, cells)),
         doors=np.array(nodes.doors, dtype=np.int64),
+        names=(None,) * len(positions),
         edges=edges,
         edge_rooms=tuple(_room_of(rooms, middles)),
         edge_doors=tuple(
@@ -247,7 +250,8 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
         [*graph.kinds, *[LANE] * len(new)],
         [*graph.doors.tolist(), *[0] * len(new)],
     )
-    return described(topology, nodes, chosen)
+    found = described(topology, nodes, chosen)
+    return replace(found, names=(*graph.names, *[None] * len(new)))
 
 
 def _lane(positions: FloatArray, edges: LongArray, off: float) -> tuple[FloatArray, FloatArray]:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.graphs.judge import FreeSpace
 
+_SLOPE = 0.35
+"""Slope up to which an edge counts as one along a main direction."""
+
 
 def turn_of(angle_rad: float) -> FloatArray:
     """Return the matrix, float64 (2, 2), that turns a main direction into that of rows."""
@@ -128,3 +131,29 @@ def crossing(
     pair = [int(one[pairs[0]]), int(other[pairs[0]])]
     point = shapely.intersection(lines[pair[0]], lines[pair[1]])
     return pair, shapely.get_coordinates(point)[0]
+
+
+def aligned(
+    turned: FloatArray, edges: LongArray, reach: FloatArray, axis: int, most: float
+) -> FloatArray:
+    """Return coordinates that are equal along the edges of one direction, float64 (n,).
+
+    The longest edges come first; their nodes share a coordinate as long as all can reach it.
+    """
+    steps = abs(turned[edges[:, 1]] - turned[edges[:, 0]])
+    along, off = steps[:, 1 - axis], steps[:, axis]
+    fits = (off < _SLOPE * along) | ((off < most) & (along > 1.5 * off))
+    group, value = np.arange(len(turned)), turned[:, axis]
+    low, high = value - reach, value + reach
+    members = [[node] for node in range(len(turned))]
+    for edge in np.argsort(-along, kind="stable").tolist():
+        one, other = group[edges[edge]].tolist()
+        least, greatest = max(low[one], low[other]), min(high[one], high[other])
+        if fits[edge] and one != other and least <= greatest:
+            low[one], high[one] = least, greatest
+            members[one] += members[other]
+            group[members[other]] = one
+    found = value.copy()
+    for one in np.unique(group).tolist():
+        found[members[one]] = np.clip(value[members[one]].mean(), low[one], high[one])
+    return found

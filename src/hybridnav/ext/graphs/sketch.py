@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.ext.graphs.segments import (
+    aligned,
     crosses,
     crossing,
     is_beside,
@@ -30,8 +31,6 @@ _KEPT = 0.8
 """Share of its clearance that an edge keeps where it is moved, up to what is asked for."""
 _STRAIGHT = 0.7
 """The same where a bend goes."""
-_SLOPE = 0.35
-"""Slope up to which an edge counts as one along a main direction."""
 _FRACTION = 2.0**10
 """Parts of a cell to which positions that were computed are rounded."""
 _RIM = 2.0**-5
@@ -41,6 +40,8 @@ _TOUCHING = 1e-6
 _MOST_BESIDE = 5
 """Edges of a node from which on it gets no chord: people draw crossings, no stars."""
 _ROUNDS = 50
+_TRIED = 20
+"""Nearest edges that a point is joined to, if it sees them."""
 
 
 def settled(positions: FloatArray) -> FloatArray:
@@ -123,7 +124,7 @@ class Sketch:
         turned = self.positions @ turn.T
         reach = np.clip(0.4 * self._passage.at(self.positions), 1.0, most)
         reach[self.kinds >= DOOR] = np.minimum(reach[self.kinds >= DOOR], most / 4)
-        aim = [_aligned(turned, self.edges, reach, axis, most) for axis in (0, 1)]
+        aim = [aligned(turned, self.edges, reach, axis, most) for axis in (0, 1)]
         self.move(np.stack(aim, axis=1) @ turn)
 
     def move(self, aim: FloatArray) -> None:
@@ -322,6 +323,55 @@ class Sketch:
                 beside[one][other] = beside[other][one] = length
         return added
 
+    def add_points(self, points: FloatArray, near: float) -> None:
+        """Add nodes at points, each joined to the nearest edge where that is in sight.
+
+        Parameters
+        ----------
+        points
+            float64 (k, 2).
+        near
+            Distance in cells from its ends, and from a point, within which an edge gets no node
+            for the point: it is joined to the end, or led through the point.
+        """
+        for node in self._with_nodes(points):
+            if (self.edges == node).any():
+                continue
+            at = self.positions[node]
+            tails = self.positions[self.edges[:, 0]]
+            steps = self.positions[self.edges[:, 1]] - tails
+            lengths = np.maximum((steps**2).sum(axis=1), 1e-9)
+            along = np.clip(((at - tails) * steps).sum(axis=1) / lengths, 0, 1)
+            feet = tails + along[:, None] * steps
+            away = np.hypot(*(feet - at).T)
+            for edge in np.argsort(away, kind="stable")[:_TRIED].tolist():
+                joined = self._stub(node, edge, feet[edge], near)
+                if joined:
+                    self.set_edges([*np.delete(self.edges, edge, axis=0).tolist(), *joined])
+                    break
+
+    def _stub(
+        self, node: int, edge: int, foot: FloatArray, near: float
+    ) -> list[tuple[int, int]] | None:
+        """Return the edges that join a node to an edge and stand for it, None if none are free."""
+        tail, head = self.edges[edge].tolist()
+        at, ends = self.positions[node], self.positions[[tail, head]]
+        joins = self._passage.space.joins
+        if math.dist(at, foot) <= near and joins(np.stack([at, at]), ends).all():
+            return [(tail, node), (node, head)]
+        gaps = np.hypot(*(ends - foot).T)
+        if gaps.min() > near:
+            foot = settled(foot[None])
+            if self._is_free(foot)[0]:
+                spots = np.repeat(foot, 3, axis=0)
+                if joins(spots, np.concatenate([ends, at[None]])).all():
+                    (new,) = self._with_nodes(foot)
+                    return [(tail, new), (new, head), (new, node)]
+        for end in np.argsort(gaps, kind="stable").tolist():
+            if joins(at[None], ends[[end]])[0]:
+                return [(tail, head), (node, (tail, head)[end])]
+        return None
+
     def split(self, longest: float) -> None:
         """Divide edges into equal ones of about a length in cells at most."""
         edges: list[Sequence[int]] = []
@@ -397,29 +447,3 @@ class Sketch:
 def _remove(node: int, beside: dict[int, set[int]]) -> None:
     for other in beside.pop(node):
         beside[other].discard(node)
-
-
-def _aligned(
-    turned: FloatArray, edges: LongArray, reach: FloatArray, axis: int, most: float
-) -> FloatArray:
-    """Return coordinates that are equal along the edges of one direction, float64 (n,).
-
-    The longest edges come first; their nodes share a coordinate as long as all can reach it.
-    """
-    steps = abs(turned[edges[:, 1]] - turned[edges[:, 0]])
-    along, off = steps[:, 1 - axis], steps[:, axis]
-    fits = (off < _SLOPE * along) | ((off < most) & (along > 1.5 * off))
-    group, value = np.arange(len(turned)), turned[:, axis]
-    low, high = value - reach, value + reach
-    members = [[node] for node in range(len(turned))]
-    for edge in np.argsort(-along, kind="stable").tolist():
-        one, other = group[edges[edge]].tolist()
-        least, greatest = max(low[one], low[other]), min(high[one], high[other])
-        if fits[edge] and one != other and least <= greatest:
-            low[one], high[one] = least, greatest
-            members[one] += members[other]
-            group[members[other]] = one
-    found = value.copy()
-    for one in np.unique(group).tolist():
-        found[members[one]] = np.clip(value[members[one]].mean(), low[one], high[one])
-    return found
