@@ -95,7 +95,7 @@ def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
 def test_named_points_come_from_a_file(cli, tmp_path):
     out, again = tmp_path / "a.geojson", tmp_path / "b.geojson"
     (tmp_path / "points.yaml").write_text(
-        "dock: [1.5, 2.5]\n'shelf 7': {position: {x: 0.35, y: 1.5, z: 0.0}, orientation: {w: 1.0}}\n"
+        "dock: [1.5, 2.5]\n'shelf 7': {position: {x: 0.35, y: 1.5}, orientation: {w: 1.0}}\n"
     )
     given = ("export", FIGURE, *SMALL[:2], "--points", tmp_path / "points.yaml")
     done = cli(*given, "-o", out, "--json")

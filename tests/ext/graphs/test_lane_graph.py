@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -218,7 +219,7 @@ def test_named_points_are_nodes_where_they_are(tmp_path, yaw_rad):
     # Each adds itself and where its lane begins at most, and the rest of the graph is the same.
     assert graph.n_nodes <= plain.n_nodes + 2 * len(points)
     away, _ = KDTree(graph.points).query(plain.points)
-    assert away.max() <= 1e-9
+    assert np.max(away) <= 1e-9
     kinds = dict(zip(graph.names, graph.kinds, strict=True))
     assert {kinds[name] for name in points} <= {"point", "room", "door"}
     assert kinds["dock"] == "point"
@@ -282,11 +283,12 @@ def test_files_of_fleets_keep_ids(tmp_path, name):
     graph = replace(graph, ids=(at[: graph.n_nodes], at[graph.n_nodes :]))
     floors = (hn.ext.fleet.floor_graph(topology, graph, name="2"),)
     house = hn.ext.fleet.BuildingGraph(name="house", floors=floors)
-    write = {
+    writers: dict[str, Any] = {
         "a.yaml": hn.ext.graphs.export_rmf,
         "a.osm": partial(hn.ext.graphs.export_osm, anchor=hn.ext.graphs.Anchor(48.1, 11.5, 20)),
         "a.json": partial(hn.ext.graphs.export_lif, vehicle_types=["A.B"]),
-    }[name]
+    }
+    write = writers[name]
     write(house, tmp_path / name)
     known = hn.ext.graphs.load_graph(tmp_path / name)
     again = build_lane_graph(topology, spacing_m=2.0, keep=known)

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.segments import length_between
 from hybridnav.ext.graphs.sketch import DOOR, NOTHING, ROOM, Sketch
+from hybridnav.ext.graphs.strands import length_between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.ext.graphs.segments import Passage
-    from hybridnav.ext.graphs.strands import Strand
+    from hybridnav.ext.graphs.strands import Passage, Strand
 
 _COARSE = 8
 """Cells between the points by which the length of a chain is measured: its steps are stairs."""

@@ -13,14 +13,14 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.changes import ids_of
+from hybridnav.ext.graphs.chords import add_chords, drop_ends
 from hybridnav.ext.graphs.drawing import ChainGraph
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
-from hybridnav.ext.graphs.segments import Passage
+from hybridnav.ext.graphs.route_messages import ids_of
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
-from hybridnav.ext.graphs.strands import Layout, RoomAnchors, lines_of, strands_of
+from hybridnav.ext.graphs.strands import COVER, Layout, Passage, RoomAnchors, lines_of, strands_of
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
@@ -48,7 +48,7 @@ metres: maps of laser scans end in many thin rays."""
 _SMALL, _SMALL_NARROW = 1.75, (2.5, 3.5)
 """Length of the smallest rings of lanes, in distances between lanes; and where there is less room
 than is asked for, a little less and none beyond the robot's radius."""
-_MERGED_M, _NEAR_M = 1.0, 0.8
+_MERGED_M, _NEAR_M = 1.0, 1.0
 """Length below which a chain, and a straight edge, becomes one node, in metres."""
 _STEP_M = 0.2
 _BEND_M = 2.0
@@ -58,6 +58,9 @@ _SNAP_M = 0.8
 _CHORD, _DETOUR, _CHORD_RAD = 2.5, 1.08, math.radians(15)
 """Chords: their length in distances between lanes, the detour that they save, and the angle to
 other edges, so that they make no fans."""
+_SEEN = 1.6
+"""Distance from a node within which robots join it when a dead end is left out, in distances
+between lanes."""
 _LONGEST = 1.25
 """Length of an edge above which it is divided, in distances between lanes: robots join graphs at
 nodes."""
@@ -169,7 +172,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     for _ in range(2):
         sketch.simplify(_NEAR_M / cell_m, 2 * layout.apart)
         sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
-    sketch.add_chords(_CHORD * layout.apart, _DETOUR, _CHORD_RAD)
+    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, max(1, round(_STEP_M / cell_m)))
+    add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
     sketch.split(_LONGEST * layout.apart)
     _connect(sketch, space)
     known = None if keep is None else grid.frame.positions_of(keep.points)
