@@ -14,9 +14,14 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.ext.graphs import build_lane_graph
+from hybridnav.ext.graphs.chords import drop_ends
+from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.kernels import spread, thinned
+from hybridnav.ext.graphs.sketch import END, NOTHING, ROOM, Sketch
+from hybridnav.ext.graphs.strands import Passage
 from hybridnav.ext.graphs.waypoint_graph import components_of
 from hybridnav.harness.judges import segment_faults
+from hybridnav.maps.clearance import clearance_cells
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.ext.graphs.test_route_graph import boxes, map_of, slanted
 from tests.nav2_reader import read_nav2
@@ -175,6 +180,39 @@ def test_a_changed_map_keeps_nodes_and_ids(seed):
     old = {*before.ids[0].tolist(), *before.ids[1].tolist()}
     assert not old & (ends[1].keys() - ends[0].keys())
     assert not old & (now.keys() - at.keys())
+
+
+def test_a_node_that_a_box_covers_moves_off_and_keeps_its_id():
+    topology = floor(hall(160, 200))
+    before = build_lane_graph(topology, spacing_m=4.0)
+    degree = np.bincount(before.edges.ravel(), minlength=before.n_nodes)
+    for node in np.flatnonzero(degree == degree.max())[:3].tolist():
+        cells = hall(160, 200)
+        row, col = topology.grid.frame.cell_of(*before.points[node])
+        cells[row - 3 : row + 3, col - 3 : col + 3] = 1.0
+        after = checked(floor(cells), spacing_m=4.0, keep=before)
+        assert set(before.ids[0].tolist()) <= set(after.ids[0].tolist())
+        now = after.points[after.ids[0].tolist().index(before.ids[0][node])]
+        assert 0.3 <= np.hypot(*(now - before.points[node])) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "wall", "left"),
+    [(END, False, 1), (ROOM, False, 4), (END, True, 4)],
+    ids=["in sight", "of a room", "behind a wall"],
+)
+def test_dead_ends_are_left_out_where_robots_see_another_node(kind, wall, left):
+    cells = np.zeros((60, 60), dtype=np.float32)
+    cells[30, 10:] = cells[34:, 30] = wall
+    space = FreeSpace.of(hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0))
+    at = np.array([[10.5, 50.5], [10.5, 5.5], [50.5, 5.5], [50.5, 50.5]])
+    kinds = np.array([ROOM, NOTHING, NOTHING, kind])
+    passage = Passage(space, clearance_cells(~space.free), 2.0)
+    sketch = Sketch(at, kinds, np.array([[0, 1], [1, 2], [2, 3]]), passage)
+    drop_ends(sketch, 60.0, 90.0, 3)
+    # Once the end is gone the next is one, and from the first room all of the hall is in sight.
+    assert len(sketch.positions) == len(sketch.kinds) == left
+    assert sketch.edges.max(initial=0) < len(sketch.positions)
 
 
 def test_an_unchanged_map_keeps_everything_through_a_file(tmp_path):

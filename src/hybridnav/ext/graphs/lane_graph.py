@@ -179,7 +179,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     known = None if keep is None else grid.frame.positions_of(keep.points)
     if keep is not None and known is not None:
         same = _same(sketch, known, cell_m)
-        sketch.keep(settled(known), keep.edges, same, _STANDS * layout.apart)
+        old = sketch.freed(settled(known), _SAME_M / cell_m)
+        sketch.keep(old, keep.edges, same, _STANDS * layout.apart)
         _connect(sketch, space)
     if named:
         sketch.add_points(np.array([*named.values()]), _MERGED_M / 2 / cell_m)

@@ -261,6 +261,22 @@ class Sketch:
         is_kept = np.isin(self.edges, nodes).all(axis=1)
         self.set_edges(np.searchsorted(nodes, self.edges[is_kept]).tolist())
 
+    def freed(self, positions: FloatArray, most: float) -> FloatArray:
+        """Move positions that are not free to free ones within a distance in cells: of those with
+        the room that is asked for, or else the most, the nearest."""
+        free, passage = self.passage.space.free, self.passage
+        moved = positions.copy()
+        for k in np.flatnonzero(~self._is_free(positions)).tolist():
+            low = np.maximum(np.floor(positions[k] - most), 0).astype(np.int64)
+            high = np.maximum(np.ceil(positions[k] + most), 0).astype(np.int64)
+            spots = np.argwhere(free[low[0] : high[0], low[1] : high[1]]) + low + 0.5
+            away = np.hypot(*(spots - positions[k]).T)
+            spots, away = spots[away < most], away[away < most]
+            if len(spots):
+                room = np.minimum(passage.at(spots), passage.comfort)
+                moved[k] = spots[np.lexsort((away, -room))[0]]
+        return moved
+
     def _is_free(self, positions: FloatArray) -> BoolArray:
         free = self.passage.space.free
         inside = np.asarray(
