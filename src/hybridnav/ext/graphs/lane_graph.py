@@ -48,8 +48,10 @@ metres: maps of laser scans end in many thin rays."""
 _SMALL, _SMALL_NARROW = 1.75, (2.5, 3.5)
 """Length of the smallest rings of lanes, in distances between lanes; and where there is less room
 than is asked for, a little less and none beyond the robot's radius."""
-_MERGED_M, _NEAR_M = 1.0, 1.0
-"""Length below which a chain, and a straight edge, becomes one node, in metres."""
+_MERGED = 0.25
+"""Length below which a chain, or straight edge, becomes one node, in distances between lanes."""
+_MOST_MERGED_M = 1.0
+"""The most of this, in metres."""
 _STEP_M = 0.2
 _BEND_M = 2.0
 """Where chains may bend, and what a bend costs, in metres."""
@@ -102,8 +104,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
         to the nearest lane in sight.
     keep
         A graph of the map as it was: its nodes and edges stay where the robot can still follow
-        them, with their ids, and only what they lack is added. A node that is moved by 1 m at most
-        keeps its id too. No id of that graph goes to anything else.
+        them, with their ids, and only what they lack is added. A node that an obstacle covers now
+        moves off to free space within 1 m, if there is any, and keeps its id too. No id of that graph goes to anything else.
     progress
         Called with the number of steps done and of all steps.
 
@@ -165,12 +167,13 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     progress(2, _STEPS)
     least, most = _SMALL_NARROW
     drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
-    drawing.merge(_MERGED_M / cell_m)
+    near = min(_MERGED * layout.apart, _MOST_MERGED_M / cell_m)
+    drawing.merge(near)
     sketch = drawing.straightened(max(1, round(_STEP_M / cell_m)), _BEND_M / cell_m)
     progress(3, _STEPS)
     sketch.repair()
     for _ in range(2):
-        sketch.simplify(_NEAR_M / cell_m, 2 * layout.apart)
+        sketch.simplify(near, 2 * layout.apart)
         sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
     drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, max(1, round(_STEP_M / cell_m)))
     add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
@@ -183,7 +186,7 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
         sketch.keep(old, keep.edges, same, _STANDS * layout.apart)
         _connect(sketch, space)
     if named:
-        sketch.add_points(np.array([*named.values()]), _MERGED_M / 2 / cell_m)
+        sketch.add_points(np.array([*named.values()]), near / 2)
         _connect(sketch, space)
     sketch.make_plane()
     progress(4, _STEPS)
