@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.ext.graphs import build_lane_graph
-from hybridnav.ext.graphs.chords import drop_ends
+from hybridnav.ext.graphs.drawing import drop_ends
 from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.kernels import spread, thinned
 from hybridnav.ext.graphs.sketch import END, NOTHING, ROOM, Sketch

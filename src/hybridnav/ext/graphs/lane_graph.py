@@ -13,8 +13,7 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.chords import add_chords, drop_ends
-from hybridnav.ext.graphs.drawing import ChainGraph
+from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
@@ -105,7 +104,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     keep
         A graph of the map as it was: its nodes and edges stay where the robot can still follow
         them, with their ids, and only what they lack is added. A node that an obstacle covers now
-        moves off to free space within 1 m, if there is any, and keeps its id too. No id of that graph goes to anything else.
+        moves off to free space within 1 m, if there is any, and keeps its id too. No id of that
+        graph goes to anything else.
     progress
         Called with the number of steps done and of all steps.
 
