@@ -63,9 +63,6 @@ _PARTS = ("rooms", "places")
 """Formats without a graph."""
 _SHOWN = 8
 """Ids in a line about changes."""
-_NEAR_M, _FAR_M = 1.0, 2.0
-"""Spacing of roadmaps for Nav2, which joins them at the nearest node; and of all other
-roadmaps: one-way lanes need long edges."""
 
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
@@ -75,9 +72,8 @@ SpacingOption = Annotated[
     typer.Option(
         "--spacing",
         metavar="D",
-        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of "
-        f"a roadmap, within which points see a node, by default {_NEAR_M:g}, with --lanes and in "
-        f"formats other than nav2 {_FAR_M:g}.",
+        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of a "
+        "roadmap, within which points see a node, by default 1.",
     ),
 ]
 
@@ -159,13 +155,7 @@ def export(
     for_lanes: dict[str, Any] = {"keep": before} if before else {}
     for_lanes |= {"points": read_points(points)} if points else {}
     began = time.perf_counter()
-    build = _builder(
-        style,
-        nodes,
-        spacing_m,
-        is_near=kind == "nav2" and lanes_m is None,
-        seed=settings.pyramid.seed,
-    )
+    build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with progress_bar("building the graph") as advance:
         graph = build(topology, progress=advance, **for_lanes)
         if lanes_m is not None:
@@ -196,22 +186,13 @@ def export(
 
 
 def _builder(
-    style: str,
-    nodes: int | None,
-    spacing_m: float | None,
-    *,
-    is_near: bool,
-    seed: int,
+    style: str, nodes: int | None, spacing_m: float | None, seed: int
 ) -> Callable[..., RouteGraph]:
     """Return what builds the graph of a map in a style; see `export`."""
     if style == "lanes":
         return partial(hn.ext.graphs.build_lane_graph, spacing_m=spacing_m)
-    return partial(
-        hn.ext.graphs.build_route_graph,
-        nodes=nodes,
-        spacing_m=_spacing(spacing_m, is_near=is_near),
-        seed=seed,
-    )
+    near_m = 1.0 if spacing_m is None else spacing_m
+    return partial(hn.ext.graphs.build_route_graph, nodes=nodes, spacing_m=near_m, seed=seed)
 
 
 def _export_over_floors(
@@ -242,8 +223,7 @@ def _export_over_floors(
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    seed = reading.seed or 0
-    build = _builder(style, nodes, spacing_m, is_near=False, seed=seed)
+    build = _builder(style, nodes, spacing_m, reading.seed or 0)
     reports: list[GraphReport] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
@@ -318,11 +298,6 @@ def _check_taken(out: Path, *, force: bool) -> None:
     """Refuse to write over a file."""
     if out.is_file() and not force:
         raise UsageError(f"{printable(out)} exists: add --force to write over it")
-
-
-def _spacing(given_m: float | None, *, is_near: bool) -> float:
-    """Return the spacing that is given, or that of the format."""
-    return given_m if given_m is not None else _NEAR_M if is_near else _FAR_M
 
 
 def _check_plain(kind: str, given: dict[str, bool]) -> None:
