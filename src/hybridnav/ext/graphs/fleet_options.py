@@ -11,10 +11,8 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav._base.yaml_file import read_yaml
 from hybridnav.cli.common import UsageError, complain
 from hybridnav.errors import MapError, brief
-from hybridnav.ext.graphs.gather import pair_of
 
 if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
@@ -225,6 +223,9 @@ def read_points(path: Path) -> dict[str, tuple[float, float]]:
     UsageError
         When it is no mapping of names to points or poses.
     """
+    from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
+    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415
+
     found = {}
     for name, value in read_yaml(path, what="points", error=MapError).items():
         pose = value.get("pose", value) if isinstance(value, dict) else value
