@@ -210,7 +210,6 @@ FILES = {
     "nav2-roadmap.geojson": ["export", *_OFFICE, "--style", "roadmap"],
     "nav2-nodes.geojson": ["export", *_OFFICE, "--style", "roadmap", "--nodes", "200"],
     "nav2-lanes.geojson": ["export", *_OFFICE, "--lanes", "0.6"],
-    "nav2-polylines.geojson": ["export", *_OFFICE, "--polylines"],
     "rmf.building.yaml": ["export", *_OFFICE, "--format", "rmf"],
     "office.osm": ["export", *_OFFICE, "--format", "osm", "--anchor", "50.1,8.6,12"],
     "office.lif.json": ["export", *_OFFICE, "--format", "lif", "--vehicle", "acme.one"],

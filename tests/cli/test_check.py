@@ -66,6 +66,17 @@ def test_a_faulty_graph(cli, faulty, tmp_path):
 LEVELS = ("error", "warning", "note", "never")
 
 
+def test_edges_are_checked_along_their_lines(cli, sound, tmp_path):
+    whole = json.loads(sound.read_text())
+    edge = next(one for one in whole["features"] if one["geometry"]["type"] == "LineString")
+    edge["geometry"]["coordinates"].insert(1, [100.0, 100.0])  # a detour outside the map
+    path = tmp_path / "detour.geojson"
+    path.write_text(json.dumps(whole))
+    assert cli("check", FIGURE, path, *POINT).code == 0
+    done = cli("check", FIGURE, path, *POINT, "--along-lines", "--json")
+    assert (done.code, done.answer["findings"]["edge-through-wall"]["count"]) == (1, 1)
+
+
 def codes(cli, path):
     """The exit code for each level of --fail-on, and for none."""
     levels = [cli("check", FIGURE, path, *POINT, "--fail-on", level).code for level in LEVELS]

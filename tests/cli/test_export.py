@@ -48,41 +48,25 @@ def test_lanes_for_robots_that_pass_each_other(cli, tmp_path):
     )
 
 
-def test_edges_that_bend(cli, tmp_path):
-    out = tmp_path / "graph.geojson"
-    done = cli("export", FIGURE, "-o", out, *SMALL, "--polylines", "--json")
-    assert (done.code, done.err) == (0, "")
-    assert set(done.answer["kinds"]) <= {"room", "door", "place"}
-    assert sum(done.answer["kinds"].values()) == done.answer["nodes"] == len(read_nav2(out).points)
-    done = cli("check", FIGURE, out, *SMALL[:2], "--along-lines", "--json")
-    assert (done.code, done.answer["findings"]) == (0, {})
-    refused = cli("export", FIGURE, "-o", out, "--polylines", "--report", "5")
-    assert refused.refuses(2, "--polylines does not go with --report")
-
-
 def test_wrong_usage_ends_in_one_line(cli, tmp_path):
     out = tmp_path / "graph.geojson"
     assert cli("export", FIGURE, "-o", tmp_path / "graph.txt").refuses(2, "--out", ".geojson")
     assert cli("export", FIGURE, "-o", out, "--format", "shapefile").refuses(2, "--format", "nav2")
     assert cli("export", FIGURE, "-o", tmp_path / "no" / "g.json").refuses(2, "no folder")
     assert cli("export", FIGURE, "-o", out, *SMALL[:2], "--spacing", "nan").refuses(2, "spacing_m")
-    assert cli("export", FIGURE, "-o", out, "--stretch", "0.9", *SMALL).refuses(2, "stretch")
     assert cli("export", FIGURE, "-o", out, "--report", 10**20, *SMALL).refuses(2, "--report")
     assert cli("export", tmp_path / "none.yaml", "-o", out).refuses(3, "none.yaml")
     assert not out.exists()
 
 
-def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
+def test_roadmaps_have_nodes_near_every_point(cli, tmp_path):
     def nodes(*more):
-        out = tmp_path / f"g.{more[1] if more else 'json'}"
-        given = ("export", FIGURE, "-o", out, "--json", "--force")
-        return cli(*given, *SMALL[:2], *SMALL[4:], *more[2:]).answer["nodes"]
+        given = ("export", FIGURE, "-o", tmp_path / "g.json", "--json", "--force")
+        return cli(*given, *SMALL[:2], *SMALL[4:], *more).answer["nodes"]
 
-    near, far = nodes(), nodes("", "json", "--spacing", 2)
-    assert near == nodes("", "json", "--spacing", 1)
-    assert near > far
-    assert nodes("", "yaml", "--format", "rmf") == far
-    assert nodes("", "json", "--lanes", 1) == nodes("", "json", "--lanes", 1, "--spacing", 2)
+    near = nodes()
+    assert near == nodes("--spacing", 1)
+    assert near > nodes("--spacing", 2)
 
 
 def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
@@ -101,9 +85,37 @@ def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
     given = ("export", FIGURE, "-o", second, "--force", *SMALL[:2])
     assert cli(*given, "--style", "dense").refuses(2, "--style", "lanes, roadmap")
     assert cli(*given, "--nodes", 5).refuses(2, "--nodes is for --style roadmap")
-    assert cli(*given, "--stretch", 2).refuses(2, "--stretch is for --style roadmap")
     assert cli(*given, *SMALL[4:], "--keep", first).refuses(2, "--keep is for --style lanes")
     assert cli(*given, "--keep", tmp_path / "no.geojson").refuses(3, "no.geojson")
+
+
+def test_named_points_come_from_a_file(cli, tmp_path):
+    out, again = tmp_path / "a.geojson", tmp_path / "b.geojson"
+    (tmp_path / "points.yaml").write_text(
+        "dock: [1.5, 2.5]\n'shelf 7': {position: {x: 0.35, y: 1.5}, orientation: {w: 1.0}}\n"
+    )
+    given = ("export", FIGURE, *SMALL[:2], "--points", tmp_path / "points.yaml")
+    done = cli(*given, "-o", out, "--json")
+    assert (done.code, done.err) == (0, "")
+    named = {
+        facts["name"]: read_nav2(out).points[n]
+        for n, facts in read_nav2(out).node_facts.items()
+        if "name" in facts
+    }
+    assert named["dock"] == pytest.approx((1.5, 2.5), abs=0.01)
+    assert named["shelf 7"] == pytest.approx((0.35, 1.5), abs=0.01)
+    assert cli(*given, "-o", again, "--keep", out).code == 0
+    assert out.read_bytes() == again.read_bytes()
+    # Through the file of a fleet, nodes keep their ids, too.
+    fleet = ("--format", "rmf", "-o", tmp_path / "a.yaml", "--floor", "2")
+    assert cli(*given, *fleet, "--keep", out).code == 0
+    done = cli(*given, *fleet, "--keep", tmp_path / "a.yaml", "--force", "--json")
+    assert (done.code, set(map(len, done.answer["changes"]["nodes"].values()))) == (0, {0})
+    for text in ("dock: [1.5]\n", "dock: here\n", "dock: {x: a, y: 1}\n"):
+        (tmp_path / "points.yaml").write_text(text)
+        assert cli(*given, "-o", out, "--force").refuses(2, "'dock' must be [x, y] in metres")
+    refused = cli(*given, "-o", out, "--force", "--style", "roadmap")
+    assert refused.refuses(2, "--points is for --style lanes")
 
 
 def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
@@ -134,7 +146,6 @@ def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
     assert done.answer["left_out"] == [f"{len(gone)} edges through keepout zones"]
     assert "changed    nothing" in cli(*zone, "--keep", folder / "graph.geojson").out
     assert cli(*given, "-o", tmp_path / "g.geojson").refuses(2, "--out does not go with --bundle")
-    assert cli(*given, "--polylines").refuses(2, "--polylines does not go with --bundle")
     assert cli(*given, "--format", "rooms").refuses(2, "--format rooms does not go with --bundle")
     assert cli(*given, "--costs", "clearance").refuses(2, "costs of a bundle are")
     assert cli(*given, "--costs", "speed:none.yaml").refuses(3, "none.yaml")
@@ -195,7 +206,6 @@ def test_options_of_graphs_are_refused_for_rooms_and_places(cli, tmp_path):
     for option in (
         ("--nodes", 5),
         ("--spacing", 3),
-        ("--stretch", 1.5),
         ("--report", 9),
         ("--plot", tmp_path / "p.png"),
     ):
@@ -322,8 +332,6 @@ def test_options_of_fleets_are_refused_elsewhere(cli, tmp_path):
     assert cli("export", FIGURE, "-o", out, "--format", "osm").refuses(2, "needs --anchor")
     out = tmp_path / "a.json"
     assert cli("export", FIGURE, "-o", out, "--format", "lif").refuses(2, "needs --vehicle")
-    done = cli("export", FIGURE, "-o", out, "--format", "lif", "--vehicle", "A.B", "--polylines")
-    assert done.refuses(2, "--polylines is for --format nav2")
 
 
 def test_one_floor_of_several_is_judged(cli, tmp_path):

@@ -120,7 +120,7 @@ def test_scorers_read_limits_penalties_and_classes(tmp_path):
 
 def test_a_door_costs_its_class_once_a_passage(tmp_path):
     here = topology_of(HOUSE)
-    graph = build_lane_graph(here, spacing_m=2.0)
+    graph = build_lane_graph(here, spacing_m=1.0)
     export_bundle(here, graph, tmp_path / "robot")
     parameters, edges, nodes = read_bundle(tmp_path / "robot")
     server = parameters["route_server"]["ros__parameters"]

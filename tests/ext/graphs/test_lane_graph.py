@@ -1,19 +1,27 @@
 """Route graphs of lanes: plane, free, connected as free space is, in the middle, and steady."""
 
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.ext.graphs import build_lane_graph
+from hybridnav.ext.graphs.drawing import drop_ends
+from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.kernels import spread, thinned
+from hybridnav.ext.graphs.sketch import END, NOTHING, ROOM, Sketch
+from hybridnav.ext.graphs.strands import Passage
 from hybridnav.ext.graphs.waypoint_graph import components_of
 from hybridnav.harness.judges import segment_faults
+from hybridnav.maps.clearance import clearance_cells
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.ext.graphs.test_route_graph import boxes, map_of, slanted
 from tests.nav2_reader import read_nav2
@@ -174,6 +182,39 @@ def test_a_changed_map_keeps_nodes_and_ids(seed):
     assert not old & (now.keys() - at.keys())
 
 
+def test_a_node_that_a_box_covers_moves_off_and_keeps_its_id():
+    topology = floor(hall(160, 200))
+    before = build_lane_graph(topology, spacing_m=4.0)
+    degree = np.bincount(before.edges.ravel(), minlength=before.n_nodes)
+    for node in np.flatnonzero(degree == degree.max())[:3].tolist():
+        cells = hall(160, 200)
+        row, col = topology.grid.frame.cell_of(*before.points[node])
+        cells[row - 3 : row + 3, col - 3 : col + 3] = 1.0
+        after = checked(floor(cells), spacing_m=4.0, keep=before)
+        assert set(before.ids[0].tolist()) <= set(after.ids[0].tolist())
+        now = after.points[after.ids[0].tolist().index(before.ids[0][node])]
+        assert 0.3 <= np.hypot(*(now - before.points[node])) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "wall", "left"),
+    [(END, False, 1), (ROOM, False, 4), (END, True, 4)],
+    ids=["in sight", "of a room", "behind a wall"],
+)
+def test_dead_ends_are_left_out_where_robots_see_another_node(kind, wall, left):
+    cells = np.zeros((60, 60), dtype=np.float32)
+    cells[30, 10:] = cells[34:, 30] = wall
+    space = FreeSpace.of(hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0))
+    at = np.array([[10.5, 50.5], [10.5, 5.5], [50.5, 5.5], [50.5, 50.5]])
+    kinds = np.array([ROOM, NOTHING, NOTHING, kind])
+    passage = Passage(space, clearance_cells(~space.free), 2.0)
+    sketch = Sketch(at, kinds, np.array([[0, 1], [1, 2], [2, 3]]), passage)
+    drop_ends(sketch, 60.0, 90.0, 3)
+    # Once the end is gone the next is one, and from the first room all of the hall is in sight.
+    assert len(sketch.positions) == len(sketch.kinds) == left
+    assert sketch.edges.max(initial=0) < len(sketch.positions)
+
+
 def test_an_unchanged_map_keeps_everything_through_a_file(tmp_path):
     topology = topology_of(HOUSE)
     graph = build_lane_graph(topology)
@@ -199,6 +240,108 @@ def test_files_and_messages_have_the_ids_of_the_graph(tmp_path):
     route = hn.ext.graphs.route_messages(graph, graph.edges[3].tolist())["route"]
     assert [node["nodeid"] for node in route["nodes"]] == ids[0][graph.edges[3]].tolist()
     assert [edge["edgeid"] for edge in route["edges"]] == [ids[1][3]]
+
+
+POINTS = {"dock": (3.3, 5.3), "shelf": (15.8, 2.9), "lift": (20.26, 5.7), "on the lane": (6.0, 3.5)}
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.4])
+def test_named_points_are_nodes_where_they_are(tmp_path, yaw_rad):
+    topology = topology_of(HOUSE, robot_radius_m=0.3, yaw_rad=yaw_rad)
+    turn = np.array([[np.cos(yaw_rad), np.sin(yaw_rad)], [-np.sin(yaw_rad), np.cos(yaw_rad)]])
+    points = {name: tuple((np.array(at) @ turn).tolist()) for name, at in POINTS.items()}
+    plain, graph = checked(topology), checked(topology, points=points)
+    at = dict(zip(graph.names, graph.points.tolist(), strict=True))
+    for name, point in points.items():
+        assert np.hypot(*np.subtract(at[name], point)) <= 0.5 / 16
+    # Each adds itself and where its lane begins at most, and the rest of the graph is the same.
+    assert graph.n_nodes <= plain.n_nodes + 2 * len(points)
+    away, _ = KDTree(graph.points).query(plain.points)
+    assert np.max(away) <= 1e-9
+    kinds = dict(zip(graph.names, graph.kinds, strict=True))
+    assert {kinds[name] for name in points} <= {"point", "room", "door"}
+    assert kinds["dock"] == "point"
+    hn.ext.graphs.export_nav2(graph, tmp_path / "a.geojson")
+    facts = read_nav2(tmp_path / "a.geojson").node_facts
+    assert {facts[n]["name"] for n in facts if "name" in facts[n]} == set(points)
+    known = hn.ext.graphs.load_graph(tmp_path / "a.geojson")
+    hn.ext.graphs.export_nav2(
+        build_lane_graph(topology, points=points, keep=known), tmp_path / "b.geojson"
+    )
+    assert (tmp_path / "a.geojson").read_bytes() == (tmp_path / "b.geojson").read_bytes()
+    # Fleets and robots on two lanes know them by the same names.
+    floor = hn.ext.fleet.floor_graph(topology, graph, name="1")
+    names = {facts["name"] for facts in floor.graph.node_facts.values() if "name" in facts}
+    assert set(points) <= names
+    apart = hn.ext.graphs.keep_right(topology, graph, apart_m=0.8)
+    assert "lane" in apart.kinds
+    assert apart.names[: graph.n_nodes] == graph.names
+
+
+@given(class_grids(20), st.integers(0, 99))
+@settings(max_examples=examples(60), deadline=None)
+def test_named_points_of_any_map(classes, seed):
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
+    rng = np.random.default_rng(seed)
+    spots = rng.permutation(np.argwhere(classes == hn.CellClass.FREE))[:3] + rng.random(2)
+    points = dict(zip("abc", map(tuple, topology.grid.frame.points_of_grid(spots)), strict=False))
+    try:
+        graph = checked(topology, spacing_m=2.0, points=points)
+    except hn.errors.InvalidValueError as error:
+        assert "no free part" in str(error) or "without lanes" in str(error)  # noqa: PT017
+        return
+    found = [n for n, name in enumerate(graph.names) if name is not None]
+    assert sorted(graph.names[n] for n in found) == sorted(points)
+    away = graph.points[found] - [points[graph.names[n]] for n in found]
+    assert np.hypot(*away.T).max(initial=0) <= topology.grid.resolution_m / 16
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        ({"wall": (0.1, 0.1)}, "'wall'.*is not free.*move it"),
+        ({"far": (1e4, 0.0)}, "is not free"),
+        ({"none": (np.nan, 0.0)}, "must be .x, y. in metres"),
+        ({"one": (1.0,)}, "must be .x, y. in metres"),
+        ({"": (3.3, 5.3)}, "must be texts"),
+        ({"a": (3.3, 5.3), "b": (3.3, 5.3)}, "two at one place"),
+    ],
+)
+def test_points_that_are_none_are_refused(points, words):
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
+        build_lane_graph(topology_of(HOUSE), points=points)
+
+
+@pytest.mark.parametrize("name", ["a.yaml", "a.osm", "a.json"])
+def test_files_of_fleets_keep_ids(tmp_path, name):
+    topology = boxes(1, radius_m=0.1)
+    graph = build_lane_graph(topology, spacing_m=2.0)
+    # Ids as after some changes of the map: with gaps, and in no order.
+    at = np.random.default_rng(0).permutation(graph.n_nodes + graph.n_edges) * 2 + 7
+    graph = replace(graph, ids=(at[: graph.n_nodes], at[graph.n_nodes :]))
+    floors = (hn.ext.fleet.floor_graph(topology, graph, name="2"),)
+    house = hn.ext.fleet.BuildingGraph(name="house", floors=floors)
+    writers: dict[str, Any] = {
+        "a.yaml": hn.ext.graphs.export_rmf,
+        "a.osm": partial(hn.ext.graphs.export_osm, anchor=hn.ext.graphs.Anchor(48.1, 11.5, 20)),
+        "a.json": partial(hn.ext.graphs.export_lif, vehicle_types=["A.B"]),
+    }
+    write = writers[name]
+    write(house, tmp_path / name)
+    known = hn.ext.graphs.load_graph(tmp_path / name)
+    again = build_lane_graph(topology, spacing_m=2.0, keep=known)
+    # By their ids, nodes are where they were, and edges lead from the same nodes to the same.
+    assert hn.ext.graphs.graph_changes(graph, again) == hn.ext.graphs.graph_changes(graph, graph)
+    assert set(known.ids[0]) == set(graph.ids[0].tolist())
+    # A file that was read is written with the same ids.
+    (tmp_path / name).unlink()
+    write(hn.ext.fleet.BuildingGraph(
+        name="house", floors=(hn.ext.fleet.FloorGraph(name="2", graph=known),)
+    ), tmp_path / name)  # fmt: skip
+    assert hn.ext.graphs.load_graph(tmp_path / name).ids[0] == known.ids[0]
+    after = build_lane_graph(changed(topology, 1), spacing_m=2.0, keep=known)
+    stays = np.isin(graph.ids[0], after.ids[0]).mean()
+    assert stays >= 0.9
 
 
 def test_arguments_out_of_range_are_refused():

@@ -1,7 +1,8 @@
-"""Lanes that keep to the right where two robots fit side by side, and edges that bend."""
+"""Lanes that keep to the right where two robots fit side by side, and checks of edges that bend."""
 
 import math
 from dataclasses import replace
+from itertools import permutations
 
 import networkx as nx
 import numpy as np
@@ -143,120 +144,22 @@ def test_distances_out_of_range_are_refused(apart_m):
         hn.ext.graphs.keep_right(topology_of(HOUSE), graph, apart_m=0.8)
 
 
-KEPT = {"room", "door", "place"}
-
-
-@given(class_grids(20))
-@settings(max_examples=examples(60))
-def test_polylines_are_free_and_connect_what_was_connected(classes):
-    if not (classes == hn.CellClass.FREE).any():
-        return
-    grid = occupancy_grid(classes)
-    graph = hn.ext.graphs.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    bent = hn.ext.graphs.merge_bends(graph)
-    kept = [node for node, kind in enumerate(graph.kinds) if kind in KEPT]
-    assert np.array_equal(bent.points, graph.points[kept])
-    full: nx.Graph[int] = graph.to_networkx().to_undirected()
-    for edge, (tail, head) in enumerate(bent.edges.tolist()):
-        line = bent.lines.get(edge, bent.points[[tail, head]])
-        assert np.array_equal(line[[0, -1]], bent.points[[tail, head]])
-        assert segment_faults(grid, line) == ()
-        length_m = np.hypot(*np.diff(line, axis=0).T).sum()
-        assert bent.costs[edge] == pytest.approx(length_m)
-        shortest = nx.shortest_path_length(full, kept[tail], kept[head], weight="length_m")
-        assert bent.costs[edge] == pytest.approx(shortest)
-    pairs = set(map(tuple, bent.edges.tolist()))
-    assert {(head, tail) for tail, head in pairs} == pairs
-    joined: nx.Graph[int] = nx.Graph()
-    joined.add_nodes_from(range(len(kept)))
-    joined.add_edges_from(pairs)
-    index = {node: at for at, node in enumerate(kept)}
-    before = [{index[n] for n in part if n in index} for part in nx.connected_components(full)]
-    after = list(nx.connected_components(joined))
-    assert sorted(map(sorted, filter(None, before))) == sorted(map(sorted, after))
-
-
-@pytest.mark.parametrize("stretch", [1.0, 1.05, 1.5])
-def test_routes_between_kept_nodes_stay_nearly_as_short(stretch):
-    graph = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
-    bent = hn.ext.graphs.merge_bends(graph, stretch=stretch)
-    kept = [node for node, kind in enumerate(graph.kinds) if kind in KEPT]
-    full = graph.to_networkx()
-    few: nx.DiGraph[int] = nx.DiGraph()
-    for (tail, head), cost in zip(bent.edges.tolist(), bent.costs.tolist(), strict=True):
-        few.add_edge(tail, head, length_m=cost)
-    lengths = dict(nx.all_pairs_dijkstra_path_length(few, weight="length_m"))
-    ratios = []
-    for a, node in enumerate(kept):
-        shortest = nx.single_source_dijkstra_path_length(full, node, weight="length_m")
-        ratios += [lengths[a][b] / shortest[kept[b]] for b in range(len(kept)) if a != b]
-    assert min(ratios) >= 1 - 1e-9
-    assert max(ratios) <= stretch + 1e-6
-
-
-@pytest.mark.parametrize("stretch", [1.0, 1.05])
-def test_no_polyline_is_one_too_many(stretch):
-    bent = hn.ext.graphs.merge_bends(
-        hn.ext.graphs.build_route_graph(topology_of(HOUSE)), stretch=stretch
-    )
-    pairs = {tuple(sorted(pair)) for pair in bent.edges.tolist()}
-    # Where polylines of three nodes make one way, no fourth one goes along it.
-    costs = dict(zip(map(tuple, bent.edges.tolist()), bent.costs.tolist(), strict=True))
-    for one, other in pairs:
-        without: nx.Graph[int] = nx.Graph()
-        for (tail, head), cost in costs.items():
-            if {tail, head} != {one, other}:
-                without.add_edge(tail, head, length_m=cost)
-        if one in without and other in without and nx.has_path(without, one, other):
-            around = nx.shortest_path_length(without, one, other, weight="length_m")
-            assert around > costs[one, other] * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("stretch", [0.99, np.nan])
-def test_a_stretch_that_is_none_is_refused(stretch):
-    graph = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
-    with pytest.raises(hn.errors.InvalidValueError, match="stretch"):
-        hn.ext.graphs.merge_bends(graph, stretch=stretch)
-
-
-def test_the_file_holds_polylines_doors_and_rooms(tmp_path):
-    here = topology_of(HOUSE)
-    graph = hn.ext.graphs.build_route_graph(here)
-    hn.ext.graphs.export_nav2(
-        hn.ext.graphs.merge_bends(graph), tmp_path / "bent.geojson", frame="floor"
-    )
-    read = read_nav2(tmp_path / "bent.geojson")
-    assert set(read.frames.values()) == {"floor"}
-    assert {facts["class"] for facts in read.node_facts.values()} <= KEPT
-    bent = 0
-    for number, line in read.lines.items():
-        facts = read.edge_facts[number]
-        assert ("polyline" in facts) == (len(line) > 2)
-        if len(line) > 2:
-            bent += 1
-            values = facts["polyline"]["x_values"], facts["polyline"]["y_values"]
-            assert list(zip(*values, strict=True)) == line
-    assert bent
-    # Without the edges of its door, the kitchen is a part of its own.
-    number = next(door.number for door in here.rooms.doors if "kitchen" in door.rooms)
-    left: nx.Graph[int] = nx.Graph(
-        ends
-        for key, ends in read.edges.items()
-        if number not in read.edge_facts[key].get("doors", [])
-    )
-    start = next(
-        node
-        for node, facts in read.node_facts.items()
-        if (facts["class"], facts.get("room")) == ("room", "kitchen")
-    )
-    left.add_node(start)
-    inside = nx.node_connected_component(left, start)
-    assert {read.node_facts[node].get("room") for node in inside} <= {"kitchen", "corridor"}
-
-
 def test_the_check_follows_lines_where_robots_do():
     here = topology_of(HOUSE)
-    bent = hn.ext.graphs.merge_bends(hn.ext.graphs.build_route_graph(here))
+    # From room to room along the shortest routes, as files with lines of edges have them.
+    full = hn.ext.graphs.build_route_graph(here)
+    network, points = full.to_networkx(), full.points
+    ends = [node for node, kind in enumerate(full.kinds) if kind == "room"]
+    plain: nx.DiGraph[int] = nx.DiGraph()
+    for node in ends:
+        plain.add_node(node, x=points[node, 0], y=points[node, 1])
+    plain.add_edges_from(permutations(ends, 2))
+    bent = hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    routes = [
+        nx.shortest_path(network, ends[tail], ends[head], weight="length_m")
+        for tail, head in bent.edges.tolist()
+    ]
+    bent = replace(bent, lines={edge: points[route] for edge, route in enumerate(routes)})
     along = hn.ext.graphs.check_graph(here, bent, along_lines=True)
     assert along.findings == ()
     assert along.doors == (6, 6)
@@ -278,10 +181,3 @@ def test_the_check_follows_lines_where_robots_do():
     drawn = plot_graph_check(along)
     shown = [line for one in drawn.collections for line in getattr(one, "get_segments", list)()]
     assert max(map(len, shown)) > 2
-
-
-def test_lanes_are_refused():
-    here = topology_of(HOUSE)
-    graph = hn.ext.graphs.keep_right(here, hn.ext.graphs.build_route_graph(here), apart_m=1.0)
-    with pytest.raises(hn.errors.InvalidValueError, match="has lanes"):
-        hn.ext.graphs.merge_bends(graph)

@@ -1,6 +1,5 @@
 from .build import build_route_graph as build_route_graph
 from .bundle import export_bundle as export_bundle
-from .changes import first_broken_edge as first_broken_edge, graph_changes as graph_changes
 from .check import GraphCheck as GraphCheck, check_graph as check_graph
 from .gather import (
     BUILDING_KINDS as BUILDING_KINDS,
@@ -17,8 +16,11 @@ from .judge import (
 from .lane_graph import build_lane_graph as build_lane_graph
 from .lanes import keep_right as keep_right
 from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
-from .lanes import merge_bends as merge_bends
-from .route_messages import route_messages as route_messages
+from .route_messages import (
+    first_broken_edge as first_broken_edge,
+    graph_changes as graph_changes,
+    route_messages as route_messages,
+)
 from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
 from .files import (
     Anchor as Anchor,

@@ -93,7 +93,7 @@ def check_graph(
     graph
         The graph.
     along_lines
-        Whether the robot follows the lines of edges, as those of `merge_bends`.
+        Whether the robot follows the lines of edges, as their file draws them.
 
     Returns
     -------

@@ -38,20 +38,19 @@ from hybridnav.ext.graphs.fleet_options import (
     NodesOption,
     NoDoorsOption,
     OperationsOption,
-    PolylinesOption,
+    PointsOption,
     ReportOption,
-    StretchOption,
     StyleOption,
     VehiclesOption,
-    check_polylines,
     check_style,
+    read_points,
     warn_of_loss,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
+    from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph
 
 _ENDINGS = {
     "nav2": (".geojson", ".json"),
@@ -64,10 +63,6 @@ _PARTS = ("rooms", "places")
 """Formats without a graph."""
 _SHOWN = 8
 """Ids in a line about changes."""
-_STRETCH = 1.05
-_NEAR_M, _FAR_M = 1.0, 2.0
-"""Spacing of roadmaps for Nav2, which joins them at the nearest node; and of all other
-roadmaps: one-way lanes need long edges."""
 
 FormatOption = Annotated[
     str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
@@ -77,9 +72,8 @@ SpacingOption = Annotated[
     typer.Option(
         "--spacing",
         metavar="D",
-        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of "
-        f"a roadmap, within which points see a node, by default {_NEAR_M:g}, with --lanes and in "
-        f"formats other than nav2 {_FAR_M:g}.",
+        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of a "
+        "roadmap, within which points see a node, by default 1.",
     ),
 ]
 
@@ -98,12 +92,11 @@ def export(
     operations: OperationsOption = False,
     kind: FormatOption = "nav2",
     style: StyleOption = "lanes",
+    points: PointsOption = None,
     keep: KeepOption = None,
     nodes: NodesOption = None,
     spacing_m: SpacingOption = None,
-    stretch: StretchOption = _STRETCH,
     lanes_m: LanesOption = None,
-    polylines: PolylinesOption = False,
     frame: options.FrameOption[str] = "map",
     floor: options.GraphFloorOption = None,
     anchor: AnchorOption = None,
@@ -124,10 +117,9 @@ def export(
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
-    others = {"--out": out, "--polylines": polylines, f"--format {kind}": kind != "nav2"}
+    others = {"--out": out, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
     out = bundle or _checked_out(kind, out)
-    check_polylines(kind, given=polylines, straight={report, plot, lanes_m} != {None})
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     if kind in _PARTS:
@@ -135,18 +127,16 @@ def export(
             kind,
             {
                 "--style": style != STYLES[0],
+                "--points": points is not None,
                 "--keep": keep is not None,
                 "--nodes": nodes is not None,
                 "--spacing": spacing_m is not None,
-                "--stretch": stretch != _STRETCH,
                 "--lanes": lanes_m is not None,
-                "--polylines": polylines,
                 "--report": report is not None,
                 "--plot": plot is not None,
             },
         )
-    of_roadmaps = {"--nodes": nodes, "--stretch": (stretch != _STRETCH and not polylines) or None}
-    check_style(style, of_roadmaps, {"--keep": keep})
+    check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
     _check_taken(out, force=force)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
@@ -160,34 +150,29 @@ def export(
             _write_parts(topology, kind, out, frame)
         _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
         return
-    before = None if keep is None else hn.ext.graphs.load_graph(keep)
+    own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
+    before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
+    for_lanes: dict[str, Any] = {"keep": before} if before else {}
+    for_lanes |= {"points": read_points(points)} if points else {}
     began = time.perf_counter()
-    build = _builder(
-        style,
-        nodes,
-        spacing_m,
-        is_near=kind == "nav2" and lanes_m is None,
-        stretch=stretch,
-        seed=settings.pyramid.seed,
-    )
+    build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with progress_bar("building the graph") as advance:
-        graph = build(topology, progress=advance, **({"keep": before} if before else {}))
+        graph = build(topology, progress=advance, **for_lanes)
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        written = hn.ext.graphs.merge_bends(graph, stretch=stretch) if polylines else graph
-        left_out = _write_graph(topology, (graph, written), fleet or robot, out, frame)
-    is_few = (fleet is not None or nodes is not None) and not polylines
+        left_out = _write_graph(topology, graph, fleet or robot, out, frame)
+    is_few = fleet is not None or nodes is not None
     pairs = LOSS_PAIRS if report is None and is_few else report
     judged = None
     if pairs is not None:
         with stage("comparing routes", seconds, "report"):
             judged = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
-    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
-    lines = [*_summary(out, written, graph.grid, judged), *_left_out_lines(left_out)]
-    lines += _ids_line(written) if fleet is None else []
+    lines = [*_summary(out, graph, judged), *_left_out_lines(left_out)]
+    lines += _ids_line(graph) if fleet is None else []
     # A bundle leaves out edges in keepout zones.
     after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
@@ -201,24 +186,13 @@ def export(
 
 
 def _builder(
-    style: str,
-    nodes: int | None,
-    spacing_m: float | None,
-    *,
-    is_near: bool,
-    stretch: float,
-    seed: int,
+    style: str, nodes: int | None, spacing_m: float | None, seed: int
 ) -> Callable[..., RouteGraph]:
     """Return what builds the graph of a map in a style; see `export`."""
     if style == "lanes":
         return partial(hn.ext.graphs.build_lane_graph, spacing_m=spacing_m)
-    return partial(
-        hn.ext.graphs.build_route_graph,
-        nodes=nodes,
-        spacing_m=_spacing(spacing_m, is_near=is_near),
-        stretch=stretch,
-        seed=seed,
-    )
+    near_m = 1.0 if spacing_m is None else spacing_m
+    return partial(hn.ext.graphs.build_route_graph, nodes=nodes, spacing_m=near_m, seed=seed)
 
 
 def _export_over_floors(
@@ -230,7 +204,6 @@ def _export_over_floors(
     style: str,
     nodes: int | None,
     spacing_m: float | None,
-    stretch: float,
     anchor: str | None,
     vehicles: list[str] | None,
     no_doors: bool,
@@ -239,7 +212,7 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     out = _checked_out(kind, out)
-    check_style(style, {"--nodes": nodes, "--stretch": stretch != _STRETCH or None}, {})
+    check_style(style, {"--nodes": nodes}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
@@ -250,8 +223,7 @@ def _export_over_floors(
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    seed = reading.seed or 0
-    build = _builder(style, nodes, spacing_m, is_near=False, stretch=stretch, seed=seed)
+    build = _builder(style, nodes, spacing_m, reading.seed or 0)
     reports: list[GraphReport] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
@@ -328,11 +300,6 @@ def _check_taken(out: Path, *, force: bool) -> None:
         raise UsageError(f"{printable(out)} exists: add --force to write over it")
 
 
-def _spacing(given_m: float | None, *, is_near: bool) -> float:
-    """Return the spacing that is given, or that of the format."""
-    return given_m if given_m is not None else _NEAR_M if is_near else _FAR_M
-
-
 def _check_plain(kind: str, given: dict[str, bool]) -> None:
     """Refuse options of graphs for a format that has none."""
     for option, is_given in given.items():
@@ -343,17 +310,17 @@ def _check_plain(kind: str, given: dict[str, bool]) -> None:
 
 def _write_graph(
     topology: hn.TopologicalMap,
-    graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
+    graph: RouteGraph,
     aim: Fleet | Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
     if isinstance(aim, Fleet):
-        return aim.write(topology, graphs[0], out)
+        return aim.write(topology, graph, out)
     if aim is not None:
-        return hn.ext.graphs.export_bundle(topology, graphs[0], out, frame=frame, **aim._asdict())
-    hn.ext.graphs.export_nav2(graphs[1], out, frame=frame)
+        return hn.ext.graphs.export_bundle(topology, graph, out, frame=frame, **aim._asdict())
+    hn.ext.graphs.export_nav2(graph, out, frame=frame)
     return ()
 
 
@@ -384,11 +351,10 @@ def _parts_answer(
 
 def _summary(
     out: Path,
-    graph: RouteGraph | WaypointGraph,
-    grid: hn.OccupancyGrid,
+    graph: RouteGraph,
     judged: GraphReport | None,
 ) -> list[str]:
-    counts = _counts(graph)
+    grid, counts = graph.grid, _counts(graph)
     lines = [
         f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",
         f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
@@ -403,13 +369,11 @@ def _summary(
     return lines
 
 
-def _ids_line(graph: RouteGraph | WaypointGraph) -> list[str]:
+def _ids_line(graph: RouteGraph) -> list[str]:
     """Return a line if Nav2's messages cannot hold all ids of a graph."""
     from hybridnav._base.messages import MOST_ID  # noqa: PLC0415 - on demand
 
-    most = graph.n_nodes + graph.n_edges - 1
-    if isinstance(graph, hn.ext.graphs.RouteGraph):
-        most = max(int(ids.max(initial=0)) for ids in graph.ids)
+    most = max(int(ids.max(initial=0)) for ids in graph.ids)
     if most <= MOST_ID:
         return []
     held = f"messages of ComputeRoute hold {MOST_ID:,}"
@@ -423,15 +387,11 @@ def _line(excess: Excess) -> str:
     )
 
 
-def _counts(graph: RouteGraph | WaypointGraph) -> dict[str, int]:
-    if isinstance(graph, hn.ext.graphs.WaypointGraph):
-        kinds = [facts["metadata"]["class"] for facts in graph.node_facts.values()]
-    else:
-        kinds = list(graph.kinds)
-    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+def _counts(graph: RouteGraph) -> dict[str, int]:
+    return {kind: graph.kinds.count(kind) for kind in dict.fromkeys(graph.kinds)}
 
 
-def _figures(graph: RouteGraph | WaypointGraph, judged: GraphReport | None) -> dict[str, Any]:
+def _figures(graph: RouteGraph, judged: GraphReport | None) -> dict[str, Any]:
     report = None if judged is None else asdict(judged)
     return {
         "nodes": graph.n_nodes,

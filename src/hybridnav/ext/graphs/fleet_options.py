@@ -12,6 +12,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, complain
+from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
@@ -44,6 +45,15 @@ KeepOption = Annotated[
         help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
     ),
 ]
+PointsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--points",
+        metavar="FILE",
+        help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
+        "get a node with the name at each.",
+    ),
+]
 NodesOption = Annotated[
     int | None,
     typer.Option(
@@ -53,14 +63,6 @@ NodesOption = Annotated[
         help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
     ),
 ]
-StretchOption = Annotated[
-    float,
-    typer.Option(
-        "--stretch",
-        metavar="S",
-        help="Most by which routes between nodes in sight are longer, as a factor.",
-    ),
-]
 LanesOption = Annotated[
     float | None,
     typer.Option(
@@ -68,13 +70,6 @@ LanesOption = Annotated[
         metavar="APART",
         help="Where two robots fit side by side, a lane on the right for each direction; APART is "
         "the distance in metres between the robots.",
-    ),
-]
-PolylinesOption = Annotated[
-    bool,
-    typer.Option(
-        "--polylines",
-        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
     ),
 ]
 ReportOption = Annotated[
@@ -220,15 +215,28 @@ class Fleet:
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
 
 
-def check_polylines(kind: str, *, given: bool, straight: bool) -> None:
-    """Refuse the option with others that are for straight edges, and for other formats."""
-    if given and straight:
-        raise UsageError(
-            "--polylines does not go with --report, --plot and --lanes, which are for straight "
-            "edges: leave them out"
-        )
-    if given and kind in ENDINGS:
-        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
+def read_points(path: Path) -> dict[str, tuple[float, float]]:
+    """Return the named points of a YAML file, in metres.
+
+    Raises
+    ------
+    UsageError
+        When it is no mapping of names to points or poses.
+    """
+    from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
+    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415
+
+    found = {}
+    for name, value in read_yaml(path, what="points", error=MapError).items():
+        pose = value.get("pose", value) if isinstance(value, dict) else value
+        at = pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
+        if at is None:
+            raise UsageError(
+                f"points {printable(path)}: {brief(name)} must be [x, y] in metres or a pose with "
+                f"a position, got {brief(value)}"
+            )
+        found[str(name)] = at
+    return found
 
 
 def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:

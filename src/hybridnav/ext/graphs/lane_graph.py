@@ -13,23 +13,26 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.drawing import ChainGraph
+from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.json_graphs import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
-from hybridnav.ext.graphs.segments import Passage
+from hybridnav.ext.graphs.route_messages import ids_of
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
-from hybridnav.ext.graphs.strands import Layout, RoomAnchors, lines_of, strands_of
-from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
+from hybridnav.ext.graphs.strands import COVER, Layout, Passage, RoomAnchors, lines_of, strands_of
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.frame import FARTHEST_M
 from hybridnav.topology import TopologicalMap
 from hybridnav.topology.rooms.cutting import wall_directions
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
     from hybridnav.topology.rooms import Rooms
 
 _APART_M = 4.0
@@ -44,8 +47,10 @@ metres: maps of laser scans end in many thin rays."""
 _SMALL, _SMALL_NARROW = 1.75, (2.5, 3.5)
 """Length of the smallest rings of lanes, in distances between lanes; and where there is less room
 than is asked for, a little less and none beyond the robot's radius."""
-_MERGED_M, _NEAR_M = 1.0, 0.8
-"""Length below which a chain, and a straight edge, becomes one node, in metres."""
+_MERGED = 0.25
+"""Length below which a chain, or straight edge, becomes one node, in distances between lanes."""
+_MOST_MERGED_M = 1.0
+"""The most of this, in metres."""
 _STEP_M = 0.2
 _BEND_M = 2.0
 """Where chains may bend, and what a bend costs, in metres."""
@@ -54,6 +59,9 @@ _SNAP_M = 0.8
 _CHORD, _DETOUR, _CHORD_RAD = 2.5, 1.08, math.radians(15)
 """Chords: their length in distances between lanes, the detour that they save, and the angle to
 other edges, so that they make no fans."""
+_SEEN = 1.6
+"""Distance from a node within which robots join it when a dead end is left out, in distances
+between lanes."""
 _LONGEST = 1.25
 """Length of an edge above which it is divided, in distances between lanes: robots join graphs at
 nodes."""
@@ -64,11 +72,12 @@ _STANDS = 0.4
 _STEPS = 5
 
 
-def build_lane_graph(
+def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     topology: TopologicalMap,
     *,
     spacing_m: float | None = None,
     margin_m: float = 0.25,
+    points: Mapping[str, tuple[float, float]] | None = None,
     keep: RouteGraph | WaypointGraph | None = None,
     progress: Progress = no_progress,
 ) -> RouteGraph:
@@ -89,10 +98,14 @@ def build_lane_graph(
         long at most, and free space farther than 1.1 times from lanes gets one of its own.
     margin_m
         Clearance beyond the robot's radius that lanes keep where there is as much, in metres.
+    points
+        Named points, `(x, y)` in metres in the map frame: each becomes a node with its name, joined
+        to the nearest lane in sight.
     keep
         A graph of the map as it was: its nodes and edges stay where the robot can still follow
-        them, with their ids, and only what they lack is added. A node that is moved by 1 m at most
-        keeps its id too. No id of that graph goes to anything else.
+        them, with their ids, and only what they lack is added. A node that an obstacle covers now
+        moves off to free space within 1 m, if there is any, and keeps its id too. No id of that
+        graph goes to anything else.
     progress
         Called with the number of steps done and of all steps.
 
@@ -104,8 +117,9 @@ def build_lane_graph(
     Raises
     ------
     InvalidValueError
-        When an argument is out of range, the map allows corner cutting, or no part of it is as
-        large as 1 m².
+        When an argument is out of range, the map allows corner cutting, no part of it is as large
+        as 1 m², or a named point is not free, lies in a part that gets no lanes, or has the place
+        of another one.
 
     Notes
     -----
@@ -138,6 +152,9 @@ def build_lane_graph(
         )
     if spacing_m is None:
         spacing_m = _spacing_m(int((part_of >= 0).sum()) * grid.cell_area_m2)
+    named = {name: _place_of(space, part_of, name, at) for name, at in (points or {}).items()}
+    if len({tuple(at) for at in named.values()}) < len(named):
+        raise InvalidValueError(f"points must lie apart, got two at one place: {brief(points)}")
     progress(1, _STEPS)
     directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
     layout = Layout(
@@ -150,28 +167,56 @@ def build_lane_graph(
     progress(2, _STEPS)
     least, most = _SMALL_NARROW
     drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
-    drawing.merge(_MERGED_M / cell_m)
+    near = min(_MERGED * layout.apart, _MOST_MERGED_M / cell_m)
+    drawing.merge(near)
     sketch = drawing.straightened(max(1, round(_STEP_M / cell_m)), _BEND_M / cell_m)
     progress(3, _STEPS)
     sketch.repair()
     for _ in range(2):
-        sketch.simplify(_NEAR_M / cell_m, 2 * layout.apart)
+        sketch.simplify(near, 2 * layout.apart)
         sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
-    sketch.add_chords(_CHORD * layout.apart, _DETOUR, _CHORD_RAD)
+    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, max(1, round(_STEP_M / cell_m)))
+    add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
     sketch.split(_LONGEST * layout.apart)
     _connect(sketch, space)
     known = None if keep is None else grid.frame.positions_of(keep.points)
     if keep is not None and known is not None:
         same = _same(sketch, known, cell_m)
-        sketch.keep(settled(known), keep.edges, same, _STANDS * layout.apart)
+        old = sketch.freed(settled(known), _SAME_M / cell_m)
+        sketch.keep(old, keep.edges, same, _STANDS * layout.apart)
+        _connect(sketch, space)
+    if named:
+        sketch.add_points(np.array([*named.values()]), near / 2)
         _connect(sketch, space)
     sketch.make_plane()
     progress(4, _STEPS)
-    graph = _described(topology, space, sketch)
+    graph = _described(topology, space, sketch, named)
     progress(_STEPS, _STEPS)
     if keep is None or known is None:
         return graph
     return _renamed(graph, keep, _same(sketch, known, cell_m))
+
+
+def _place_of(
+    space: FreeSpace, part_of: IntArray, name: str, point: tuple[float, float]
+) -> FloatArray:
+    """Return the position of a named point."""
+    if not (isinstance(name, str) and name):
+        raise InvalidValueError(f"names of points must be texts, got {brief(name)}")
+    try:
+        x, y = (float(value) for value in point)
+    except (TypeError, ValueError):
+        x = y = math.nan
+    if not abs(x) + abs(y) <= 2 * FARTHEST_M:
+        raise InvalidValueError(f"point {brief(name)} must be (x, y) in metres, got {brief(point)}")
+    at = checked_position(space, (x, y))
+    if at is None or part_of[tuple(at.astype(np.int64))] < 0:
+        why = "not free" if at is None else "in a part of free space without lanes"
+        raise InvalidValueError(
+            f"point {brief(name)} ({x:g}, {y:g}) is {why} for a robot radius of "
+            f"{space.grid.robot_radius_m:g} m: move it"
+        )
+    return settled(at)
 
 
 def _spacing_m(area_m2: float) -> float:
@@ -273,26 +318,28 @@ def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
     return np.where(is_same, to_known, -1)
 
 
-def _described(topology: TopologicalMap, space: FreeSpace, sketch: Sketch) -> RouteGraph:
-    """Return the route graph of a sketch."""
+def _described(
+    topology: TopologicalMap, space: FreeSpace, sketch: Sketch, named: Mapping[str, FloatArray]
+) -> RouteGraph:
+    """Return the route graph of a sketch, with the names of its named points."""
+    name_of = {tuple(at): name for name, at in named.items()}
+    names = [name_of.get(tuple(at)) for at in sketch.positions.tolist()]
     degree = np.bincount(sketch.edges.ravel(), minlength=len(sketch.kinds))
     by_degree = np.array(["end", "end", "bend", "crossing"])[np.minimum(degree, 3)].tolist()
     kinds = [
-        "door" if kind >= DOOR else "room" if kind == ROOM else known
-        for kind, known in zip(sketch.kinds.tolist(), by_degree, strict=True)
+        "door" if kind >= DOOR else "room" if kind == ROOM else "point" if name else known
+        for kind, known, name in zip(sketch.kinds.tolist(), by_degree, names, strict=True)
     ]
     doors = np.maximum(sketch.kinds - (DOOR - 1), 0).tolist()
     nodes = Nodes(space, len(kinds), sketch.positions, kinds, doors)
-    return described(topology, nodes, np.concatenate([sketch.edges, sketch.edges[:, ::-1]]))
+    both = np.concatenate([sketch.edges, sketch.edges[:, ::-1]])
+    return replace(described(topology, nodes, both), names=tuple(names))
 
 
 def _renamed(graph: RouteGraph, keep: RouteGraph | WaypointGraph, same: LongArray) -> RouteGraph:
     """Return a graph with the ids of nodes and edges that are the same as before; all others get
     ids that nothing had."""
-    if isinstance(keep, RouteGraph):
-        nodes, edges = (each.tolist() for each in keep.ids)
-    else:
-        nodes, edges = list(keep.names), list(keep.edge_names)
+    nodes, edges = ids_of(keep)
     id_of = dict(zip(map(tuple, keep.edges.tolist()), edges, strict=True))
     wanted = [nodes[node] if node >= 0 else None for node in same.tolist()]
     wanted += [id_of.get((tail, head)) for tail, head in same[graph.edges].tolist()]

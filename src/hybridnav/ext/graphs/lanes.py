@@ -1,20 +1,19 @@
-"""What is made of a graph that was built: descriptions, one-way lanes, edges that bend."""
+"""What is made of a graph that was built: descriptions, and one-way lanes."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import frozen
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.ext.graphs.attach import adjacency, shortest_routes
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace
 from hybridnav.ext.graphs.kernels import least_along, least_widths
-from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph, WaypointGraph
+from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line
@@ -30,9 +29,10 @@ if TYPE_CHECKING:
 
 
 def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:
-    """Return what is known of a node: `class`, `room`, `door`."""
-    door = int(graph.doors[node])
-    return _known({"class": graph.kinds[node], "room": graph.rooms[node], "door": door or None})
+    """Return what is known of a node: `class`, `name`, `room`, `door`."""
+    door = int(graph.doors[node]) or None
+    known = {"class": graph.kinds[node], "name": graph.names[node]}
+    return _known(known | {"room": graph.rooms[node], "door": door})
 
 
 def edge_metadata(graph: RouteGraph, chain: Sequence[int]) -> dict[str, Any]:
@@ -77,160 +77,6 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-# Edges that bend: a graph of rooms, doors and places, with polylines instead of nodes at bends.
-
-_LANDMARKS = frozenset({"room", "door", "place", "crossing", "end"})
-_ROUNDING = 1e-9
-"""Relative slack on the length of a route, which is a sum of rounded numbers."""
-_AT_ONCE = 64
-"""Nodes from which distances to all others are held at once."""
-
-
-def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
-    """Leave out the nodes of a route graph that only bend routes or cover space.
-
-    Nodes at rooms, doors, places, crossings and ends of lanes stay. Two of them are joined by the
-    shortest route over the nodes that are left out, where the way over other polylines is longer
-    than `stretch` allows; so nodes are connected where they were. The cost of an edge is the length
-    of that polyline in metres; its metadata are those of `export_nav2`, and where it bends
-    `polyline`, with `x_values` and `y_values` in metres. A robot must follow the polyline: straight
-    from node to node there may be walls, and Nav2's route server of its own accord does not read
-    it.
-
-    Parameters
-    ----------
-    graph
-        The graph, without lanes.
-    stretch
-        At least 1: between two of its nodes, a route over polylines is at most this many times as
-        long as a route on `graph`.
-
-    Returns
-    -------
-    WaypointGraph
-        The polylines are in `lines`, too.
-
-    Raises
-    ------
-    InvalidValueError
-        When the graph has lanes, or `stretch` is below 1.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.graphs import build_route_graph, merge_bends
-    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> graph = build_route_graph(topology)
-    >>> merge_bends(graph).n_nodes < graph.n_nodes
-    True
-    """
-    checked_type("graph", graph, RouteGraph)
-    checked_between("stretch", stretch, 1, 1e6)
-    if graph.is_lane.any():
-        raise InvalidValueError(
-            f"the graph of map {brief(graph.grid.name)} has lanes, whose edges are straight: merge "
-            "bends of the graph without lanes"
-        )
-    kept = np.array([node for node, kind in enumerate(graph.kinds) if kind in _LANDMARKS])
-    index = {node: at for at, node in enumerate(kept.tolist())}
-    edges: list[tuple[int, int]] = []
-    costs: list[float] = []
-    lines: dict[int, FloatArray] = {}
-    facts: dict[int, dict[str, Any]] = {}
-    for chain in _chains(graph, kept, stretch):
-        nodes = [*graph.edges[chain, 0].tolist(), int(graph.edges[chain[-1], 1])]
-        metadata = edge_metadata(graph, chain)
-        points = graph.points[nodes]
-        if len(nodes) > 2:  # noqa: PLR2004 - it bends
-            lines[len(edges)] = frozen(points)
-            x_values, y_values = points.T.tolist()
-            metadata["polyline"] = {"x_values": x_values, "y_values": y_values}
-        facts[len(edges)] = {"metadata": metadata}
-        costs.append(float(graph.lengths_m[chain].sum()))
-        edges.append((index[nodes[0]], index[nodes[-1]]))
-    return WaypointGraph(
-        name=graph.grid.name,
-        format="nav2",
-        frame="",
-        names=tuple(range(len(kept))),
-        points=frozen(graph.points[kept]),
-        edge_names=tuple(range(len(kept), len(kept) + len(edges))),
-        edges=frozen(np.array(edges, dtype=np.int64).reshape(-1, 2)),
-        costs=frozen(np.array(costs, dtype=np.float64)),
-        lines=lines,
-        node_facts={at: {"metadata": node_metadata(graph, node)} for node, at in index.items()},
-        edge_facts=facts,
-    )
-
-
-def _chains(graph: RouteGraph, kept: LongArray, stretch: float) -> list[list[int]]:
-    """Return the edges of each polyline, those of both directions one after the other."""
-    tails, heads = kept[_joined(_distances(graph, kept), stretch)].T
-    offsets, nothing = np.arange(len(tails) + 1), np.zeros(len(tails))
-    network = adjacency(graph.n_nodes, graph.edges, graph.lengths_m)
-    _, routes, _ = shortest_routes(network, (offsets, tails, nothing), (offsets, heads, nothing))
-    keys = graph.edges[:, 0] * graph.n_nodes + graph.edges[:, 1]  # ascending
-    chains: list[list[int]] = []
-    for nodes in routes[: len(tails)]:
-        for line in (nodes, nodes[::-1]):
-            found = np.searchsorted(keys, line[:-1] * graph.n_nodes + line[1:])
-            chains.append(found.tolist())
-    return chains
-
-
-def _joined(away: FloatArray, stretch: float) -> LongArray:
-    """Choose pairs of nodes, int64 (k, 2), so that a route over chosen ones joins every pair and is
-    at most `stretch` times as long as their distance, `away`, float64 (n, n), infinite for none.
-
-    A pair is chosen when it is the nearest one without a route that is short enough, of both its
-    nodes: so no other node lies on the way.
-    """
-    count = len(away)
-    chosen = np.zeros((count, count), dtype=np.bool_)
-    waiting = np.arange(count)
-    while True:
-        lengths = _lengths(chosen, away, waiting)
-        rest = np.where(lengths > stretch * (1 + _ROUNDING) * away[waiting], away[waiting], np.inf)
-        waits = np.isfinite(rest).any(axis=1)
-        waiting, rest = waiting[waits], rest[waits]
-        if not len(waiting):
-            return np.argwhere(np.triu(chosen)).astype(np.int64)
-        nearest = np.full(count, -1, dtype=np.int64)
-        nearest[waiting] = rest.argmin(axis=1)
-        both = waiting[nearest[nearest[waiting]] == waiting]
-        chosen[both, nearest[both]] = True
-
-
-def _lengths(chosen: BoolArray, away: FloatArray, nodes: LongArray) -> FloatArray:
-    """Return the lengths of the shortest routes over chosen pairs from some nodes to all, float64
-    (k, n)."""
-    from scipy.sparse import csr_array  # noqa: PLC0415 - on demand
-    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
-
-    tails, heads = np.nonzero(chosen)
-    lengths: FloatArray = away[tails, heads]
-    matrix = csr_array((lengths, (tails, heads)), shape=away.shape)
-    found: FloatArray = dijkstra(matrix, indices=nodes)
-    return found
-
-
-def _distances(graph: RouteGraph, kept: LongArray) -> FloatArray:
-    """Return the lengths of the shortest routes between some nodes, float64 (k, k), infinite for
-    none."""
-    from scipy.sparse import csr_array  # noqa: PLC0415 - on demand
-    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
-
-    shape = (graph.n_nodes, graph.n_nodes)
-    matrix = csr_array((graph.lengths_m, (graph.edges[:, 0], graph.edges[:, 1])), shape=shape)
-    away = np.empty((len(kept), len(kept)))
-    for first in range(0, len(kept), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        away[some] = dijkstra(matrix, indices=kept[some])[:, kept]
-    # Rounding differs by direction: pairs need one distance.
-    found: FloatArray = np.minimum(away, away.T)
-    return found
-
-
 # What is known of the nodes and edges of a route graph: rooms, doors, widths.
 
 
@@ -269,6 +115,7 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
         kinds=tuple(nodes.kinds),
         rooms=tuple(_room_of(rooms, cells)),
         doors=np.array(nodes.doors, dtype=np.int64),
+        names=(None,) * len(positions),
         edges=edges,
         edge_rooms=tuple(_room_of(rooms, middles)),
         edge_doors=tuple(
@@ -403,7 +250,8 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
         [*graph.kinds, *[LANE] * len(new)],
         [*graph.doors.tolist(), *[0] * len(new)],
     )
-    return described(topology, nodes, chosen)
+    found = described(topology, nodes, chosen)
+    return replace(found, names=(*graph.names, *[None] * len(new)))
 
 
 def _lane(positions: FloatArray, edges: LongArray, off: float) -> tuple[FloatArray, FloatArray]:

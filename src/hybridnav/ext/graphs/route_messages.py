@@ -1,21 +1,26 @@
-"""Routes over a route graph as the messages of Nav2's route server."""
+"""Routes over a graph that robots follow: messages, changes, and whether they still hold."""
 
 from __future__ import annotations
 
+import math
 import operator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from hybridnav._base.messages import MOST_ID, header_message, path_message
 from hybridnav._base.poses import Motion
-from hybridnav.errors import InvalidValueError
-from hybridnav.ext.graphs.waypoint_graph import RouteGraph
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.graphs.attach import placed_points
+from hybridnav.ext.graphs.judge import FreeSpace
+from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from hybridnav.maps import OccupancyGrid
 
 
 def route_messages(
@@ -111,3 +116,138 @@ def _edge_of(graph: RouteGraph, tail: int, head: int) -> int:
     if not len(found):
         raise InvalidValueError(f"no edge leads from node {tail} to node {head}")
     return int(found[0])
+
+
+# What changed from one graph to the next, and whether a route still holds.
+
+_MOVED_M = 1e-3
+"""Distance in metres above which a node has moved: files are written in more digits."""
+
+Graph = RouteGraph | WaypointGraph
+
+
+def graph_changes(before: Graph, after: Graph) -> dict[str, dict[str, list[Any]]]:
+    """Return what changed from a graph to another with the ids of the first, by `--keep`.
+
+    Parameters
+    ----------
+    before, after
+        Graphs of one map, from the map or from a file.
+
+    Returns
+    -------
+    dict
+        `nodes` and `edges`, each with the ids that were `added`, are `gone`, or stay and have
+        `moved` by more than 1 mm; an edge moves with a node, or to other ones.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import WaypointGraph, graph_changes
+    >>> import networkx as nx
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node(1, pos=(0.0, 0.0))
+    >>> before = WaypointGraph.from_networkx(plain)
+    >>> plain.add_node(2, pos=(1.0, 0.0))
+    >>> graph_changes(before, WaypointGraph.from_networkx(plain))["nodes"]
+    {'added': [2], 'gone': [], 'moved': []}
+    """
+    old, new = (_by_id(graph) for graph in (before, after))
+    moved = {
+        name: math.dist(old[0][name], new[0][name]) > _MOVED_M for name in old[0] if name in new[0]
+    }
+    kept = [(name, ends, new[1][name]) for name, ends in old[1].items() if name in new[1]]
+    follows = [name for name, was, now in kept if was != now or any(moved.get(n) for n in now)]
+    return {
+        kind: {
+            "added": [name for name in new[at] if name not in old[at]],
+            "gone": [name for name in old[at] if name not in new[at]],
+            "moved": [name for name, has in moved.items() if has] if at == 0 else follows,
+        }
+        for at, kind in enumerate(("nodes", "edges"))
+    }
+
+
+def first_broken_edge(
+    graph: Graph,
+    route: Sequence[int | str],
+    grid: OccupancyGrid | None = None,
+    *,
+    by: Literal["nodes", "edges"] = "nodes",
+) -> int | None:
+    """Return the first edge of a route that a graph has no longer, or that is not free now.
+
+    Parameters
+    ----------
+    graph
+        The graph now.
+    route
+        Ids of its nodes in order, or of its edges.
+    grid
+        The map now; a graph from a file needs it, for others the default is their own.
+    by
+        What the ids are: `"nodes"` or `"edges"`.
+
+    Returns
+    -------
+    int or None
+        The place of the edge in the route, from 0: it leads from node `route[i]` to the next, or is
+        the edge `route[i]`. None where the whole route is there and free for the robot. An edge
+        that does not begin where the one before ends is broken.
+
+    Raises
+    ------
+    InvalidValueError
+        When the graph is from a file and there is no map, or `by` is another word.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.graphs import build_lane_graph, first_broken_edge
+    >>> cells = np.ones((24, 120))
+    >>> cells[2:-2, 2:-2] = 0.0
+    >>> grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+    >>> graph = build_lane_graph(topology)
+    >>> route = [int(graph.ids[0][node]) for node in graph.edges[0]]
+    >>> first_broken_edge(graph, route) is None
+    True
+    >>> cells[:, :60] = 1.0
+    >>> shut = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    >>> first_broken_edge(graph, route, shut)
+    0
+    """
+    if by not in {"nodes", "edges"}:
+        raise InvalidValueError(f"by must be 'nodes' or 'edges', got {brief(by)}")
+    if grid is None:
+        if not isinstance(graph, RouteGraph):
+            raise InvalidValueError("a graph from a file knows no map: give grid, the map now")
+        grid = graph.grid
+    (nodes, edges), ends = ids_of(graph), [*map(tuple, graph.edges.tolist())]
+    edge_of = dict(zip(edges, ends, strict=True))
+    if by == "nodes":
+        edge_of = {(nodes[tail], nodes[head]): (tail, head) for tail, head in ends}
+    pairs = [edge_of.get(each) for each in (pairwise(route) if by == "nodes" else route)]
+    space = FreeSpace.of(grid)
+    positions, _, is_free = placed_points(graph.points, grid, space.free)
+    last = None
+    for at, pair in enumerate(pairs):
+        if pair is None or last not in {None, pair[0]} or not is_free[[*pair]].all():
+            return at
+        if not space.joins(positions[[pair[0]]], positions[[pair[1]]])[0]:
+            return at
+        last = pair[1]
+    return None
+
+
+def ids_of(graph: Graph) -> tuple[list[Any], list[Any]]:
+    """Return the ids of nodes and edges."""
+    if isinstance(graph, RouteGraph):
+        return graph.ids[0].tolist(), graph.ids[1].tolist()
+    return graph.ids
+
+
+def _by_id(graph: Graph) -> tuple[dict[Any, tuple[float, float]], dict[Any, tuple[Any, Any]]]:
+    """Return the points of nodes and the ends of edges, by their ids."""
+    nodes, edges = ids_of(graph)
+    points = dict(zip(nodes, map(tuple, graph.points.tolist()), strict=True))
+    pairs = [(nodes[tail], nodes[head]) for tail, head in graph.edges.tolist()]
+    return points, dict(zip(edges, pairs, strict=True))

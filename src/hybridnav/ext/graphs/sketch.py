@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.segments import (
+from hybridnav.ext.graphs.strands import (
+    aligned,
     crosses,
     crossing,
-    is_beside,
     length_between,
     turn_of,
 )
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.segments import Passage
+    from hybridnav.ext.graphs.strands import Passage
 
 NOTHING, END, ROOM, DOOR = -1, 0, 1, 2
 """What a node is for: its edges only, the end of a lane, a room, a door; door n is
@@ -28,19 +28,19 @@ NOTHING, END, ROOM, DOOR = -1, 0, 1, 2
 
 _KEPT = 0.8
 """Share of its clearance that an edge keeps where it is moved, up to what is asked for."""
+_MERGED = 0.5
+"""The same where two nodes become one."""
 _STRAIGHT = 0.7
 """The same where a bend goes."""
-_SLOPE = 0.35
-"""Slope up to which an edge counts as one along a main direction."""
 _FRACTION = 2.0**10
 """Parts of a cell to which positions that were computed are rounded."""
 _RIM = 2.0**-5
 """Least distance of these from the sides of their cell, in cells."""
 _TOUCHING = 1e-6
 """Distance in cells from an edge at which a node lies on it."""
-_MOST_BESIDE = 5
-"""Edges of a node from which on it gets no chord: people draw crossings, no stars."""
 _ROUNDS = 50
+_TRIED = 20
+"""Nearest edges that a point is joined to, if it sees them."""
 
 
 def settled(positions: FloatArray) -> FloatArray:
@@ -70,10 +70,11 @@ class Sketch:
         self, positions: FloatArray, kinds: LongArray, edges: LongArray, passage: Passage
     ) -> None:
         self.positions, self.kinds, self.edges = positions, kinds, edges
-        self._passage = passage
+        self.passage = passage
 
-    def _least(self, positions: FloatArray, edges: LongArray) -> FloatArray:
-        return self._passage.least(positions[edges[:, 0]], positions[edges[:, 1]])
+    def least(self, positions: FloatArray, edges: LongArray) -> FloatArray:
+        """Return the least clearance of edges, as `Passage.least` does."""
+        return self.passage.least(positions[edges[:, 0]], positions[edges[:, 1]])
 
     def _with_nodes(self, positions: FloatArray) -> list[int]:
         """Return the nodes at some positions; they are added where there are none."""
@@ -92,8 +93,8 @@ class Sketch:
 
     def repair(self) -> None:
         """Lead edges that the robot cannot follow round what is in their way."""
-        is_bad = self._least(self.positions, self.edges) < 0
-        space, bad = self._passage.space, self.edges[is_bad]
+        is_bad = self.least(self.positions, self.edges) < 0
+        space, bad = self.passage.space, self.edges[is_bad]
         part = space.components_at(self.positions)
         bad = bad[(part[bad[:, 0]] == part[bad[:, 1]]) & (bad[:, 0] != bad[:, 1])]
         edges = self.edges[~is_bad].tolist()
@@ -121,18 +122,18 @@ class Sketch:
         """
         turn = turn_of(angle_rad)
         turned = self.positions @ turn.T
-        reach = np.clip(0.4 * self._passage.at(self.positions), 1.0, most)
+        reach = np.clip(0.4 * self.passage.at(self.positions), 1.0, most)
         reach[self.kinds >= DOOR] = np.minimum(reach[self.kinds >= DOOR], most / 4)
-        aim = [_aligned(turned, self.edges, reach, axis, most) for axis in (0, 1)]
+        aim = [aligned(turned, self.edges, reach, axis, most) for axis in (0, 1)]
         self.move(np.stack(aim, axis=1) @ turn)
 
     def move(self, aim: FloatArray) -> None:
         """Move nodes, float64 (n, 2), where all their edges keep their room."""
         start, aim = self.positions, settled(aim)
         now = np.where(self._is_free(aim)[:, None], aim, start)
-        want = np.minimum(self._passage.comfort, _KEPT * self._least(start, self.edges))
+        want = np.minimum(self.passage.comfort, _KEPT * self.least(start, self.edges))
         while True:
-            back = np.unique(self.edges[self._least(now, self.edges) < want])
+            back = np.unique(self.edges[self.least(now, self.edges) < want])
             back = back[(now[back] != start[back]).any(axis=1)]
             if not len(back):
                 break
@@ -149,7 +150,7 @@ class Sketch:
         longest
             Length of the longest edge that a dropped bend may leave, in cells.
         """
-        beside = self._neighbours()
+        beside = self.neighbours()
         waiting = list(beside)
         while waiting:
             node = waiting.pop()
@@ -162,7 +163,8 @@ class Sketch:
         self.positions, self.kinds = self.positions[nodes], self.kinds[nodes]
         self.set_edges([(index[one], index[other]) for one in beside for other in beside[one]])
 
-    def _neighbours(self) -> dict[int, set[int]]:
+    def neighbours(self) -> dict[int, set[int]]:
+        """Return the nodes next to each node."""
         beside: dict[int, set[int]] = {node: set() for node in range(len(self.positions))}
         for one, other in self.edges.tolist():
             if one != other:
@@ -174,15 +176,15 @@ class Sketch:
         """Merge a node with the nearest neighbour that can take its edges over."""
         if self.kinds[node] > END:
             return set()
-        at, comfort = self.positions, self._passage.comfort
+        at, comfort = self.positions, self.passage.comfort
         gaps = {other: math.dist(at[node], at[other]) for other in beside[node]}
         for other in sorted(gaps, key=lambda k: (gaps[k], k)):
             rest = sorted(beside[node] - {other})
             if gaps[other] > near or beside[other] & set(rest):
                 continue
             pairs = np.array([(k, one) for k in (node, other) for one in rest], dtype=np.int64)
-            least = self._least(at, pairs.reshape(-1, 2)).reshape(2, -1)
-            if (least[1] < np.minimum(comfort, _KEPT * least[0])).any():
+            least = self.least(at, pairs.reshape(-1, 2)).reshape(2, -1)
+            if (least[1] < np.minimum(comfort, _MERGED * least[0])).any():
                 continue
             self.kinds[other] = max(self.kinds[node], self.kinds[other])
             for one in rest:
@@ -197,62 +199,22 @@ class Sketch:
         if self.kinds[node] != NOTHING or len(beside[node]) != 2:  # noqa: PLR2004
             return set()
         one, other = sorted(beside[node])
-        at, comfort = self.positions, self._passage.comfort
+        at, comfort = self.positions, self.passage.comfort
         step = at[other] - at[one]
         length = math.hypot(*step)
         if other in beside[one] or not 0 < length <= longest:
             return set()
         off = abs(float((at[node] - at[one]) @ np.array([-step[1], step[0]]))) / length
-        room = float(self._passage.at(at[node][None])[0])
+        room = float(self.passage.at(at[node][None])[0])
         if off > max(0.3 * room, 1.0, room - comfort):
             return set()
-        least = self._least(at, np.array([(one, other), (one, node), (node, other)]))
+        least = self.least(at, np.array([(one, other), (one, node), (node, other)]))
         if least[0] < min(comfort, _STRAIGHT * min(least[1:])):
             return set()
         _remove(node, beside)
         beside[one].add(other)
         beside[other].add(one)
         return {one, other}
-
-    def add_chords(self, reach: float, detour: float, least_rad: float) -> None:
-        """Join nodes that see each other where the way between them is long.
-
-        Parameters
-        ----------
-        reach
-            Length of the longest chord in cells.
-        detour
-            Least length of that way, in lengths of the chord.
-        least_rad
-            Least angle between a chord and another edge of its nodes.
-        """
-        from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
-
-        at = self.positions
-        pairs = KDTree(at).query_pairs(reach, output_type="ndarray").astype(np.int64)
-        pairs = np.sort(pairs.reshape(-1, 2), axis=1)
-        pairs = pairs[self._least(at, pairs) >= _KEPT * self._passage.comfort]
-        steps = at[pairs[:, 1]] - at[pairs[:, 0]]
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
-        beside: list[dict[int, float]] = [{} for _ in at]
-        ways = [each.items() for each in beside]
-        for one, other in self.edges.tolist():
-            beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
-        edges = self.edges.tolist()
-        for k in np.lexsort((pairs[:, 1], pairs[:, 0], lengths)).tolist():
-            (one, other), length = pairs[k].tolist(), float(lengths[k])
-            if length <= 0 or max(len(beside[one]), len(beside[other])) >= _MOST_BESIDE:
-                continue
-            if length_between(ways.__getitem__, one, other, detour * length) < math.inf:
-                continue
-            both = ((one, other), (other, one))
-            if any(is_beside(at, a, b, list(beside[a]), least_rad) for a, b in both):
-                continue
-            if edges and crosses(at[one], at[other], *at[np.array(edges)].swapaxes(0, 1)).any():
-                continue
-            edges.append([one, other])
-            beside[one][other] = beside[other][one] = length
-        self.set_edges(edges)
 
     def keep(self, known: FloatArray, edges: LongArray, same: LongArray, near: float) -> None:
         """Keep a graph before where the robot can follow it, and add what it lacks.
@@ -270,10 +232,10 @@ class Sketch:
         """
         from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 
-        space, count = self._passage.space, len(known)
+        space, count = self.passage.space, len(known)
         is_free = self._is_free(known)
         edges = edges[is_free[edges].all(axis=1)]
-        edges = edges[self._least(known, edges) >= 0]
+        edges = edges[self.least(known, edges) >= 0]
         is_free[np.setdiff1d(np.arange(count), edges)] = False
         # A node stands for itself, for one before at its place, or for one before that is near.
         stands = np.where((same >= 0) & is_free[same], same, count + np.arange(len(same)))
@@ -288,15 +250,35 @@ class Sketch:
         np.maximum.at(kinds, stands[stands < count], self.kinds[stands < count])
         new = stands[self.edges]
         both = np.concatenate([known, self.positions])
-        new = new[(self._least(both, new) >= 0) & (new[:, 0] != new[:, 1])]
+        new = new[(self.least(both, new) >= 0) & (new[:, 0] != new[:, 1])]
         self.positions, self.kinds = both, np.append(kinds, self.kinds)
         self.set_edges([*edges.tolist(), *self._lacking(edges, new)])
-        used = np.unique(np.append(self.edges, stands))
-        self.positions, self.kinds = self.positions[used], self.kinds[used]
-        self.set_edges(np.searchsorted(used, self.edges).tolist())
+        self.keep_nodes(np.unique(np.append(self.edges, stands)))
+
+    def keep_nodes(self, nodes: LongArray) -> None:
+        """Keep some nodes, ascending, and the edges between them."""
+        self.positions, self.kinds = self.positions[nodes], self.kinds[nodes]
+        is_kept = np.isin(self.edges, nodes).all(axis=1)
+        self.set_edges(np.searchsorted(nodes, self.edges[is_kept]).tolist())
+
+    def freed(self, positions: FloatArray, most: float) -> FloatArray:
+        """Move positions that are not free to free ones within a distance in cells: of those with
+        the room that is asked for, or else the most, the nearest."""
+        free, passage = self.passage.space.free, self.passage
+        moved = positions.copy()
+        for k in np.flatnonzero(~self._is_free(positions)).tolist():
+            low = np.maximum(np.floor(positions[k] - most), 0).astype(np.int64)
+            high = np.maximum(np.ceil(positions[k] + most), 0).astype(np.int64)
+            spots = np.argwhere(free[low[0] : high[0], low[1] : high[1]]) + low + 0.5
+            away = np.hypot(*(spots - positions[k]).T)
+            spots, away = spots[away < most], away[away < most]
+            if len(spots):
+                room = np.minimum(passage.at(spots), passage.comfort)
+                moved[k] = spots[np.lexsort((away, -room))[0]]
+        return moved
 
     def _is_free(self, positions: FloatArray) -> BoolArray:
-        free = self._passage.space.free
+        free = self.passage.space.free
         inside = np.asarray(
             ((positions > 0) & (positions < free.shape)).all(axis=1), dtype=np.bool_
         )
@@ -322,6 +304,55 @@ class Sketch:
                 beside[one][other] = beside[other][one] = length
         return added
 
+    def add_points(self, points: FloatArray, near: float) -> None:
+        """Add nodes at points, each joined to the nearest edge where that is in sight.
+
+        Parameters
+        ----------
+        points
+            float64 (k, 2).
+        near
+            Distance in cells from its ends, and from a point, within which an edge gets no node
+            for the point: it is joined to the end, or led through the point.
+        """
+        for node in self._with_nodes(points):
+            if (self.edges == node).any():
+                continue
+            at = self.positions[node]
+            tails = self.positions[self.edges[:, 0]]
+            steps = self.positions[self.edges[:, 1]] - tails
+            lengths = np.maximum((steps**2).sum(axis=1), 1e-9)
+            along = np.clip(((at - tails) * steps).sum(axis=1) / lengths, 0, 1)
+            feet = tails + along[:, None] * steps
+            away = np.hypot(*(feet - at).T)
+            for edge in np.argsort(away, kind="stable")[:_TRIED].tolist():
+                joined = self._stub(node, edge, feet[edge], near)
+                if joined:
+                    self.set_edges([*np.delete(self.edges, edge, axis=0).tolist(), *joined])
+                    break
+
+    def _stub(
+        self, node: int, edge: int, foot: FloatArray, near: float
+    ) -> list[tuple[int, int]] | None:
+        """Return the edges that join a node to an edge and stand for it, None if none are free."""
+        tail, head = self.edges[edge].tolist()
+        at, ends = self.positions[node], self.positions[[tail, head]]
+        joins = self.passage.space.joins
+        if math.dist(at, foot) <= near and joins(np.stack([at, at]), ends).all():
+            return [(tail, node), (node, head)]
+        gaps = np.hypot(*(ends - foot).T)
+        if gaps.min() > near:
+            foot = settled(foot[None])
+            if self._is_free(foot)[0]:
+                spots = np.repeat(foot, 3, axis=0)
+                if joins(spots, np.concatenate([ends, at[None]])).all():
+                    (new,) = self._with_nodes(foot)
+                    return [(tail, new), (new, head), (new, node)]
+        for end in np.argsort(gaps, kind="stable").tolist():
+            if joins(at[None], ends[[end]])[0]:
+                return [(tail, head), (node, (tail, head)[end])]
+        return None
+
     def split(self, longest: float) -> None:
         """Divide edges into equal ones of about a length in cells at most."""
         edges: list[Sequence[int]] = []
@@ -331,7 +362,7 @@ class Sketch:
             along = np.arange(1, parts)[:, None] / parts
             inner = settled(start + (end - start) * along)
             line = np.concatenate([start[None], inner, end[None]])
-            is_free = parts > 1 and bool(self._passage.space.joins(line[:-1], line[1:]).all())
+            is_free = parts > 1 and bool(self.passage.space.joins(line[:-1], line[1:]).all())
             edges += self.add_path(tail, head, inner) if is_free else [(tail, head)]
         self.set_edges(edges)
 
@@ -358,7 +389,7 @@ class Sketch:
 
     def _part(self, which: list[int], at: FloatArray) -> None:
         """Lead edges through a common node, or leave the longest out that is not needed."""
-        space, there = self._passage.space, np.flatnonzero((self.positions == at).all(axis=1))
+        space, there = self.passage.space, np.flatnonzero((self.positions == at).all(axis=1))
         ends = np.unique(self.edges[which]).tolist()
         rest = np.delete(self.edges, which, axis=0).tolist()
         near = np.floor(
@@ -397,29 +428,3 @@ class Sketch:
 def _remove(node: int, beside: dict[int, set[int]]) -> None:
     for other in beside.pop(node):
         beside[other].discard(node)
-
-
-def _aligned(
-    turned: FloatArray, edges: LongArray, reach: FloatArray, axis: int, most: float
-) -> FloatArray:
-    """Return coordinates that are equal along the edges of one direction, float64 (n,).
-
-    The longest edges come first; their nodes share a coordinate as long as all can reach it.
-    """
-    steps = abs(turned[edges[:, 1]] - turned[edges[:, 0]])
-    along, off = steps[:, 1 - axis], steps[:, axis]
-    fits = (off < _SLOPE * along) | ((off < most) & (along > 1.5 * off))
-    group, value = np.arange(len(turned)), turned[:, axis]
-    low, high = value - reach, value + reach
-    members = [[node] for node in range(len(turned))]
-    for edge in np.argsort(-along, kind="stable").tolist():
-        one, other = group[edges[edge]].tolist()
-        least, greatest = max(low[one], low[other]), min(high[one], high[other])
-        if fits[edge] and one != other and least <= greatest:
-            low[one], high[one] = least, greatest
-            members[one] += members[other]
-            group[members[other]] = one
-    found = value.copy()
-    for one in np.unique(group).tolist():
-        found[members[one]] = np.clip(value[members[one]].mean(), low[one], high[one])
-    return found

@@ -128,6 +128,15 @@ class WaypointGraph:
         return len(self.edges)
 
     @property
+    def ids(self) -> tuple[list[Name], list[Name | None]]:
+        """The ids of nodes and edges that stay from one export to the next: whole numbers that the
+        facts hold as `id`, as files of Open-RMF, OpenStreetMap and LIF by hybridnav do; for others
+        their names."""
+        node_ids = [_kept_id(self.node_facts, at, name) for at, name in enumerate(self.names)]
+        edge_ids = [_kept_id(self.edge_facts, at, name) for at, name in enumerate(self.edge_names)]
+        return [name for name in node_ids if name is not None], edge_ids
+
+    @property
     def lengths_m(self) -> FloatArray:
         """float64 (m,), distance between the two nodes of each edge in metres."""
         import numpy as np  # noqa: PLC0415 - lengths alone need it
@@ -177,6 +186,11 @@ class WaypointGraph:
         return graph
 
 
+def _kept_id(facts_of: dict[int, dict[str, Any]], at: int, name: Name | None) -> Name | None:
+    found = facts_of.get(at, {}).get("id")
+    return found if isinstance(found, int) and not isinstance(found, bool) else name
+
+
 # The route graph of a map: nodes, straight edges, and what is known of them.
 
 LANE = "lane"
@@ -205,12 +219,15 @@ class RouteGraph:
     positions: FloatArray
     """float64 (n, 2), (row, col) of each node in grid units."""
     kinds: tuple[str, ...]
-    """The kind of each node: room, door, crossing, end (of a lane), bend, place, cover (for points
-    that would see no node nearby), lane (of a lane that `keep_right` makes)."""
+    """The kind of each node: room, door, point (a named one), crossing, end (of a lane), bend,
+    place, cover (for points that would see no node nearby), lane (of a lane that `keep_right`
+    makes)."""
     rooms: tuple[str | None, ...]
     """The room of each node, None for no room."""
     doors: LongArray
     """int64 (n,), the number of the door that a node lies in, 0 for none."""
+    names: tuple[str | None, ...]
+    """The name of each node that is a named point, None for others."""
     edges: LongArray
     """int64 (m, 2), tail and head of each edge, sorted."""
     edge_rooms: tuple[str | None, ...]

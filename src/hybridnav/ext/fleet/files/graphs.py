@@ -288,13 +288,16 @@ def _named(door: Door, floor: str) -> str:
 
 
 def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
-    """Return a route graph with its facts; a room has its name at its first node."""
+    """Return a route graph with its facts; a room has its name at its first node, unless that is a
+    named point."""
     nodes: dict[int, dict[str, Any]] = {}
     named: set[str] = set()
     for node in range(graph.n_nodes):
         nodes[node] = {"metadata": node_metadata(graph, node)}
         room = graph.rooms[node]
-        if graph.kinds[node] == "room" and room is not None and room not in named:
+        if graph.names[node] is not None:
+            nodes[node]["name"] = graph.names[node]
+        elif graph.kinds[node] == "room" and room is not None and room not in named:
             named.add(room)
             nodes[node]["name"] = room
     edges: dict[int, dict[str, Any]] = {}
@@ -307,9 +310,9 @@ def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
         name=graph.grid.name,
         format="hybridnav",
         frame="",
-        names=tuple(range(graph.n_nodes)),
+        names=tuple(graph.ids[0].tolist()),
         points=graph.points,
-        edge_names=(None,) * graph.n_edges,
+        edge_names=tuple(graph.ids[1].tolist()),
         edges=graph.edges,
         costs=graph.lengths_m,
         node_facts=nodes,

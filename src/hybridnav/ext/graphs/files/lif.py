@@ -14,7 +14,13 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count, list_of, mapping_of
+from hybridnav.ext.graphs.files.rmf_read import (
+    MOST_FLOORS,
+    check_link_count,
+    id_fact,
+    list_of,
+    mapping_of,
+)
 from hybridnav.ext.graphs.files.rmf_write import speed_limit_of
 from hybridnav.ext.graphs.gather import Gathered, pair_of, shown
 from hybridnav.maps.checks import checked_type
@@ -75,6 +81,7 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
             known = _text(node, "nodeId", at)
             point = pair_of(node.get("nodePosition"))
             facts = {key: value for key, value in node.items() if key != "nodePosition"}
+            facts |= _id_in(known, f"{floor}/")
             if isinstance(node.get("nodeName"), str):
                 facts["name"] = node["nodeName"]
             gathered.add_node(known, point, facts)
@@ -153,8 +160,16 @@ def _add_edges(
                 crossing.append((str(edge.get("edgeName", edge.get("edgeId", ""))), *ends))
                 continue
             facts = {key: value for key, value in edge.items() if not key.endswith("NodeId")}
-            floors[on[0] or own].add_edge(ends, facts | _speed(edge), name=edge.get("edgeId"))
+            facts |= _speed(edge) | _id_in(edge.get("edgeId"), f"{own}/", "/edge")
+            floors[on[0] or own].add_edge(ends, facts, name=edge.get("edgeId"))
     return crossing
+
+
+def _id_in(text: Any, before: str, after: str = "") -> dict[str, int]:
+    """Return the whole number that an id holds as `export_lif` writes it, as the fact `id`."""
+    if not isinstance(text, str) or not (text.startswith(before) and text.endswith(after)):
+        return {}
+    return id_fact(text[len(before) : len(text) - len(after)])
 
 
 def _speed(edge: dict[str, Any]) -> dict[str, Any]:
@@ -233,7 +248,8 @@ def export_lif(
     Parameters
     ----------
     building
-        The floors and links, all floors in one frame. Ids are "FLOOR/NODE".
+        The floors and links, all floors in one frame. Ids are "FLOOR/NODE" and "FLOOR/EDGE/edge",
+        by the ids of the graph where these are unique on the floor, else by their places.
     path
         The file, ending in .json or .lif; one that exists is replaced.
     vehicle_types
@@ -307,8 +323,10 @@ def _lines(layout: dict[str, Any]) -> str:
 
 def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str, Any]]:
     layouts: list[dict[str, Any]] = []
+    ids = {floor.name: _floor_ids(floor) for floor in building.floors}
     for floor in building.floors:
-        nodes = [_node(floor, node, types) for node in range(floor.graph.n_nodes)]
+        known = ids[floor.name][0]
+        nodes = [_node(floor, node, known[node], types) for node in range(floor.graph.n_nodes)]
         layouts.append(
             {
                 "layoutId": floor.name,
@@ -316,7 +334,7 @@ def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str
                 "layoutVersion": "1",
                 "layoutLevelId": floor.name,
                 "nodes": nodes,
-                "edges": list(_edges(floor, types)),
+                "edges": list(_edges(floor, ids[floor.name], types)),
                 "stations": [],
             }
         )
@@ -325,22 +343,33 @@ def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str
         stops = nodes_of_link(building, link)
         pairs = list(itertools.pairwise(stops))
         for one, other in [*pairs, *(pair[::-1] for pair in pairs)]:
-            ends = _node_id(*one), _node_id(*other)
+            ends = ids[one[0].name][0][one[1]], ids[other[0].name][0][other[1]]
             edge = {"edgeId": f"{link.kind}/{link.name}/{one[0].name}/{other[0].name}"}
             edge |= {"edgeName": f"{link.kind} {link.name}"}
             layouts[at[one[0].name]]["edges"].append(edge | _between(ends, types, None))
     return layouts
 
 
-def _node_id(floor: FloorGraph, node: int) -> str:
-    return f"{floor.name}/{node}"
+def _floor_ids(floor: FloorGraph) -> tuple[list[str], list[str]]:
+    """Return the ids of the nodes and of the edges of a floor."""
+    nodes, edges = (list(map(str, _unique(ids))) for ids in floor.graph.ids)
+    return [f"{floor.name}/{node}" for node in nodes], [f"{floor.name}/{e}/edge" for e in edges]
 
 
-def _node(floor: FloorGraph, node: int, types: list[str]) -> dict[str, Any]:
+def _unique(ids: Sequence[Any]) -> Sequence[Any]:
+    """Return whole numbers as they are, and free ones for others; places where two are equal."""
+    known = [each for each in ids if type(each) is int]
+    if len(set(known)) < len(known):
+        return range(len(ids))
+    free = itertools.count(max(known, default=-1) + 1)
+    return [each if type(each) is int else next(free) for each in ids]
+
+
+def _node(floor: FloorGraph, node: int, known: str, types: list[str]) -> dict[str, Any]:
     x, y = floor.graph.points[node].round(_DECIMALS).tolist()
     name = floor.graph.node_facts.get(node, {}).get("name")
     return {
-        "nodeId": _node_id(floor, node),
+        "nodeId": known,
         **({"nodeName": name} if isinstance(name, str) and name else {}),
         "mapId": floor.name,
         "nodePosition": {"x": x + 0.0, "y": y + 0.0},
@@ -348,17 +377,15 @@ def _node(floor: FloorGraph, node: int, types: list[str]) -> dict[str, Any]:
     }
 
 
-def _edges(floor: FloorGraph, types: list[str]) -> Iterator[dict[str, Any]]:
+def _edges(
+    floor: FloorGraph, ids: tuple[list[str], list[str]], types: list[str]
+) -> Iterator[dict[str, Any]]:
     for edge, (tail, head) in enumerate(floor.graph.edges.tolist()):
         facts = floor.graph.edge_facts.get(edge, {})
         door = facts.get("door_name")
-        ends = _node_id(floor, tail), _node_id(floor, head)
+        ends = ids[0][tail], ids[0][head]
         known = {"edgeDescription": f"door {door}"} if isinstance(door, str) and door else {}
-        yield (
-            {"edgeId": f"{floor.name}/{edge}/edge"}
-            | known
-            | _between(ends, types, speed_limit_of(facts))
-        )
+        yield ({"edgeId": ids[1][edge]} | known | _between(ends, types, speed_limit_of(facts)))
 
 
 def _between(nodes: tuple[str, str], types: list[str], speed: float | None) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import shapely
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.osm_write import ALONE
+from hybridnav.ext.graphs.files.osm_write import ALONE, ID, ID_BACK
 from hybridnav.ext.graphs.files.osm_xml import (
     Anchor,
     OsmData,
@@ -27,7 +27,7 @@ from hybridnav.ext.graphs.files.osm_xml import (
     read_osm_xml,
     title_of,
 )
-from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count
+from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count, id_fact
 from hybridnav.ext.graphs.gather import Gathered, number_of, shown
 
 if TYPE_CHECKING:
@@ -185,7 +185,8 @@ def _add_routes(
     used = floor.alone.union(*(way.refs for way in floor.routes))
     for node in itertools.chain(data.places, data.lost):
         if node in used:
-            gathered.add_node(node, points.get(node), data.tags.get(node, {}))
+            tags = data.tags.get(node, {})
+            gathered.add_node(node, points.get(node), tags | id_fact(tags.get(ID, "")))
     for way in floor.routes:
         facts: dict[str, Any] = dict(way.tags)
         if "hybridnav:door" in facts:
@@ -194,11 +195,12 @@ def _add_routes(
         if speed > 0:
             facts["speed_limit"] = round(speed / _KM_H, 6)
         one_way = way.tags.get("oneway", "no")
+        ahead, back = (facts | id_fact(way.tags.get(key, "")) for key in (ID, ID_BACK))
         for pair in itertools.pairwise(way.refs):
             if one_way != "-1":
-                gathered.add_edge(pair, facts)
+                gathered.add_edge(pair, ahead)
             if one_way not in {"yes", "true", "1"}:
-                gathered.add_edge(pair[::-1], facts)
+                gathered.add_edge(pair[::-1], back)
 
 
 def _is_room(element: OsmWay) -> bool:

@@ -31,6 +31,8 @@ AREA_TYPES = {"lift": "elevator", "stairs": "stairs", "ramp": "room"}
 """Values of `osmAG:areaType` for what joins floors; it has none for ramps."""
 ALONE = "hybridnav:alone"
 """Key of the nodes that no edge joins: no way has them."""
+ID, ID_BACK = "hybridnav:id", "hybridnav:id_back"
+"""Keys of the id of a node or edge, and of the edge that leads back along the same way."""
 _KM_H = 3.6
 _MOST_LEVEL = 1000
 """Greatest number of a floor that is taken for its level."""
@@ -52,8 +54,8 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
     * Links are ways through their ends with `highway` elevator, steps or footway and all levels in
       `level`, and on each floor an area with a passage to the room that it lies in.
 
-    What a `Link` knows beside, and the name of an edge's door, has keys that begin with
-    `hybridnav:`.
+    What a `Link` knows beside, the name of an edge's door, and the ids of nodes and edges that are
+    whole numbers have keys that begin with `hybridnav:`.
 
     Parameters
     ----------
@@ -164,6 +166,8 @@ class _Writer:
     def _node_tags(self, floor: FloorGraph, node: int) -> Tags:
         name = floor.graph.node_facts.get(node, {}).get("name")
         tags = self._on(floor) | ({"name": name} if isinstance(name, str) and name else {})
+        known = floor.graph.ids[0][node]
+        tags |= {ID: str(known)} if type(known) is int else {}
         return tags | ({} if node in self._joined[floor.name] else {ALONE: "yes"})
 
     def _areas(self, floor: FloorGraph, shapes: Shapes) -> dict[str, int]:
@@ -200,16 +204,20 @@ class _Writer:
 
     def _edges(self, floor: FloorGraph) -> None:
         """Write each edge, and one that leads back as the same way."""
-        graph, refs = floor.graph, self._graph_nodes[floor.name]
+        graph, refs, ids = floor.graph, self._graph_nodes[floor.name], floor.graph.ids[1]
         waiting: dict[tuple[int, int, str, float | None], list[int]] = {}
         for edge, (tail, head) in enumerate(graph.edges.tolist()):
             door, speed = _facts_of(floor, edge)
+            known = ids[edge]
             back = waiting.get((head, tail, door, speed))
             if back:
-                del self._ways[back.pop() - 1][1]["oneway"]
+                way_tags = self._ways[back.pop() - 1][1]
+                del way_tags["oneway"]
+                way_tags |= {ID_BACK: str(known)} if type(known) is int else {}
                 continue
             tags = {"highway": "footway", "indoor": "yes", "oneway": "yes"} | self._on(floor)
             tags |= {"hybridnav:door": door} if door else {}
+            tags |= {ID: str(known)} if type(known) is int else {}
             tags |= {} if speed is None else {"maxspeed": f"{speed * _KM_H:.6g}"}
             way = self._add_way([refs[tail], refs[head]], tags)
             waiting.setdefault((tail, head, door, speed), []).append(way)

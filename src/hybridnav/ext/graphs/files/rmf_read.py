@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 MOST_FLOORS, MOST_LINKS = 1000, 1000
 """Most levels of a file, and most links between them."""
 
+_MOST_DIGITS = 15
+
 Point = tuple[float, float]
 Name = int | str
 
@@ -134,6 +136,12 @@ def check_link_count(count: int, where: str) -> None:
     """Refuse more lifts, stairs and ramps than any building has: they are matched one by one."""
     if count > MOST_LINKS:
         raise MapError(f"{where}: more than {MOST_LINKS} lifts, stairs and ramps are not read")
+
+
+def id_fact(text: str) -> dict[str, int]:
+    """Return a text of digits as the fact `id`, by which an update knows a node or edge again."""
+    is_id = text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
+    return {"id": int(text)} if is_id else {}
 
 
 def mapping_of(value: Any, where: str, what: str, most: int | None = None) -> dict[str, Any]:

@@ -50,7 +50,8 @@ def export_rmf(
     ----------
     building
         The floors and links. Nodes have `name` from their facts, and flags such as `is_charger`;
-        names that occur twice get that of the floor in front. Ends of lifts without a node are
+        names that occur twice get that of the floor in front. Nodes and edges have `id`, which
+        Open-RMF skips, where the graph has whole numbers. Ends of lifts without a node are
         joined as `join_links` does it.
     path
         The file, ending in .yaml or .yml; one that exists is replaced.
@@ -150,6 +151,7 @@ class _Writer:
         for node, (x, y) in enumerate(floor.graph.points.tolist()):
             facts = floor.graph.node_facts.get(node, {})
             options = {"name": quoted(self._name_at.get((floor.name, node), ""))}
+            options |= _id_option(floor.graph.ids[0][node])
             options |= {flag: "true" for flag in _FLAGS if facts.get(flag) is True}
             if isinstance(facts.get("dock_name"), str):
                 options["dock_name"] = quoted(facts["dock_name"])
@@ -161,7 +163,7 @@ class _Writer:
     def _lanes(self, floor: FloorGraph) -> Iterator[str]:
         for edge, (tail, head) in enumerate(floor.graph.edges.tolist()):
             facts = floor.graph.edge_facts.get(edge, {})
-            options = {}
+            options = _id_option(floor.graph.ids[1][edge])
             if facts.get("door_name") in self._doors:
                 options["door_name"] = quoted(facts["door_name"])
             for key in ("dock_name", "undock_name", "orientation_constraint"):
@@ -193,6 +195,11 @@ class _Writer:
                 sides = 2 * link.max_radius_m, 2 * link.max_radius_m
             dims = ", ".join(map(_number, sides))
             yield f"  {quoted(link.name)}: {{position: [{x}, {y}, 0.0], dims: [{dims}]}}"
+
+
+def _id_option(known: Any) -> dict[str, str]:
+    """Return the id of a vertex or lane, which Open-RMF does not read and updates keep."""
+    return {"id": str(known)} if type(known) is int else {}
 
 
 def speed_limit_of(facts: dict[str, Any]) -> float | None:
