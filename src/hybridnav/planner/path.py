@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 @copies_alike
 @on_demand("cells")
+@on_demand("points")
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid, between the centres of two cells, or at any angle between two
@@ -64,10 +65,9 @@ class Path:
     """Heading to which the robot turns on the spot once it is there; None for no turn."""
 
     def __post_init__(self) -> None:
-        cells = vars(self)["cells"]
-        if not callable(cells):
-            cells.flags.writeable = False
-        self.points.flags.writeable = False
+        for array in (vars(self)["cells"], vars(self)["points"]):
+            if not callable(array):
+                array.flags.writeable = False
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
 
