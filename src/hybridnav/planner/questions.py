@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     Block = tuple[slice, slice, FloatArray]
     Planned = Callable[[tuple[FloatArray, FloatArray]], PlanBatch]
 
+_WORTH = 1000
+"""Least number of pairs round closures for which a hierarchy without these cells is built."""
 _PAIRS = 4096
 """Pairs that are planned at a time where there are no labels."""
 
@@ -178,8 +180,7 @@ def _distance(now: Planning, request: Any) -> float:
     query = now.query(request)
     if isinstance(query, PlanStatus):
         return math.nan
-    is_plain = request.smooth == "none" or now.method.metric == "any-angle"
-    if now.ompl is not None or not is_plain:
+    if not now.is_plain:
         return now.plan(request).cost
     return now.method.cost_of(query)
 
@@ -243,9 +244,9 @@ def _blocks(
     planned: Planned | None,
 ) -> Iterator[Block]:
     """Yield blocks of the table, in metres: by labels, or pair by pair."""
-    labels = None
-    if planned is None and closed is None and now.ompl is None and now.costs.layer is None:
-        labels = now.method.labels()
+    labels, is_worth = None, closed is None or len(ends[0]) * len(ends[1]) >= _WORTH
+    if planned is None and now.is_plain and is_worth:
+        labels = now.method.labels(closed)
     if labels is None:
         yield from _pair_by_pair(
             ends, planned or (lambda pairs: now.plan_many(pairs, None, closed))

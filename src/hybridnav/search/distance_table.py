@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from hybridnav._base.moves import FAR
-from hybridnav._base.threads import cores
+from hybridnav._base.threads import SHARES, cores
 from hybridnav.search.kernels.labels import meet
 
 if TYPE_CHECKING:
@@ -81,26 +81,45 @@ def distance_blocks(
     tuple
         The rows and columns of a block, and float64 lengths, infinite without a path.
     """
-    for first in range(0, len(goals[0]), BLOCK):
-        columns = slice(first, min(first + BLOCK, len(goals[0])))
-        block = source.placed((goals[0][columns], goals[1][columns]))
-        offset, corners, costs = source.goal_labels(block)
-        begin, order = by_number(corners, source.n_corners)
-        n_goals = len(offset) - 1
-        which = np.repeat(np.arange(n_goals, dtype=np.int32), np.diff(offset))[order]
-        buckets = begin, which, costs[order]
+    with ThreadPoolExecutor(cores()) as pool:
+        for first in range(0, len(goals[0]), BLOCK):
+            columns = slice(first, min(first + BLOCK, len(goals[0])))
+            yield from _rows_of(source, starts, goals, columns, pool)
 
-        def fill(
-            rows: slice, n_goals: int = n_goals, block: Any = block, buckets: Labels = buckets
-        ) -> FloatArray:
-            some = source.placed((starts[0][rows], starts[1][rows]))
-            table = np.full((rows.stop - rows.start, n_goals), FAR, np.int64)
-            source.direct(some, block, table)
-            meet(source.labels(some), buckets, table)
-            return source.lengths(table)
 
-        size = max(1, min(source.most, -(-len(starts[0]) // cores())))
-        parts = [slice(at, min(at + size, len(starts[0]))) for at in range(0, len(starts[0]), size)]
-        with ThreadPoolExecutor(cores()) as pool:
-            for rows, lengths in zip(parts, pool.map(fill, parts), strict=True):
-                yield rows, columns, lengths
+def _rows_of(
+    source: LabelSource, starts: Ends, goals: Ends, columns: slice, pool: ThreadPoolExecutor
+) -> Iterator[tuple[slice, slice, FloatArray]]:
+    """Yield the blocks of some columns."""
+
+    def labels_of(part: slice) -> Labels:
+        return source.goal_labels(source.placed((goals[0][part], goals[1][part])))
+
+    parts = _parts(columns, BLOCK)
+    offsets, corners, costs = zip(*pool.map(labels_of, parts), strict=True)
+    n_goals, corner = columns.stop - columns.start, np.concatenate(corners)
+    sizes = np.concatenate([np.diff(one) for one in offsets])
+    begin, order = by_number(corner, source.n_corners)
+    which = np.repeat(np.arange(n_goals, dtype=np.int32), sizes)[order]
+    buckets = begin, which, np.concatenate(costs)[order]
+    block = source.placed((goals[0][columns], goals[1][columns]))
+
+    def fill(rows: slice) -> FloatArray:
+        some = source.placed((starts[0][rows], starts[1][rows]))
+        table = np.full((rows.stop - rows.start, n_goals), FAR, np.int64)
+        source.direct(some, block, table)
+        meet(source.labels(some), buckets, table)
+        return source.lengths(table)
+
+    rows, at_once = _parts(slice(0, len(starts[0])), source.most), SHARES * cores()
+    for first in range(0, len(rows), at_once):  # no more blocks wait for who reads them
+        some = rows[first : first + at_once]
+        for part, lengths in zip(some, pool.map(fill, some), strict=True):
+            yield part, columns, lengths
+
+
+def _parts(whole: slice, most: int) -> list[slice]:
+    """Return shares of a range for all cores, of `most` at most."""
+    count = whole.stop - whole.start
+    size = max(1, min(most, -(-count // (SHARES * cores()))))
+    return [slice(at, min(at + size, whole.stop)) for at in range(whole.start, whole.stop, size)]

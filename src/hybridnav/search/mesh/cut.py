@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.threads import cores
+from hybridnav._base.threads import SHARES, cores
 from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
@@ -88,7 +88,7 @@ def shortest_paths(
         [rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1
     )
     endpoints = np.ascontiguousarray(endpoints[:, [1, 0, 3, 2]])
-    n_parts = max(1, min(cores(), len(where) // _LEAST))
+    n_parts = max(1, min(SHARES * cores(), len(where) // _LEAST))
     parts = np.array_split(np.arange(len(where)), n_parts)
 
     def answer(part: LongArray) -> MeshPaths:
@@ -98,7 +98,7 @@ def shortest_paths(
         search.prepare()
     if n_parts == 1:
         return answer(parts[0])
-    with ThreadPoolExecutor(n_parts) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         found = list(pool.map(answer, parts))
     before = np.cumsum([0, *(len(of.positions) for of in found)])
     starts = [of.path_start[:-1] + base for of, base in zip(found, before, strict=False)]
@@ -119,9 +119,9 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    mesh, graph = search.mesh, search.graph
-    place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
-    arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
+    graph = search.graph
+    place, asked = search.place, (where, endpoints)
+    arrays: Any = search.blocks if graph is None else graph.arrays
     at = n = 0
     with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
@@ -347,6 +347,16 @@ class DetourSearch:
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
 
+    @property
+    def search(self) -> MeshSearch:
+        """The search of the mesh without the closed cells."""
+        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
+        if self._search is None:
+            free = self._free.copy()
+            free.ravel()[self._closed] = False
+            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
+        return self._search
+
     def is_met_by(self, path: MeshPath) -> bool:
         """Return whether a shortest path between open cells is illegal with these cells closed.
 
@@ -378,10 +388,6 @@ class DetourSearch:
     ) -> MeshPath:
         """Find a shortest path between two positions, as `MeshSearch.path` does."""
         until = math.inf if budget_s is None else perf_counter() + budget_s
-        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
-        if self._search is None:
-            free = self._free.copy()
-            free.ravel()[self._closed] = False
-            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
+        search = self.search
         left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        return self._search.path(cells, positions, epsilon=epsilon, budget_s=left_s)
+        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s)

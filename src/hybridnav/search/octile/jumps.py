@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav._base.threads import Pool, cores
+from hybridnav._base.threads import SHARES, Pool, cores
 from hybridnav.search.contraction import contract, renumbered
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import (
@@ -287,11 +287,11 @@ class JumpSearch:
     def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
         """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
         endpoints = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
-        n_parts = max(1, min(cores(), len(endpoints) // _LEAST))
+        n_parts = max(1, min(SHARES * cores(), len(endpoints) // _LEAST))
         if n_parts == 1:
             found = [self._paths(endpoints)]
         else:
-            with ThreadPoolExecutor(n_parts) as pool:
+            with ThreadPoolExecutor(cores()) as pool:
                 found = list(pool.map(self._paths, np.array_split(endpoints, n_parts)))
         counts = np.concatenate([part[2] for part in found])
         length = counts[:, 0] + counts[:, 1] * math.sqrt(2.0)
@@ -303,8 +303,9 @@ class JumpSearch:
 
     def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
-        with self._works.lent() as work:
-            found: tuple[Any, Any, Any] = kernels.paths(
-                self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
-            )
+        work = self._works.take()
+        found: tuple[Any, Any, Any] = kernels.paths(
+            self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
+        )
+        self._works.give(work)
         return found
