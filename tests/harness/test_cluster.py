@@ -8,10 +8,12 @@ from dataclasses import replace
 
 import dask
 import distributed
+import numpy as np
 import pytest
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness import workers
+from hybridnav.harness import distances, distances_on_cluster, workers
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
@@ -105,6 +107,29 @@ def test_a_task_that_kills_every_worker_is_recorded_as_lost(
         status.setdefault(record["method"], set()).add(record["status"])
     assert status[name_of(faulty.Dies)] == {"lost"}
     assert status["grid-dijkstra"] == {"ready", "solved", "no path"}
+
+
+def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
+    monkeypatch.setattr(distances, "_ENTRIES", 20)  # several tasks
+    grid = hn.example_map("figure1")
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    planner.prepare()
+    cells = np.argwhere(grid.enterable())
+    picked = np.random.default_rng(0).integers(len(cells), size=(2, 9))
+    ends = tuple(grid.frame.points_of(cells[part]) for part in picked)
+    done = []
+    asked = {"address": cluster.scheduler_address, "progress": lambda *step: done.append(step)}
+    for more in ({}, {"blocked": {"cells": cells[::50]}}):
+        table = distances_on_cluster(planner, ends, **asked, **more)
+        np.testing.assert_array_equal(table, planner.distances(*ends, **more))
+    assert done[-1] == (81, 81)
+    near, same = (
+        distances_on_cluster(planner, ends, nearest=3, **asked),
+        planner.distances(*ends, nearest=3),
+    )
+    for part in ("data", "indices", "indptr"):
+        np.testing.assert_array_equal(getattr(near, part), getattr(same, part))
+    assert distances_on_cluster(planner, ([], ends[1]), **asked).shape == (0, 9)
 
 
 @pytest.mark.parametrize("address", ["nonsense", "bogus://x:1", "tcp://127.0.0.1", ""])

@@ -214,22 +214,13 @@ def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Reco
         When dask.distributed is not installed, the scheduler cannot be reached, or it has had no
         worker for `NO_WORKER_S`.
     """
-    try:
+    with connected(address) as client:
         from dask import distributed  # noqa: PLC0415 - an optional extra
-    except ImportError:
-        raise InvalidValueError(
-            "a scheduler needs dask.distributed: pip install 'hybridnav[cluster]'"
-        ) from None
-    try:
-        _knock(address)
-        client: Any = distributed.Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise InvalidValueError(f"scheduler {address}: {error}") from None
-    with client:
+
         futures = client.map(_whole, tasks, retries=_ATTEMPTS, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
         suspects = []
-        for future in _as_completed(client, futures):
+        for future in as_completed(client, futures):
             try:
                 yield future.result()
             except distributed.KilledWorker:
@@ -238,12 +229,27 @@ def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Reco
         for task in suspects:
             again = client.submit(_whole, task, pure=False)
             try:
-                yield next(_as_completed(client, [again])).result()
+                yield next(as_completed(client, [again])).result()
             except distributed.KilledWorker:
                 yield [task.failed_record(at, "lost") for at in range(len(task.ids))]
 
 
-def _as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
+def connected(address: str) -> Any:
+    """Return a client of a scheduler; see `run_on_cluster`."""
+    try:
+        from dask import distributed  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        raise InvalidValueError(
+            "a scheduler needs dask.distributed: pip install 'hybridnav[cluster]'"
+        ) from None
+    try:
+        _knock(address)
+        return distributed.Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InvalidValueError(f"scheduler {address}: {error}") from None
+
+
+def as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
     """Yield futures when they end; a cluster that no worker joins any more is not waited for."""
     from dask import distributed  # noqa: PLC0415 - an optional extra
 
