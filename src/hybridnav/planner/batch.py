@@ -147,8 +147,9 @@ def plan_many(
             if result.path.headings_rad is not None:
                 headings.append(result.path.headings_rad)
     path_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    points = np.empty((path_start[-1], 2))
-    if found is not None:
+    is_whole = found is not None and not left.any() and path_start[-1] == len(found.points)
+    points = found.points if found is not None and is_whole else np.empty((path_start[-1], 2))
+    if found is not None and not is_whole:
         counts[left] = 0
         points[_rows(path_start[:-1], counts)] = found.points[_rows(source, counts)]
     for i, path in paths.items():

@@ -130,8 +130,10 @@ class Questions:
     ) -> Any:
         """Return the costs of plans from all starts to all goals, exactly.
 
-        With `shortest` and `octile` they come from labels of the ends in a hierarchy, less than a
-        microsecond a pair on a building. With closures, costs or OMPL each pair is planned.
+        With lengths they come from labels of the ends in a hierarchy, less than a microsecond a
+        pair on a building; with closures in one of the map without these cells, for a thousand
+        pairs or more. With costs `grid-astar` searches once from each start. `robot`, `paper`, OMPL
+        and paths that are smoothed are planned pair by pair.
 
         Parameters
         ----------
@@ -211,13 +213,14 @@ def _distances(
     shape = len(points[0]), len(points[1])
     table = None if nearest else np.full(shape, np.nan)
     kept = _Nearest(shape, min(nearest or 1, max(shape[1], 1)))
+    is_whole = (len(starts), len(goals)) == shape
     n_blocks, total = 0, max(1, len(starts) * len(goals))
     for rows, columns, lengths in _blocks(now, (starts, goals), closed, planned):
         at, to = start_at[rows], goal_at[columns]
         if table is None:
             kept.add(at, to, lengths)
         else:
-            table[np.ix_(at, to)] = lengths
+            table[(rows, columns) if is_whole else np.ix_(at, to)] = lengths
         n_blocks += lengths.size
         progress(n_blocks, total)
     return kept.matrix() if table is None else table

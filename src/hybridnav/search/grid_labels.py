@@ -1,4 +1,4 @@
-"""Tables of distances over all cells, by one search from each start: lengths, or costs of cells."""
+"""Tables of costs of cells, by one search from each start."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.kernels.moves import legal_moves
-from hybridnav._base.moves import FAR, STRAIGHT, length_in_cells
+from hybridnav._base.moves import FAR, STRAIGHT
 from hybridnav.maps.costs import UNIT_BITS
-from hybridnav.search.kernels.waypoints import spread
+from hybridnav.search.kernels.labels import costs_to_cells
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
@@ -23,24 +23,25 @@ class GridLabels:
     ----------
     enterable
         bool (rows, cols), cells that may be entered.
+    units
+        int32 (rows, cols), the factor of each cell in units; None for 1.
     corner_cutting
         As for `GridSearch`.
-    units
-        int32 (rows, cols), the factor of each cell in units; None for lengths.
     """
 
-    n_corners, most = 1, 4
+    n_corners, most = 1, 16
 
     def __init__(
-        self, enterable: BoolArray, *, corner_cutting: bool, units: IntArray | None
+        self, enterable: BoolArray, units: IntArray | None, *, corner_cutting: bool
     ) -> None:
-        self._cols = enterable.shape[1]
-        self._moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
-        self._units = None if units is None else np.ascontiguousarray(units).ravel()
+        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+        one = np.broadcast_to(np.int32(1 << UNIT_BITS), enterable.shape)
+        factors = np.ascontiguousarray(one if units is None else units).ravel()
+        self._grid = moves, factors, enterable.shape[1]
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells."""
-        flat: LongArray = ends[0] @ np.array([self._cols, 1])
+        flat: LongArray = ends[0] @ np.array([self._grid[2], 1])
         return flat
 
     def labels(self, ends: LongArray) -> Labels:
@@ -51,20 +52,16 @@ class GridLabels:
 
     def direct(self, starts: LongArray, goals: LongArray, table: LongArray) -> None:
         """Set all entries."""
-        is_target = np.zeros(self._moves.size, np.bool_)
-        is_target[goals] = True
-        nothing = np.zeros(1, np.int64)
-        for row, start in zip(table, starts, strict=True):
-            asked = np.array([start]), nothing, is_target, True
-            cost = spread(self._moves, self._units, self._cols, *asked)[0][goals]
-            row[:] = np.where(cost < 0, FAR, cost)
+        is_goal, best = (
+            np.zeros(self._grid[0].size, np.bool_),
+            np.empty(self._grid[0].size, np.int64),
+        )
+        is_goal[goals] = True
+        count = int(np.count_nonzero(is_goal))
+        for row, start in zip(table, starts.tolist(), strict=True):
+            costs_to_cells(self._grid, start, is_goal, count, best)
+            row[:] = best[goals]
 
     def lengths(self, table: LongArray) -> FloatArray:
-        """Return costs as lengths in cells, of costs within 1e-10 of them, infinite for `FAR`."""
-        found = np.full(table.shape, np.inf)
-        reached = table < FAR
-        if self._units is None:
-            found[reached] = length_in_cells(table[reached])
-        else:
-            found[reached] = table[reached] / ((2 << UNIT_BITS) * STRAIGHT)
-        return found
+        """Return costs in cells, within 1e-10 of them, infinite for `FAR`."""
+        return np.where(table < FAR, table / ((2 << UNIT_BITS) * STRAIGHT), np.inf)

@@ -110,16 +110,19 @@ class WholeMap(Method):
         return search
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
-        """Return a search from each start, None with a refiner of the user's own; see `Method`."""
+        """Return labels of lengths, or by costs a search from each start; None with a refiner of
+        the user's own. See `Method`."""
         if self.refiners[1] is not None:
             return None
         # Loads kernels for tables alone.
         from hybridnav.search.grid_labels import GridLabels  # noqa: PLC0415
+        from hybridnav.search.octile.labels import jump_labels  # noqa: PLC0415
 
         refiner = self.refiners[0]
         cells, cutting = refiner.enterable(closed), refiner.grid.corner_cutting
         units = None if refiner.costs is None else refiner.costs.units
-        return GridLabels(cells, corner_cutting=cutting, units=units)
+        found = None if cutting or units is not None else jump_labels(cells)
+        return found or GridLabels(cells, units, corner_cutting=cutting)
 
     def find(self, query: Query) -> Found:
         """Find a shortest path; see `Method`."""

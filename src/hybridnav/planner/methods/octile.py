@@ -10,7 +10,6 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
-from hybridnav.maps.geometry import centres
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
@@ -108,19 +107,12 @@ class OverJumps(Method):
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""
-        if self._grid.corner_cutting:
+        if self._grid.corner_cutting or closed is not None:
             return self._whole_map.labels(closed)
         from hybridnav.search.octile.labels import JumpLabels  # noqa: PLC0415 - for tables alone
 
-        if closed is None:
-            graph = (self._search or self.prepare()).graph
-        else:
-            graph = build_jump_graph(self._refiner.enterable(closed))
-        if not graph.is_contracted:
-            graph = contract_graph(graph)
-        return (
-            JumpLabels(JumpSearch(graph)) if graph.is_contracted else self._whole_map.labels(closed)
-        )
+        search = self._search or self.prepare()
+        return JumpLabels(search) if search.graph.is_contracted else self._whole_map.labels()
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:
         """Find a shortest path for each query, on all cores; see `Method`.
@@ -129,7 +121,7 @@ class OverJumps(Method):
         """
         if self._grid.corner_cutting:
             return None
-        found = (self._search or self.prepare()).many(*queries.cells)
+        found = (self._search or self.prepare()).many(*queries.cells, self._frame)
         cost_m = found.length_cells * self._grid.resolution_m
-        done, points = np.ones(len(cost_m), dtype=np.bool_), centres(found.cells, self._frame)
-        return FoundMany(done, cost_m, cost_m, found.path_start, points)
+        done = np.ones(len(cost_m), dtype=np.bool_)
+        return FoundMany(done, cost_m, cost_m, found.path_start, found.cells)
