@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
+from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.geometry import (
     cells_of_line,
@@ -89,6 +90,7 @@ class OverMesh(Method):
         self._is_renewed = False
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
+        self._scratch = Pool(partial(np.copy, self._free))
         self._building = threading.RLock()  # a progress callback may plan
 
     @property
@@ -307,7 +309,8 @@ class OverMesh(Method):
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            found = self._detours[closed] = DetourSearch(search.mesh, self._free, closed.flat)
+            known = search.mesh, self._free, closed.flat, self._scratch
+            found = self._detours[closed] = DetourSearch(*known)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)
         return found
