@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 
 import dask
 import distributed
@@ -116,20 +117,22 @@ def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
     planner.prepare()
     cells = np.argwhere(grid.enterable())
     picked = np.random.default_rng(0).integers(len(cells), size=(2, 9))
-    ends = tuple(grid.frame.points_of(cells[part]) for part in picked)
-    done = []
-    asked = {"address": cluster.scheduler_address, "progress": lambda *step: done.append(step)}
-    for more in ({}, {"blocked": {"cells": cells[::50]}}):
-        table = distances_on_cluster(planner, ends, **asked, **more)
-        np.testing.assert_array_equal(table, planner.distances(*ends, **more))
-    assert done[-1] == (81, 81)
-    near, same = (
-        distances_on_cluster(planner, ends, nearest=3, **asked),
-        planner.distances(*ends, nearest=3),
+    starts, goals = (grid.frame.points_of(cells[part]) for part in picked)
+    done: list[tuple[int, int]] = []
+    there = partial(
+        distances_on_cluster,
+        planner,
+        address=cluster.scheduler_address,
+        progress=lambda *step: done.append(step),
     )
+    for blocked in (None, {"cells": cells[::50]}):
+        table = there((starts, goals), blocked=blocked)
+        np.testing.assert_array_equal(table, planner.distances(starts, goals, blocked=blocked))
+    assert done[-1] == (81, 81)
+    near, same = there((starts, goals), nearest=3), planner.distances(starts, goals, nearest=3)
     for part in ("data", "indices", "indptr"):
         np.testing.assert_array_equal(getattr(near, part), getattr(same, part))
-    assert distances_on_cluster(planner, ([], ends[1]), **asked).shape == (0, 9)
+    assert there(([], goals)).shape == (0, 9)
 
 
 @pytest.mark.parametrize("address", ["nonsense", "bogus://x:1", "tcp://127.0.0.1", ""])

@@ -66,6 +66,8 @@ def places_of_endpoints(
     status of one that is not valid."""
     ends = (*points[0].tolist(), *points[1].tolist())
     start, goal = classes_at(ends, grid.classes, grid.frame.for_kernels)
+    if start[0] == _FREE == goal[0]:
+        return (start[1], goal[1]), (start[2], goal[2])
     if start[0] < 0 or goal[0] < 0:
         return _OUTSIDE[start[0] >= 0]
     for (of_class, *_), refused in ((start, _REFUSED[0]), (goal, _REFUSED[1])):
@@ -105,8 +107,10 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
 def read_end(name: str, given: ArrayLike, needs_heading: bool) -> FloatArray:  # noqa: FBT001 - hot
     """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
     pose = _numbers(given)
-    if pose.shape == (2,) and not needs_heading and all(map(math.isfinite, pose.tolist())):
-        return pose
+    if pose.shape == (2,) and not needs_heading:
+        x, y = pose.tolist()
+        if math.isfinite(x) and math.isfinite(y):
+            return pose
     if pose.shape != (3,) or not np.isfinite(pose).all():
         pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
         raise InvalidValueError(

@@ -186,7 +186,7 @@ class Planning:
         """The finish of the preset."""
         return self._checked(None)
 
-    @property
+    @cached_property
     def is_plain(self) -> bool:
         """Whether the cost of a plan is that of the path that the method finds."""
         is_kept = self._finish == "none" or self.method.metric == "any-angle"
@@ -257,7 +257,8 @@ class Planning:
         elif metric == "octile" and request.smooth == "line-of-sight":
             result = self._in_sight(request, query, found)
         else:
-            points, length_m = found.points, found.cost_m
+            points: Any = found.points
+            length_m = found.cost_m
             if points is None:
                 points = partial(centres, found.cells, self.grid.frame.for_kernels)
             else:

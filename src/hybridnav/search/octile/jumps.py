@@ -6,7 +6,7 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -209,8 +209,7 @@ _LEAST = 64
 """Least number of queries that justifies a thread."""
 
 
-@dataclass(frozen=True, eq=False)
-class JumpPath:
+class JumpPath(NamedTuple):
     """A shortest path between two cells; its cells are None if there is none."""
 
     cells: LongArray | None
