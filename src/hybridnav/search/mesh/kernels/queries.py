@@ -225,12 +225,16 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
 
 
 def _answer(mesh, graph, place, where, points, work, effort):
-    """Answer one query by the kernel for its kind of graph, which the types of arrays tell."""
+    """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
+    if isinstance(graph[1], tuple):
+        return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
+    kernel = query_corners if len(graph) == 3 else query_hierarchy
+    return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
 @overload(_answer)
 def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: ARG001 - numba's rule
-    """Return what stands for `_answer`, as numba asks for it: a function with equal arguments."""
+    """Return what is compiled for `_answer`, as numba asks for it: by the types of the arrays."""
 
     def by_intervals(mesh, graph, place, where, points, work, effort):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
