@@ -14,7 +14,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness import distances, distances_on_cluster, workers
+from hybridnav.harness import distances_on_cluster, workers
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
@@ -111,7 +111,7 @@ def test_a_task_that_kills_every_worker_is_recorded_as_lost(
 
 
 def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
-    monkeypatch.setattr(distances, "_ENTRIES", 20)  # several tasks
+    monkeypatch.setattr(workers, "_ENTRIES", 20)  # several tasks
     grid = hn.example_map("figure1")
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
     planner.prepare()

@@ -1,9 +1,9 @@
 from .analysis import Study as Study, load_study as load_study, to_frame as to_frame
 from .compare import compare_runs as compare_runs
-from .distances import distances_on_cluster as distances_on_cluster
 from .names import NamedMethod as NamedMethod, load_methods as load_methods
 from .output import write_outputs as write_outputs
 from .run import RunSettings as RunSettings, evaluate as evaluate
+from .workers import distances_on_cluster as distances_on_cluster
 from .yardstick import AnyAngleOptimum as AnyAngleOptimum
 
 __all__: list[str]

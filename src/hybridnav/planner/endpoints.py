@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.search.found import ClosedCells
+    from hybridnav.planner.settings import Finish
+    from hybridnav.search.found import ClosedCells, KeptLine
 
 Cell = tuple[int, int]
 Position = tuple[float, float]
@@ -37,6 +38,23 @@ _REFUSED = (
         CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
     },
 )
+
+
+class PlanRequest(NamedTuple):
+    """What a caller wants to know, read."""
+
+    poses: tuple[FloatArray, FloatArray]
+    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
+    smooth: Finish
+    """What is done with the path that the method finds."""
+    closed: ClosedCells | None
+    """Cells that are closed for this query; None for none."""
+    goal: ArrayLike | str
+    """The goal as it was given."""
+    kept: KeptLine | None
+    """The line to stay on; None for none."""
+    began: float
+    """The time at which reading began, of `time.perf_counter`."""
 
 
 def no_places() -> NoReturn:

@@ -6,19 +6,27 @@ import time
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, filled, frozen
+from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.checks import checked_type
-from hybridnav.maps.geometry import centres, polyline_length
+from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path, PlanResult, PlanStatus
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import CostFinish
-from hybridnav.planner.endpoints import check_at, no_places, places_of_endpoints, read_end, refusal
+from hybridnav.planner.endpoints import (
+    PlanRequest,
+    check_at,
+    no_places,
+    places_of_endpoints,
+    read_end,
+    refusal,
+)
+from hybridnav.planner.path import path_of
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
@@ -45,23 +53,6 @@ _SMOOTH = get_args(Smooth)
 
 _KEPT = 16
 """Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
-
-
-class PlanRequest(NamedTuple):
-    """What a caller wants to know, read."""
-
-    poses: tuple[FloatArray, FloatArray]
-    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
-    smooth: Smooth
-    """What is done with the path that the method finds."""
-    closed: ClosedCells | None
-    """Cells that are closed for this query; None for none."""
-    goal: ArrayLike | str
-    """The goal as it was given."""
-    kept: KeptLine | None
-    """The line to stay on; None for none."""
-    began: float
-    """The time at which reading began, of `time.perf_counter`."""
 
 
 @copies_alike
@@ -257,17 +248,8 @@ class Planning:
         elif metric == "octile" and request.smooth == "line-of-sight":
             result = self._in_sight(request, query, found)
         else:
-            points: Any = found.points
-            length_m = found.cost_m
-            if points is None:
-                points = partial(centres, found.cells, self.grid.frame.for_kernels)
-            else:
-                points = frozen(points if metric == "octile" or length_m > 0 else points[:1])
-            cells = found.cells_on_demand
-            if not callable(cells):
-                frozen(cells)
-            path = filled(Path, cells=cells, points=points, length_m=length_m)
-            least = self._bound(query, found, length_m)
+            path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
+            least = self._bound(query, found, path.length_m)
             result = self._solved(request, found, path, least, metric=metric)
         if result.path is None or not result.solved or self.guide is None:
             return result
@@ -404,17 +386,10 @@ class Planning:
     def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         first, last = request.poses
-        if "stats" not in outcome:
-            outcome["stats"] = PlanStats()
-        return filled(
-            PlanResult,
-            status=status,
-            settings=partial(deepcopy, self._settings),
-            start=tuple(first.tolist()),
-            goal=tuple(last.tolist()),
-            proof_source=(self.grid, self.costs, request.closed),
-            **outcome,
-        )
+        made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
+        made |= {"proof_source": (self.grid, self.costs, request.closed), "status": status}
+        made |= {"start": tuple(first.tolist()), "goal": tuple(last.tolist())}
+        return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path or no places."""

@@ -1,4 +1,4 @@
-"""Tables of exact distances between many ends, by labels in a hierarchy."""
+"""Tables of exact distances between many ends, by labels in a hierarchy or searches of cells."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hybridnav._base.moves import FAR
+from hybridnav._base.kernels.moves import legal_moves
+from hybridnav._base.moves import FAR, STRAIGHT
 from hybridnav._base.threads import SHARES, cores
-from hybridnav.search.kernels.labels import meet
+from hybridnav.maps.costs import UNIT_BITS
+from hybridnav.search.kernels.labels import costs_to_cells, meet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
     Labels = tuple[LongArray, IntArray, LongArray]
     """Offsets of ends, corners, costs."""
@@ -123,3 +125,57 @@ def _parts(whole: slice, most: int) -> list[slice]:
     count = whole.stop - whole.start
     size = max(1, min(most, -(-count // (SHARES * cores()))))
     return [slice(at, min(at + size, whole.stop)) for at in range(whole.start, whole.stop, size)]
+
+
+# Tables of costs of cells.
+
+
+class GridLabels:
+    """Least costs of cells from each start to all goals, by Dijkstra's algorithm; no labels.
+
+    Parameters
+    ----------
+    enterable
+        bool (rows, cols), cells that may be entered.
+    units
+        int32 (rows, cols), the factor of each cell in units; None for 1.
+    corner_cutting
+        As for `GridSearch`.
+    """
+
+    n_corners, most = 1, 16
+
+    def __init__(
+        self, enterable: BoolArray, units: IntArray | None, *, corner_cutting: bool
+    ) -> None:
+        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+        one = np.broadcast_to(np.int32(1 << UNIT_BITS), enterable.shape)
+        factors = np.ascontiguousarray(one if units is None else units).ravel()
+        self._grid = moves, factors, enterable.shape[1]
+
+    def placed(self, ends: Ends) -> LongArray:
+        """Return flat cells."""
+        flat: LongArray = ends[0] @ np.array([self._grid[2], 1])
+        return flat
+
+    def labels(self, ends: LongArray) -> Labels:
+        """Return labels without entries."""
+        return np.zeros(len(ends) + 1, np.int64), np.empty(0, np.int32), np.empty(0, np.int64)
+
+    goal_labels = labels
+
+    def direct(self, starts: LongArray, goals: LongArray, table: LongArray) -> None:
+        """Set all entries."""
+        is_goal, best = (
+            np.zeros(self._grid[0].size, np.bool_),
+            np.empty(self._grid[0].size, np.int64),
+        )
+        is_goal[goals] = True
+        count = int(np.count_nonzero(is_goal))
+        for row, start in zip(table, starts.tolist(), strict=True):
+            costs_to_cells(self._grid, start, is_goal, count, best)
+            row[:] = best[goals]
+
+    def lengths(self, table: LongArray) -> FloatArray:
+        """Return costs in cells, within 1e-10 of them, infinite for `FAR`."""
+        return np.where(table < FAR, table / ((2 << UNIT_BITS) * STRAIGHT), np.inf)

@@ -115,7 +115,7 @@ class WholeMap(Method):
         if self.refiners[1] is not None:
             return None
         # Loads kernels for tables alone.
-        from hybridnav.search.grid_labels import GridLabels  # noqa: PLC0415
+        from hybridnav.search.distance_table import GridLabels  # noqa: PLC0415
         from hybridnav.search.octile.labels import jump_labels  # noqa: PLC0415
 
         refiner = self.refiners[0]
