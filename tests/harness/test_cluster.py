@@ -5,13 +5,16 @@ import signal
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 
 import dask
 import distributed
+import numpy as np
 import pytest
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness import workers
+from hybridnav.harness import distances_on_cluster, workers
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
@@ -105,6 +108,31 @@ def test_a_task_that_kills_every_worker_is_recorded_as_lost(
         status.setdefault(record["method"], set()).add(record["status"])
     assert status[name_of(faulty.Dies)] == {"lost"}
     assert status["grid-dijkstra"] == {"ready", "solved", "no path"}
+
+
+def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
+    monkeypatch.setattr(workers, "_ENTRIES", 20)  # several tasks
+    grid = hn.example_map("figure1")
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    planner.prepare()
+    cells = np.argwhere(grid.enterable())
+    picked = np.random.default_rng(0).integers(len(cells), size=(2, 9))
+    starts, goals = (grid.frame.points_of(cells[part]) for part in picked)
+    done: list[tuple[int, int]] = []
+    there = partial(
+        distances_on_cluster,
+        planner,
+        address=cluster.scheduler_address,
+        progress=lambda *step: done.append(step),
+    )
+    for blocked in (None, {"cells": cells[::50]}):
+        table = there((starts, goals), blocked=blocked)
+        np.testing.assert_array_equal(table, planner.distances(starts, goals, blocked=blocked))
+    assert done[-1] == (81, 81)
+    near, same = there((starts, goals), nearest=3), planner.distances(starts, goals, nearest=3)
+    for part in ("data", "indices", "indptr"):
+        np.testing.assert_array_equal(getattr(near, part), getattr(same, part))
+    assert there(([], goals)).shape == (0, 9)
 
 
 @pytest.mark.parametrize("address", ["nonsense", "bogus://x:1", "tcp://127.0.0.1", ""])

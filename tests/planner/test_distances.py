@@ -16,6 +16,7 @@ import hybridnav as hn
 from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
+from hybridnav.planner import questions
 from hybridnav.search import distance_table
 from hybridnav.search.distance_table import distance_blocks
 from hybridnav.search.mesh import CornerHierarchy, MeshSearch, build_mesh
@@ -62,6 +63,25 @@ def test_tables_hold_the_costs_of_plans(classes, seed, preset):
     starts, goals = ends_in(planner.grid, seed)
     table = planner.distances(starts, goals)
     np.testing.assert_allclose(table, pair_by_pair(planner, starts, goals), rtol=1e-9, atol=1e-8)
+
+
+@PLAIN
+@given(class_grids(), st.integers(0, 99), st.sampled_from(("shortest", "octile", "grid-astar")))
+def test_tables_round_closures_and_by_costs_hold_the_costs_of_plans(classes, seed, preset):
+    if not (classes == CellClass.FREE).any():
+        return
+    grid, rng = occupancy_grid(classes), np.random.default_rng(seed)
+    factors = rng.uniform(1, 4, grid.shape).astype(np.float32)
+    costs = hn.CostLayer(factors) if preset == "grid-astar" and seed % 2 else None
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
+    starts, goals = ends_in(grid, seed)
+    blocked = {"cells": np.argwhere(rng.random(grid.shape) < 0.1)} if seed % 3 else None
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(questions, "_WORTH", 0)
+        table = planner.distances(starts, goals, blocked=blocked)
+    plans = pair_by_pair(planner, starts, goals, blocked=blocked)
+    np.testing.assert_allclose(table, plans, rtol=1e-9, atol=1e-8)
 
 
 @PLAIN

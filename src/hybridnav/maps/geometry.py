@@ -10,7 +10,9 @@ import numpy as np
 
 from hybridnav.maps.kernels import (
     centres,
+    classes_at,
     least_along,
+    line_between,
     passed_cells,
     points_at,
     polyline_length,
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 __all__ = [
     "cells_of_line",
     "centres",
+    "classes_at",
     "least_along",
+    "line_between",
     "passed_cells",
     "points_at",
     "polyline_length",

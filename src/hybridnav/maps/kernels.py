@@ -38,6 +38,42 @@ def points_at(positions, frame):
 
 
 @guarded
+@njit(cache=True)
+def line_between(positions, ends, frame):
+    """Return the points of positions with ends of their own, float64 (n, 2), and their length.
+
+    `ends` are `(x, y)` of both in metres. The GIL is kept: this is over before another thread is
+    awake.
+    """
+    points = points_at(positions, frame)
+    points[0, 0], points[0, 1] = ends[0], ends[1]
+    points[-1, 0], points[-1, 1] = ends[2], ends[3]
+    return points, polyline_length(points)
+
+
+@guarded
+@njit(cache=True)
+def classes_at(ends, classes, frame):
+    """Return where two points are: for each its class, -1 outside the grid, its cell, as that of
+    `Frame.cell_of`, and its position.
+
+    `ends` are `(x, y)` of both in metres, finite; the GIL is kept, as in `line_between`.
+    """
+    return _class_at(ends[0], ends[1], classes, frame), _class_at(ends[2], ends[3], classes, frame)
+
+
+@njit(cache=True)
+def _class_at(x, y, classes, frame):
+    """Return where one point is."""
+    at = position_of(x, y, frame)
+    row, col = at[0] + 1e-9, at[1] + 1e-9  # compared as numbers, which may be infinite
+    if 0 <= row < classes.shape[0] and 0 <= col < classes.shape[1]:
+        cell = int(row), int(col)
+        return int(classes[cell]), cell, at
+    return -1, (0, 0), at
+
+
+@guarded
 @njit(cache=True, nogil=True)
 def position_of(x, y, frame):
     """Return a point as (row, col) in grid units, that of `Frame.position_of` for near points.

@@ -109,8 +109,9 @@ def plan_many(
     n = len(starts)
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
-    paths: list[FloatArray] = [np.empty((0, 2))] * n
-    headings = [np.empty(0)] * n
+    counts, source = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    paths: dict[int, FloatArray] = {}
+    headings = [np.empty(0)]
     late: dict[int, Callable[[], float]] = {}
     left = np.ones(n, dtype=np.bool_)
     first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
@@ -129,9 +130,10 @@ def plan_many(
         cost[done] = found.cost_m[kept]
         bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
         status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
-        for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
-            points = found.points[found.path_start[k] : found.path_start[k + 1]]
-            paths[i] = points if cost[i] > 0 else points[:1]
+        source[done] = found.path_start[:-1][kept]
+        counts[done] = np.diff(found.path_start)[kept]
+        still = done[~(cost[done] > 0)]
+        counts[still] = np.minimum(counts[still], 1)
     for i in np.flatnonzero(left).tolist():
         result = alone(starts[i], goals[i])
         status[i], cost[i] = str(result.status), result.cost
@@ -141,17 +143,32 @@ def plan_many(
             bound[i] = result.bound_source
         if result.path is not None:
             paths[i] = result.path.points
+            counts[i] = len(paths[i])
             if result.path.headings_rad is not None:
-                headings[i] = result.path.headings_rad
+                headings.append(result.path.headings_rad)
+    path_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    is_whole = found is not None and not left.any() and path_start[-1] == len(found.points)
+    points = found.points if found is not None and is_whole else np.empty((path_start[-1], 2))
+    if found is not None and not is_whole:
+        counts[left] = 0
+        points[_rows(path_start[:-1], counts)] = found.points[_rows(source, counts)]
+    for i, path in paths.items():
+        points[path_start[i] : path_start[i + 1]] = path
     has_yaw = starts.shape[1] > 2  # noqa: PLR2004
     return PlanBatch(
         status=status,
         cost=cost,
         bound_source=partial(_with_late, bound, late) if late else bound,
-        path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
-        points=np.concatenate([np.empty((0, 2)), *paths]),
-        headings_rad=np.concatenate([np.empty(0), *headings]) if has_yaw else None,
+        path_start=path_start,
+        points=points,
+        headings_rad=np.concatenate(headings) if has_yaw else None,
     )
+
+
+def _rows(begin: LongArray, counts: LongArray) -> LongArray:
+    """Return the rows of runs that begin somewhere, one run after the other."""
+    before = np.cumsum(counts) - counts
+    return np.repeat(begin - before, counts) + np.arange(counts.sum())
 
 
 def _with_late(bound: FloatArray, late: dict[int, Callable[[], float]]) -> FloatArray:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass
+from hybridnav.maps.geometry import classes_at
 from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.search.found import ClosedCells
+    from hybridnav.planner.settings import Finish
+    from hybridnav.search.found import ClosedCells, KeptLine
 
 Cell = tuple[int, int]
+Position = tuple[float, float]
 Points = tuple["FloatArray", "FloatArray"]
 
 _FREE, _UNEXPLORED = int(CellClass.FREE), int(CellClass.UNEXPLORED)
@@ -35,6 +38,23 @@ _REFUSED = (
         CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
     },
 )
+
+
+class PlanRequest(NamedTuple):
+    """What a caller wants to know, read."""
+
+    poses: tuple[FloatArray, FloatArray]
+    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
+    smooth: Finish
+    """What is done with the path that the method finds."""
+    closed: ClosedCells | None
+    """Cells that are closed for this query; None for none."""
+    goal: ArrayLike | str
+    """The goal as it was given."""
+    kept: KeptLine | None
+    """The line to stay on; None for none."""
+    began: float
+    """The time at which reading began, of `time.perf_counter`."""
 
 
 def no_places() -> NoReturn:
@@ -57,23 +77,21 @@ def check_at(at: str) -> None:
         raise InvalidValueError(f"at must be 'anywhere' or 'point', got {brief(at)}")
 
 
-def cells_of_endpoints(
+def places_of_endpoints(
     grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
-) -> tuple[Cell, Cell] | PlanStatus:
-    """Return the cells of start and goal, or the status of one that is not valid."""
-    (x, y), (goal_x, goal_y) = points[0].tolist(), points[1].tolist()
-    cells = grid.frame.cell_of(x, y), grid.frame.cell_of(goal_x, goal_y)
-    classes = grid.classes
-    rows, cols = classes.shape
-    for (row, col), outside in zip(cells, _OUTSIDE, strict=True):
-        if not (0 <= row < rows and 0 <= col < cols):
-            return outside
-    for cell, refused in zip(cells, _REFUSED, strict=True):
-        of_class = classes[cell]
-        may_enter = of_class == _FREE or (allow_unexplored and of_class == _UNEXPLORED)
-        if not may_enter:
+) -> tuple[tuple[Cell, Cell], tuple[Position, Position]] | PlanStatus:
+    """Return the cells of start and goal and their positions, (row, col) in grid units, or the
+    status of one that is not valid."""
+    ends = (*points[0].tolist(), *points[1].tolist())
+    start, goal = classes_at(ends, grid.classes, grid.frame.for_kernels)
+    if start[0] == _FREE == goal[0]:
+        return (start[1], goal[1]), (start[2], goal[2])
+    if start[0] < 0 or goal[0] < 0:
+        return _OUTSIDE[start[0] >= 0]
+    for (of_class, *_), refused in ((start, _REFUSED[0]), (goal, _REFUSED[1])):
+        if of_class != _FREE and not (allow_unexplored and of_class == _UNEXPLORED):
             return refused[CellClass(of_class)]
-    return cells
+    return (start[1], goal[1]), (start[2], goal[2])
 
 
 def refusal(
@@ -104,11 +122,13 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
     return xy
 
 
-def read_end(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
+def read_end(name: str, given: ArrayLike, needs_heading: bool) -> FloatArray:  # noqa: FBT001 - hot
     """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
     pose = _numbers(given)
-    if pose.shape == (2,) and not needs_heading and np.isfinite(pose).all():
-        return pose
+    if pose.shape == (2,) and not needs_heading:
+        x, y = pose.tolist()
+        if math.isfinite(x) and math.isfinite(y):
+            return pose
     if pose.shape != (3,) or not np.isfinite(pose).all():
         pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
         raise InvalidValueError(

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, on_demand
+from hybridnav._base.copies import copies_alike, filled, frozen, on_demand
 from hybridnav._base.messages import path_message
 from hybridnav._base.poses import Motion
+from hybridnav.maps.geometry import centres
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import FloatArray, LongArray, SignArray
+    from hybridnav.maps import Frame
     from hybridnav.planner.speed import MotionLimits, SpeedMap, SpeedProfile
+    from hybridnav.search.found import Found
 
     End = Sequence[float] | FloatArray
 
 
 @copies_alike
 @on_demand("cells")
+@on_demand("points")
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid, between the centres of two cells, or at any angle between two
@@ -64,10 +68,9 @@ class Path:
     """Heading to which the robot turns on the spot once it is there; None for no turn."""
 
     def __post_init__(self) -> None:
-        cells = vars(self)["cells"]
-        if not callable(cells):
-            cells.flags.writeable = False
-        self.points.flags.writeable = False
+        for array in (vars(self)["cells"], vars(self)["points"]):
+            if not callable(array):
+                array.flags.writeable = False
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
 
@@ -224,3 +227,15 @@ class Path:
     def reversals(self) -> LongArray:
         """int64, indices of the points where the robot changes between ahead and backwards."""
         return np.flatnonzero(np.diff(self._motion.directions)) + 1
+
+
+def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
+    """Return the path that a method found; cells and their centres are found when they are read."""
+    points: Any = found.points
+    cells, length_m = found.cells_on_demand, found.cost_m
+    if points is None:
+        points = partial(centres, found.cells, frame.for_kernels)
+    else:
+        points = frozen(points if is_of_cells or length_m > 0 else points[:1])
+    cells = cells if callable(cells) else frozen(cells)
+    return filled(Path, cells=cells, points=points, length_m=length_m)

@@ -6,11 +6,11 @@ import time
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.checks import checked_type
@@ -18,11 +18,19 @@ from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path, PlanResult, PlanStatus
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import CostFinish
-from hybridnav.planner.endpoints import cells_of_endpoints, check_at, no_places, read_end, refusal
+from hybridnav.planner.endpoints import (
+    PlanRequest,
+    check_at,
+    no_places,
+    places_of_endpoints,
+    read_end,
+    refusal,
+)
+from hybridnav.planner.path import path_of
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
-from hybridnav.search.found import ClosedCells, KeptLine, Query
+from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -45,23 +53,6 @@ _SMOOTH = get_args(Smooth)
 
 _KEPT = 16
 """Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
-
-
-class PlanRequest(NamedTuple):
-    """What a caller wants to know, read."""
-
-    poses: tuple[FloatArray, FloatArray]
-    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
-    smooth: Smooth
-    """What is done with the path that the method finds."""
-    closed: ClosedCells | None
-    """Cells that are closed for this query; None for none."""
-    goal: ArrayLike | str
-    """The goal as it was given."""
-    kept: KeptLine | None
-    """The line to stay on; None for none."""
-    began: float
-    """The time at which reading began, of `time.perf_counter`."""
 
 
 @copies_alike
@@ -104,15 +95,16 @@ class Planning:
     ) -> PlanRequest:
         """Read a query; see `HybridPlanner.plan`."""
         began, waypoint = time.perf_counter(), goal
-        check_at(at)
+        if at != "anywhere":
+            check_at(at)
         if isinstance(start, str) or isinstance(goal, str):
             start, goal = self.points_of([start, goal], at, blocked)
-        closed = self.closed(blocked)
-        turns = self.needs_headings
-        first = read_end("start", start, needs_heading=turns)
-        last = read_end("goal", goal, needs_heading=turns)
-        kept = None if keep is None else self._kept(keep, last)
-        return PlanRequest((first, last), self._checked(smooth), closed, waypoint, kept, began)
+        closed = None if blocked is None else self.closed(blocked)
+        turns = self.ompl is not None and self.needs_headings
+        poses = read_end("start", start, turns), read_end("goal", goal, turns)
+        kept = None if keep is None else self._kept(keep, poses[1])
+        finish = self._finish if smooth is None else self._checked(smooth)
+        return PlanRequest(poses, finish, closed, waypoint, kept, began)
 
     def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
         """Return the line of a result, None if it ends elsewhere or there is none."""
@@ -180,6 +172,17 @@ class Planning:
         always = self.costs.closed
         return closed | always if closed and always else closed or always
 
+    @cached_property
+    def _finish(self) -> Smooth:
+        """The finish of the preset."""
+        return self._checked(None)
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether the cost of a plan is that of the path that the method finds."""
+        is_kept = self._finish == "none" or self.method.metric == "any-angle"
+        return is_kept and self.ompl is None
+
     def _checked(self, smooth: Smooth | None) -> Smooth:
         """Return the finish asked for, or that of the preset for None."""
         chosen = self.preset.planner.finish if smooth is None else smooth
@@ -195,15 +198,16 @@ class Planning:
 
     def query(self, request: PlanRequest) -> Query | PlanStatus:
         """Return the query for the method, or the status that refuses start or goal."""
-        poses, _, closed, _, kept, _ = request
-        points, allowed = (poses[0][:2], poses[1][:2]), self.preset.planner.allow_unexplored
-        cells = cells_of_endpoints(self.grid, points, allow_unexplored=allowed)
-        if isinstance(cells, PlanStatus):
-            return cells
+        (first, last), _, closed, _, kept, _ = request
+        points, allowed = (first[:2], last[:2]), self.preset.planner.allow_unexplored
+        places = places_of_endpoints(self.grid, points, allow_unexplored=allowed)
+        if isinstance(places, PlanStatus):
+            return places
+        cells, positions = places
         shut = self.closed_for_all(closed)
         if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
             return refused
-        return Query(cells, points, closed, kept)
+        return Query(cells, points, closed, kept, positions)
 
     # Planning: a path found by the method, then refined.
 
@@ -244,13 +248,8 @@ class Planning:
         elif metric == "octile" and request.smooth == "line-of-sight":
             result = self._in_sight(request, query, found)
         else:
-            points, length_m = found.points, found.cost_m
-            if points is None:
-                points = self.grid.frame.points_of(found.cells)
-            if metric != "octile" and not length_m > 0:
-                points = points[:1]
-            path = Path(found.cells_on_demand, points, length_m)
-            least = self._bound(query, found, length_m)
+            path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
+            least = self._bound(query, found, path.length_m)
             result = self._solved(request, found, path, least, metric=metric)
         if result.path is None or not result.solved or self.guide is None:
             return result
@@ -386,17 +385,18 @@ class Planning:
 
     def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
-        start, goal = (tuple(pose.tolist()) for pose in request.poses)
-        own: Any = partial(deepcopy, self._settings)
-        outcome["proof_source"] = self.grid, self.costs, request.closed
-        return PlanResult(status, settings=own, start=start, goal=goal, **outcome)
+        first, last = request.poses
+        made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
+        made |= {"proof_source": (self.grid, self.costs, request.closed), "status": status}
+        made |= {"start": tuple(first.tolist()), "goal": tuple(last.tolist())}
+        return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path or no places."""
         if path is None or self._route_finder is None:
             return None
-        cells: Any = partial(getattr, path, "cells")
-        return RouteOfCells(self.built, self._route_finder, cells)
+        cells = partial(getattr, path, "cells")
+        return filled(RouteOfCells, topology=self.built, finder=self._route_finder, cells=cells)
 
     @cached_property
     def _route_finder(self) -> RouteFinder | None:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     Block = tuple[slice, slice, FloatArray]
     Planned = Callable[[tuple[FloatArray, FloatArray]], PlanBatch]
 
+_WORTH = 1000
+"""Least number of pairs round closures for which a hierarchy without these cells is built."""
 _PAIRS = 4096
 """Pairs that are planned at a time where there are no labels."""
 
@@ -128,8 +130,10 @@ class Questions:
     ) -> Any:
         """Return the costs of plans from all starts to all goals, exactly.
 
-        With `shortest` and `octile` they come from labels of the ends in a hierarchy, less than a
-        microsecond a pair on a building. With closures, costs or OMPL each pair is planned.
+        With lengths they come from labels of the ends in a hierarchy, less than a microsecond a
+        pair on a building; with closures in one of the map without these cells, for a thousand
+        pairs or more. With costs `grid-astar` searches once from each start. `robot`, `paper`, OMPL
+        and paths that are smoothed are planned pair by pair.
 
         Parameters
         ----------
@@ -178,8 +182,7 @@ def _distance(now: Planning, request: Any) -> float:
     query = now.query(request)
     if isinstance(query, PlanStatus):
         return math.nan
-    is_plain = request.smooth == "none" or now.method.metric == "any-angle"
-    if now.ompl is not None or not is_plain:
+    if not now.is_plain:
         return now.plan(request).cost
     return now.method.cost_of(query)
 
@@ -210,13 +213,14 @@ def _distances(
     shape = len(points[0]), len(points[1])
     table = None if nearest else np.full(shape, np.nan)
     kept = _Nearest(shape, min(nearest or 1, max(shape[1], 1)))
+    is_whole = (len(starts), len(goals)) == shape
     n_blocks, total = 0, max(1, len(starts) * len(goals))
     for rows, columns, lengths in _blocks(now, (starts, goals), closed, planned):
         at, to = start_at[rows], goal_at[columns]
         if table is None:
             kept.add(at, to, lengths)
         else:
-            table[np.ix_(at, to)] = lengths
+            table[(rows, columns) if is_whole else np.ix_(at, to)] = lengths
         n_blocks += lengths.size
         progress(n_blocks, total)
     return kept.matrix() if table is None else table
@@ -243,9 +247,9 @@ def _blocks(
     planned: Planned | None,
 ) -> Iterator[Block]:
     """Yield blocks of the table, in metres: by labels, or pair by pair."""
-    labels = None
-    if planned is None and closed is None and now.ompl is None and now.costs.layer is None:
-        labels = now.method.labels()
+    labels, is_worth = None, closed is None or len(ends[0]) * len(ends[1]) >= _WORTH
+    if planned is None and now.is_plain and is_worth:
+        labels = now.method.labels(closed)
     if labels is None:
         yield from _pair_by_pair(
             ends, planned or (lambda pairs: now.plan_many(pairs, None, closed))

@@ -13,7 +13,7 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.widest import Bottleneck, WidestPaths
 from hybridnav.planner import Blocked, PlanStatus
 from hybridnav.planner.blocked import as_blocked
-from hybridnav.planner.endpoints import cells_of_endpoints
+from hybridnav.planner.endpoints import places_of_endpoints
 from hybridnav.planner.fewest import OpenGround, fewest_to_open
 from hybridnav.planner.why_words import BlockedEnd, Closure, TightPlace, sentences
 from hybridnav.pyramid import LevelArc
@@ -231,7 +231,7 @@ class Case:
         found = []
         for is_start, point, cell in zip((True, False), self.points, self._cells, strict=True):
             both = (point, point)
-            status = cells_of_endpoints(self.grid, both, allow_unexplored=self.allow_unexplored)
+            status = places_of_endpoints(self.grid, both, allow_unexplored=self.allow_unexplored)
             by: tuple[Closure, ...] = ()
             if not isinstance(status, PlanStatus):
                 if not self._shut[cell]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.route import Corridor
+    from hybridnav.search.found import ClosedCells
 
 
 def open_cells(grid: OccupancyGrid, *closed: LongArray | None, allow_unexplored: bool) -> BoolArray:
@@ -302,12 +303,17 @@ class GridRefiner:
     @cached_property
     def search(self) -> GridSearch:
         """The search of cells, built on first use."""
-        closed = None if self.costs is None else self.costs.closed_flat
-        enterable = open_cells(self.grid, closed, allow_unexplored=self._allow_unexplored)
+        enterable = self.enterable(None)
         if self.costs is None:
             return GridSearch(enterable, corner_cutting=self.grid.corner_cutting)
         corner_cutting, units = self.grid.corner_cutting, self.costs.units
         return GridSearch(enterable, corner_cutting=corner_cutting, units=units)
+
+    def enterable(self, closed: ClosedCells | None) -> BoolArray:
+        """Return the cells that may be entered, bool (rows, cols), without closed ones."""
+        always = None if self.costs is None else self.costs.closed_flat
+        flat = None if closed is None else closed.flat
+        return open_cells(self.grid, always, flat, allow_unexplored=self._allow_unexplored)
 
     def cost_in_cells(self, cells: LongArray | None) -> float:
         """Return the cost of a path of cells in cells, infinite for none: without costs its

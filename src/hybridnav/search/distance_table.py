@@ -1,4 +1,4 @@
-"""Tables of exact distances between many ends, by labels in a hierarchy."""
+"""Tables of exact distances between many ends, by labels in a hierarchy or searches of cells."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hybridnav._base.moves import FAR
-from hybridnav._base.threads import cores
-from hybridnav.search.kernels.labels import meet
+from hybridnav._base.kernels.moves import legal_moves
+from hybridnav._base.moves import FAR, STRAIGHT
+from hybridnav._base.threads import SHARES, cores
+from hybridnav.maps.costs import UNIT_BITS
+from hybridnav.search.kernels.labels import costs_to_cells, meet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
     Labels = tuple[LongArray, IntArray, LongArray]
     """Offsets of ends, corners, costs."""
@@ -81,26 +83,99 @@ def distance_blocks(
     tuple
         The rows and columns of a block, and float64 lengths, infinite without a path.
     """
-    for first in range(0, len(goals[0]), BLOCK):
-        columns = slice(first, min(first + BLOCK, len(goals[0])))
-        block = source.placed((goals[0][columns], goals[1][columns]))
-        offset, corners, costs = source.goal_labels(block)
-        begin, order = by_number(corners, source.n_corners)
-        n_goals = len(offset) - 1
-        which = np.repeat(np.arange(n_goals, dtype=np.int32), np.diff(offset))[order]
-        buckets = begin, which, costs[order]
+    with ThreadPoolExecutor(cores()) as pool:
+        for first in range(0, len(goals[0]), BLOCK):
+            columns = slice(first, min(first + BLOCK, len(goals[0])))
+            yield from _rows_of(source, starts, goals, columns, pool)
 
-        def fill(
-            rows: slice, n_goals: int = n_goals, block: Any = block, buckets: Labels = buckets
-        ) -> FloatArray:
-            some = source.placed((starts[0][rows], starts[1][rows]))
-            table = np.full((rows.stop - rows.start, n_goals), FAR, np.int64)
-            source.direct(some, block, table)
-            meet(source.labels(some), buckets, table)
-            return source.lengths(table)
 
-        size = max(1, min(source.most, -(-len(starts[0]) // cores())))
-        parts = [slice(at, min(at + size, len(starts[0]))) for at in range(0, len(starts[0]), size)]
-        with ThreadPoolExecutor(cores()) as pool:
-            for rows, lengths in zip(parts, pool.map(fill, parts), strict=True):
-                yield rows, columns, lengths
+def _rows_of(
+    source: LabelSource, starts: Ends, goals: Ends, columns: slice, pool: ThreadPoolExecutor
+) -> Iterator[tuple[slice, slice, FloatArray]]:
+    """Yield the blocks of some columns."""
+
+    def labels_of(part: slice) -> Labels:
+        return source.goal_labels(source.placed((goals[0][part], goals[1][part])))
+
+    parts = _parts(columns, BLOCK)
+    offsets, corners, costs = zip(*pool.map(labels_of, parts), strict=True)
+    n_goals, corner = columns.stop - columns.start, np.concatenate(corners)
+    sizes = np.concatenate([np.diff(one) for one in offsets])
+    begin, order = by_number(corner, source.n_corners)
+    which = np.repeat(np.arange(n_goals, dtype=np.int32), sizes)[order]
+    buckets = begin, which, np.concatenate(costs)[order]
+    block = source.placed((goals[0][columns], goals[1][columns]))
+
+    def fill(rows: slice) -> FloatArray:
+        some = source.placed((starts[0][rows], starts[1][rows]))
+        table = np.full((rows.stop - rows.start, n_goals), FAR, np.int64)
+        source.direct(some, block, table)
+        meet(source.labels(some), buckets, table)
+        return source.lengths(table)
+
+    rows, at_once = _parts(slice(0, len(starts[0])), source.most), SHARES * cores()
+    for first in range(0, len(rows), at_once):  # no more blocks wait for who reads them
+        some = rows[first : first + at_once]
+        for part, lengths in zip(some, pool.map(fill, some), strict=True):
+            yield part, columns, lengths
+
+
+def _parts(whole: slice, most: int) -> list[slice]:
+    """Return shares of a range for all cores, of `most` at most."""
+    count = whole.stop - whole.start
+    size = max(1, min(most, -(-count // (SHARES * cores()))))
+    return [slice(at, min(at + size, whole.stop)) for at in range(whole.start, whole.stop, size)]
+
+
+# Tables of costs of cells.
+
+
+class GridLabels:
+    """Least costs of cells from each start to all goals, by Dijkstra's algorithm; no labels.
+
+    Parameters
+    ----------
+    enterable
+        bool (rows, cols), cells that may be entered.
+    units
+        int32 (rows, cols), the factor of each cell in units; None for 1.
+    corner_cutting
+        As for `GridSearch`.
+    """
+
+    n_corners, most = 1, 16
+
+    def __init__(
+        self, enterable: BoolArray, units: IntArray | None, *, corner_cutting: bool
+    ) -> None:
+        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+        one = np.broadcast_to(np.int32(1 << UNIT_BITS), enterable.shape)
+        factors = np.ascontiguousarray(one if units is None else units).ravel()
+        self._grid = moves, factors, enterable.shape[1]
+
+    def placed(self, ends: Ends) -> LongArray:
+        """Return flat cells."""
+        flat: LongArray = ends[0] @ np.array([self._grid[2], 1])
+        return flat
+
+    def labels(self, ends: LongArray) -> Labels:
+        """Return labels without entries."""
+        return np.zeros(len(ends) + 1, np.int64), np.empty(0, np.int32), np.empty(0, np.int64)
+
+    goal_labels = labels
+
+    def direct(self, starts: LongArray, goals: LongArray, table: LongArray) -> None:
+        """Set all entries."""
+        is_goal, best = (
+            np.zeros(self._grid[0].size, np.bool_),
+            np.empty(self._grid[0].size, np.int64),
+        )
+        is_goal[goals] = True
+        count = int(np.count_nonzero(is_goal))
+        for row, start in zip(table, starts.tolist(), strict=True):
+            costs_to_cells(self._grid, start, is_goal, count, best)
+            row[:] = best[goals]
+
+    def lengths(self, table: LongArray) -> FloatArray:
+        """Return costs in cells, within 1e-10 of them, infinite for `FAR`."""
+        return np.where(table < FAR, table / ((2 << UNIT_BITS) * STRAIGHT), np.inf)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     """Structures of a map that methods build, and models keep."""
 
 Cell = tuple[int, int]
+Position = tuple[float, float]
 Metric = Literal[
     "octile",
     "weighted",
@@ -121,6 +122,8 @@ class Query(NamedTuple):
     """Closed cells, not including start and goal; None for none."""
     kept: KeptLine | None = None
     """The line to stay on, for method `cheapest`; None for none."""
+    positions: tuple[Position, Position] | None = None
+    """The points as (row, col) in grid units; None where nobody has found them yet."""
 
     @property
     def straight_m(self) -> float:
@@ -235,8 +238,9 @@ class Method(Protocol):
         """Return the cost of the path that `find` finds, metres; infinite without a path."""
         return self.find(query).cost_m
 
-    def labels(self) -> LabelSource | None:
-        """Return what makes labels for tables of distances; None for plans of each pair."""
+    def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:  # noqa: ARG002
+        """Return what makes labels for tables of distances round closed cells; None for plans of
+        each pair."""
         return None
 
     @property

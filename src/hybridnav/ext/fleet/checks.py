@@ -15,7 +15,7 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
 from hybridnav.planner import PlanStatus
-from hybridnav.planner.endpoints import cells_of_endpoints, read_point, refusal
+from hybridnav.planner.endpoints import places_of_endpoints, read_point, refusal
 from hybridnav.planner.named import check_names
 
 if TYPE_CHECKING:
@@ -308,11 +308,11 @@ def refusal_of(
         planner = floors[end.floor].planner
         grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
         point = read_point(kind, end.waypoint)
-        cells = cells_of_endpoints(grid, (point, point), allow_unexplored=allowed)
-        status = cells if isinstance(cells, PlanStatus) else None
+        places = places_of_endpoints(grid, (point, point), allow_unexplored=allowed)
+        status = places if isinstance(places, PlanStatus) else None
         shut = planner.closed_for_all(closed.get(end.floor))
-        if status is None and shut is not None and not isinstance(cells, PlanStatus):
-            status = refusal(shut, cells, grid.shape)
+        if shut is not None and not isinstance(places, PlanStatus):
+            status = refusal(shut, places[0], grid.shape)
         if status is not None:
             return PlanStatus[status.name.replace("START", kind)]
     return None

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlannerSettings
-    from hybridnav.search.found import Metric, Prepared, Query
+    from hybridnav.search.distance_table import LabelSource
+    from hybridnav.search.found import ClosedCells, Metric, Prepared, Query
     from hybridnav.topology import TopologicalMap
 
 
@@ -107,6 +108,21 @@ class WholeMap(Method):
         search = self.refiners[0].search
         progress(1, 1)
         return search
+
+    def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
+        """Return labels of lengths, or by costs a search from each start; None with a refiner of
+        the user's own. See `Method`."""
+        if self.refiners[1] is not None:
+            return None
+        # Loads kernels for tables alone.
+        from hybridnav.search.distance_table import GridLabels  # noqa: PLC0415
+        from hybridnav.search.octile.labels import jump_labels  # noqa: PLC0415
+
+        refiner = self.refiners[0]
+        cells, cutting = refiner.enterable(closed), refiner.grid.corner_cutting
+        units = None if refiner.costs is None else refiner.costs.units
+        found = None if cutting or units is not None else jump_labels(cells)
+        return found or GridLabels(cells, units, corner_cutting=cutting)
 
     def find(self, query: Query) -> Found:
         """Find a shortest path; see `Method`."""

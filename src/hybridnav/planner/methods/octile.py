@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
-from hybridnav.maps.geometry import centres
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
@@ -18,8 +17,8 @@ from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
-    from hybridnav.search.found import MapChange, Metric, Query, QueryMany
-    from hybridnav.search.octile.labels import JumpLabels
+    from hybridnav.search.distance_table import LabelSource
+    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
 
 CONTRACTED_FROM = 2000
@@ -93,26 +92,27 @@ class OverJumps(Method):
         now = time.perf_counter()
         path = (self._search or self.prepare()).path(*query.cells)
         seconds["jumps"] = time.perf_counter() - now
-        stats = PlanStats(expanded=path.expanded, seconds=seconds)
+        stats = filled(PlanStats, expanded=path.expanded, seconds=seconds)
         if path.cells is None:
             return Found(None, stats=stats)
-        length_m, points = (
-            path.length_cells * self._grid.resolution_m,
-            centres(path.cells, self._frame),
-        )
-        found = Found(path.cells, length_m, length_m, points, stats=stats)
+        length_m = path.length_cells * self._grid.resolution_m
+        found = filled(Found, passed=path.cells, cost=length_m, lower_bound_m=length_m, stats=stats)
         return round_closed(found, query, self._refiner)
 
-    def labels(self) -> JumpLabels | None:
-        """Return labels in the contracted graph; see `Method`."""
-        if self._grid.corner_cutting:
-            return None
+    def cost_of(self, query: Query) -> float:
+        """Return the length of a shortest path; see `Method`."""
+        if query.closed is not None or self._search is None or self._grid.corner_cutting:
+            return self.find(query).cost_m
+        return self._search.path(*query.cells).length_cells * self._grid.resolution_m
+
+    def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
+        """Return labels in the contracted graph, of the map with closed cells; see `Method`."""
+        if self._grid.corner_cutting or closed is not None:
+            return self._whole_map.labels(closed)
         from hybridnav.search.octile.labels import JumpLabels  # noqa: PLC0415 - for tables alone
 
         search = self._search or self.prepare()
-        if not search.graph.is_contracted:
-            search = JumpSearch(contract_graph(search.graph))
-        return JumpLabels(search) if search.graph.is_contracted else None
+        return JumpLabels(search) if search.graph.is_contracted else self._whole_map.labels()
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:
         """Find a shortest path for each query, on all cores; see `Method`.
@@ -121,7 +121,7 @@ class OverJumps(Method):
         """
         if self._grid.corner_cutting:
             return None
-        found = (self._search or self.prepare()).many(*queries.cells)
+        found = (self._search or self.prepare()).many(*queries.cells, self._frame)
         cost_m = found.length_cells * self._grid.resolution_m
-        done, points = np.ones(len(cost_m), dtype=np.bool_), centres(found.cells, self._frame)
-        return FoundMany(done, cost_m, cost_m, found.path_start, points)
+        done = np.ones(len(cost_m), dtype=np.bool_)
+        return FoundMany(done, cost_m, cost_m, found.path_start, found.cells)

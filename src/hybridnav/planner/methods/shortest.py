@@ -5,16 +5,21 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
+from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.geometry import cells_of_line, points_at, polyline_length, polyline_lengths
+from hybridnav.maps.geometry import (
+    cells_of_line,
+    line_between,
+    polyline_length,
+    polyline_lengths,
+)
 from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
@@ -85,6 +90,7 @@ class OverMesh(Method):
         self._is_renewed = False
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
+        self._scratch = Pool(partial(np.copy, self._free))
         self._building = threading.RLock()  # a progress callback may plan
 
     @property
@@ -140,19 +146,17 @@ class OverMesh(Method):
             self._on_mesh()
             seconds["mesh"] = time.perf_counter() - began
         start, goal = query.points
-        row, col = self._frame.position_of(float(start[0]), float(start[1]))
-        positions = (row, col), self._frame.position_of(float(goal[0]), float(goal[1]))
+        ends = (*start.tolist(), *goal.tolist())
         now = time.perf_counter()
-        path, expanded = self._on_graph(query, positions)
-        points = None
+        path, expanded = self._on_graph(query, query.positions or self._positions(query))
         if path.positions is not None:
-            points = points_at(path.positions, self._placing)
-            points[0], points[-1] = query.points
+            points, length_m = line_between(path.positions, ends, self._placing)
+            seconds["shortest"] = time.perf_counter() - now
+            cells = partial(self._passed, query, path, seconds)
+            stats = filled(PlanStats, expanded_intervals=expanded, seconds=seconds)
+            return _along((points, length_m), path, cells, stats)
         seconds["shortest"] = time.perf_counter() - now
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
-        if points is not None:
-            cells = partial(self._passed, query, path, seconds)
-            return _along(points, path.length_cells, path.lower_bound_cells, cells, stats)
         if math.isinf(path.lower_bound_cells):
             return Found(None, stats=stats)
         return self._in_sight(query, path.lower_bound_cells, stats)
@@ -161,10 +165,14 @@ class OverMesh(Method):
         """Return the length of a shortest path; see `Method`."""
         if query.closed is not None or self._search is None or self._budget_s is not None:
             return self.find(query).cost_m
-        position_of = self._frame.position_of
-        start, goal = (position_of(*point[:2].tolist()) for point in query.points)
-        found = self._search.path(query.cells, (start, goal), epsilon=self._epsilon)
+        positions = query.positions or self._positions(query)
+        found = self._search.path(query.cells, positions, epsilon=self._epsilon)
         return found.length_cells * self._placing[0]
+
+    def _positions(self, query: Query) -> tuple[Position, Position]:
+        """Return the points of a query as (row, col) in grid units."""
+        start, goal = (self._frame.position_of(*point.tolist()) for point in query.points)
+        return start, goal
 
     def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
         """Return the path of the search of the mesh, and the nodes expanded."""
@@ -188,7 +196,7 @@ class OverMesh(Method):
             expanded += found.expanded
             # Closed cells make no path shorter.
             bound = max(min(bound, found.length_cells), found.lower_bound_cells)
-            found = replace(found, lower_bound_cells=bound)
+            found = found._replace(lower_bound_cells=bound)
         return found, expanded
 
     def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
@@ -205,8 +213,10 @@ class OverMesh(Method):
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
         if points is None or found.cells is None:
             return Found(None, stats=stats)
-        length = polyline_length(points) / self._frame.resolution_m
-        return _along(points, length, min(bound_cells, length), found.cells, stats)
+        length_m = polyline_length(points)
+        length = length_m / self._frame.resolution_m
+        path = MeshPath(None, length, min(bound_cells, length), 0)
+        return _along((points, length_m), path, found.cells, stats)
 
     @cached_property
     def _open_sight(self) -> LineOfSight:
@@ -216,13 +226,16 @@ class OverMesh(Method):
         """Return the shortener of cell paths, with some flat cells closed."""
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
-    def labels(self) -> LabelSource | None:
-        """Return labels in the hierarchy of corners, or on the graph that is not contracted; see
-        `Method`."""
+    def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
+        """Return labels in the hierarchy of corners, or on the graph that is not contracted; with
+        closed cells of a mesh without them. See `Method`."""
         # Loads kernels for tables alone.
         from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
 
         search = self._on_mesh()
+        if closed is not None:
+            # Not the search that plans ask: with its graph it might find another of equal paths.
+            search = MeshSearch(self._round(search, closed).search.mesh)
         search.prepare()
         if isinstance(search.graph, CornerHierarchy):
             return MeshLabels(search, search.graph)
@@ -296,23 +309,25 @@ class OverMesh(Method):
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            found = self._detours[closed] = DetourSearch(search.mesh, self._free, closed.flat)
+            known = search.mesh, self._free, closed.flat, self._scratch
+            found = self._detours[closed] = DetourSearch(*known)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)
         return found
 
 
 def _along(
-    points: FloatArray,
-    length_cells: float,
-    bound_cells: float,
+    line: tuple[FloatArray, float],
+    path: MeshPath,
     cells: LongArray | Callable[[], LongArray],
     stats: PlanStats,
 ) -> Found:
-    """Return the answer of a path through points.
+    """Return the answer of a path through points, of a length in metres.
 
     The bound is a share of the length in metres, so that a proved optimum has no gap by rounding.
     """
-    length_m = polyline_length(points)
-    bound_m = min(length_m * (bound_cells / length_cells), length_m) if length_cells else 0.0
-    return Found(cells, length_m, bound_m, points, stats=stats)
+    (points, length_m), (_, length, bound, _) = line, path
+    bound_m = min(length_m * (bound / length), length_m) if length else 0.0
+    return filled(
+        Found, passed=cells, cost=length_m, lower_bound_m=bound_m, points=points, stats=stats
+    )

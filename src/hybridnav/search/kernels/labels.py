@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 from hybridnav._base.moves import FAR
 
 
@@ -86,6 +87,53 @@ def grow_rows(rows):
     larger = np.empty((2 * len(rows), rows.shape[1]), rows.dtype)
     larger[: len(rows)] = rows
     return larger
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def costs_to_cells(grid, start, goals, left, best):
+    """Find the least costs of cells from one cell, by Dijkstra's algorithm.
+
+    Parameters
+    ----------
+    grid
+        uint8 (n_cells,), the legal moves of each flat cell; int32 (n_cells,), the factors of the
+        cells in units; and the columns of the grid.
+    start
+        A flat cell.
+    goals, left
+        bool (n_cells,), and how many of them are to be settled.
+    best
+        int64 (n_cells,), filled with the costs; `FAR` where there is no path, and no less than the
+        least cost of cells that are no goals.
+    """
+    moves, units, cols = grid
+    heap, size = np.empty((4096, 2), np.int64), 1
+    best[:] = FAR
+    best[start] = 0
+    heap[0] = 0, start
+    while size > 0:
+        cost, cell = heap[0, 0], heap[0, 1]
+        pop(heap, size)
+        size -= 1
+        if cost != best[cell]:
+            continue  # reached at less since it was queued
+        if goals[cell]:
+            left -= 1
+            if left == 0:
+                break
+        if size + 8 > len(heap):
+            heap = grow_rows(heap)
+        for k in range(8):
+            if moves[cell] >> k & 1 == 0:
+                continue
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
+            step = DIAGONAL if k & 1 else STRAIGHT
+            further = cost + step * (np.int64(units[cell]) + units[to])
+            if further < best[to]:
+                best[to] = further
+                push(heap, size, further, to)
+                size += 1
 
 
 @guarded

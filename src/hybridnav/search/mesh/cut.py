@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.threads import cores
+from hybridnav._base.threads import SHARES, Pool, cores
 from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
@@ -88,7 +89,7 @@ def shortest_paths(
         [rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1
     )
     endpoints = np.ascontiguousarray(endpoints[:, [1, 0, 3, 2]])
-    n_parts = max(1, min(cores(), len(where) // _LEAST))
+    n_parts = max(1, min(SHARES * cores(), len(where) // _LEAST))
     parts = np.array_split(np.arange(len(where)), n_parts)
 
     def answer(part: LongArray) -> MeshPaths:
@@ -98,7 +99,7 @@ def shortest_paths(
         search.prepare()
     if n_parts == 1:
         return answer(parts[0])
-    with ThreadPoolExecutor(n_parts) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         found = list(pool.map(answer, parts))
     before = np.cumsum([0, *(len(of.positions) for of in found)])
     starts = [of.path_start[:-1] + base for of, base in zip(found, before, strict=False)]
@@ -119,9 +120,9 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    mesh, graph = search.mesh, search.graph
-    place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
-    arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
+    graph = search.graph
+    place, asked = search.place, (where, endpoints)
+    arrays: Any = search.blocks if graph is None else graph.arrays
     at = n = 0
     with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
@@ -237,11 +238,11 @@ def _vertices_of(
     number_of = np.concatenate([old[~is_straight], len(mesh.corners) + np.arange(len(made))])
     order = np.argsort(points, kind="stable")
     points, number_of = points[order], number_of[order].astype(np.int32)
-    corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
+    corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), 1).astype(np.int32)])
     kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
     kinds[old[is_straight]] = MANY
     kinds[number_of[np.searchsorted(points, at[turns])]] = kinds_at[turns]
-    return _Vertices(points, number_of, corners.astype(np.int32), kinds)
+    return _Vertices(points, number_of, corners, kinds)
 
 
 def _polygons_in(
@@ -283,8 +284,10 @@ def _with_hole_filled(
     return (
         np.concatenate([mesh.first, n_slots + first[1:]]),
         np.concatenate([mesh.begins, begins]),
-        all_twins.astype(np.int32),
-        np.concatenate([mesh.polygon_of, mesh.n_polygons + polygon_of]).astype(np.int32),
+        all_twins.astype(np.int32, copy=False),
+        np.concatenate([mesh.polygon_of, mesh.n_polygons + polygon_of]).astype(
+            np.int32, copy=False
+        ),
     )
 
 
@@ -328,6 +331,8 @@ class DetourSearch:
     closed
         int64 (m,), flat cells that are closed, sorted, each once; those that are not free change
         nothing.
+    scratch
+        Copies of `free` to close cells in and open them again; None to make one.
 
     Examples
     --------
@@ -341,11 +346,30 @@ class DetourSearch:
            [0.5, 4.5]])
     """
 
-    def __init__(self, mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> None:
+    def __init__(
+        self,
+        mesh: ConvexMesh,
+        free: BoolArray,
+        closed: LongArray,
+        scratch: Pool[BoolArray] | None = None,
+    ) -> None:
         self._mesh, self._free = mesh, free
+        self._scratch = Pool(partial(np.copy, free)) if scratch is None else scratch
         self._closed = closed[free.ravel()[closed]]
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
+
+    @property
+    def search(self) -> MeshSearch:
+        """The search of the mesh without the closed cells."""
+        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
+        if self._search is None:
+            free = self._scratch.take()
+            free.ravel()[self._closed] = False
+            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
+            free.ravel()[self._closed] = True
+            self._scratch.give(free)
+        return self._search
 
     def is_met_by(self, path: MeshPath) -> bool:
         """Return whether a shortest path between open cells is illegal with these cells closed.
@@ -378,10 +402,6 @@ class DetourSearch:
     ) -> MeshPath:
         """Find a shortest path between two positions, as `MeshSearch.path` does."""
         until = math.inf if budget_s is None else perf_counter() + budget_s
-        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
-        if self._search is None:
-            free = self._free.copy()
-            free.ravel()[self._closed] = False
-            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
+        search = self.search
         left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        return self._search.path(cells, positions, epsilon=epsilon, budget_s=left_s)
+        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s)

@@ -7,7 +7,7 @@ import threading
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -18,10 +18,9 @@ from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.build import CornerHierarchy, add_landmarks, contract_corners, find_edges
 from hybridnav.search.mesh.kernels import polyanya
-from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.intervals import G
 from hybridnav.search.mesh.kernels.polyanya import N
-from hybridnav.search.mesh.kernels.queries import query, query_hierarchy
+from hybridnav.search.mesh.kernels.queries import answer
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
 
 
-KERNEL = query
+KERNEL = answer
 """The kernel whose compiled form shows that a search was run before."""
 Cell = tuple[int, int]
 Position = tuple[float, float]
@@ -46,8 +45,7 @@ _WORTH = 20_000
 """Least number of intervals that queries expand before the graph of corners is built."""
 
 
-@dataclass(frozen=True, eq=False)
-class MeshPath:
+class MeshPath(NamedTuple):
     """The shortest path found between two positions; its positions are None if none was found."""
 
     positions: FloatArray | None
@@ -69,6 +67,7 @@ class _Work:
         self.endpoints = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
         self.counts = np.zeros(polyanya.N_COUNTS, dtype=np.int64)
         self.bounds = np.zeros(2)
+        self.told = self.counts, self.bounds
         self.heap = np.empty(_ROOM), np.empty(_ROOM, np.int32)
 
     def make_room(self) -> None:
@@ -171,7 +170,8 @@ class MeshSearch:
         rows, cols = np.ascontiguousarray(mesh.corners.T, dtype=np.float64)
         sides = mesh.begins, mesh.finishes, mesh.twins, mesh.polygon_of
         self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
-        self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
+        tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
+        self.blocks, self.place = (mesh.block_of, tree), (mesh.component, mesh.polygon_at)
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
         self.corner_works: Pool[Any]
         self.edges: tuple[LongArray, IntArray] | None = None
@@ -263,46 +263,40 @@ class MeshSearch:
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
             self.prepare()
-        endpoints = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
         upper = math.inf
         if known is not None:
-            known = np.concatenate([endpoints[:1], known[1:-1], endpoints[1:]])
+            first, last = (round_into(*end) for end in zip(cells, positions, strict=True))
+            known = np.concatenate([[first], known[1:-1], [last]])
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
-        points = endpoints[0][1], endpoints[0][0], endpoints[1][1], endpoints[1][0]
-        graph = self.graph
-        with (self.works if graph is None else self.corner_works).lent() as work:
-            path = self._run(graph, (*cells[0], *cells[1]), points, work, (upper, epsilon, until))
-            length, bound = work.bounds.tolist()
-            bound = length if bound >= length else bound * SURE
-            expanded = int(work.counts[polyanya.EXPANDED])
+        (row, col), (to_row, to_col) = positions
+        ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
+        graph = self._graph
+        works = self.works if graph is None else self.corner_works
+        work = works.take()
+        _, path, length, bound, expanded = self._run(graph, ends, work, (upper, epsilon, until))
+        works.give(work)
         if graph is None:
             self.expanded += expanded
+        bound = length if bound >= length else bound * SURE
         return MeshPath(path if len(path) else known, length, bound, expanded)
 
     def _run(
         self,
         graph: CornerGraph | CornerHierarchy | None,
-        where: tuple[int, ...],
-        points: tuple[float, ...],
+        ends: tuple[tuple[int, ...], tuple[float, ...]],
         work: Any,
         effort: tuple[float, float, float],
-    ) -> FloatArray:
-        """Run a kernel in slices until it is done, or out of time."""
+    ) -> tuple[int, FloatArray, float, float, int]:
+        """Run a kernel in slices until it is done, or out of time; see `answer`."""
         upper, epsilon, until = effort
-        limit = NO_LIMIT if math.isinf(until) else SLICE
-        at = self.mesh.polygon_at
+        limit = NO_LIMIT if until == math.inf else SLICE
+        arrays: Any = self.blocks if graph is None else graph.arrays
         while True:
             left = upper, 1.0 + epsilon, limit
-            if graph is None:
-                blocks = self.mesh.block_of, self.tree, at
-                found = query(self.arrays, *blocks, where, points, work.arrays, left)
-            else:
-                answer = query_hierarchy if isinstance(graph, CornerHierarchy) else query_corners
-                place = self.mesh.component, at, where
-                found = answer(self.arrays, graph.arrays, place, points, work.arrays, left)
-            status, path = found
+            found = answer(self.arrays, arrays, self.place, ends, (work.arrays, work.told), left)
+            status = found[0]
             if status == polyanya.DONE:
-                return cast("FloatArray", path)
+                return cast("tuple[int, FloatArray, float, float, int]", found)
             if status == polyanya.WORK_FULL:
                 work.make_room()
             elif perf_counter() >= until:

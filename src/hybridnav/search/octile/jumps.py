@@ -6,13 +6,14 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav._base.threads import Pool, cores
+from hybridnav._base.threads import SHARES, Pool, cores
+from hybridnav.maps.geometry import centres
 from hybridnav.search.contraction import contract, renumbered
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import (
@@ -27,7 +28,7 @@ from hybridnav.search.octile.kernels.tables import look_ahead, number_cells
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
 
 
 _SHORT = 32_000
@@ -208,8 +209,7 @@ _LEAST = 64
 """Least number of queries that justifies a thread."""
 
 
-@dataclass(frozen=True, eq=False)
-class JumpPath:
+class JumpPath(NamedTuple):
     """A shortest path between two cells; its cells are None if there is none."""
 
     cells: LongArray | None
@@ -228,8 +228,8 @@ class JumpPaths:
     """float64 (n,), infinite where there is no path."""
     path_start: LongArray
     """int64 (n + 1,), where the cells of each path begin."""
-    cells: LongArray
-    """int64 (c, 2), (row, col) of the cells passed."""
+    cells: AnyArray
+    """int64 (c, 2), (row, col) of the cells passed; or float64, their centres `(x, y)`."""
     expanded: LongArray
     """int64 (n,), corner cells that each search expanded."""
 
@@ -284,27 +284,37 @@ class JumpSearch:
             return JumpPath(None, math.inf, expanded)
         return JumpPath(cells, straight + diagonal * math.sqrt(2.0), expanded)
 
-    def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
-        """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
+    def many(
+        self, starts: LongArray, goals: LongArray, frame: tuple[float, ...] | None = None
+    ) -> JumpPaths:
+        """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores.
+
+        With a `Frame.for_kernels` the cells are stated by their centres.
+        """
         endpoints = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
-        n_parts = max(1, min(cores(), len(endpoints) // _LEAST))
-        if n_parts == 1:
-            found = [self._paths(endpoints)]
-        else:
-            with ThreadPoolExecutor(n_parts) as pool:
-                found = list(pool.map(self._paths, np.array_split(endpoints, n_parts)))
+        n_parts = max(1, min(SHARES * cores(), len(endpoints) // _LEAST))
+        with ThreadPoolExecutor(cores()) as pool:
+            found = list(pool.map(self._paths, np.array_split(endpoints, n_parts)))
+            ends = np.cumsum([0, *(len(part[1]) for part in found)])
+            cells = np.empty((ends[-1], 2), np.int64 if frame is None else np.float64)
+
+            def put(k: int) -> None:
+                part = found[k][1]
+                cells[ends[k] : ends[k + 1]] = part if frame is None else centres(part, frame)
+
+            list(pool.map(put, range(n_parts)))
         counts = np.concatenate([part[2] for part in found])
         length = counts[:, 0] + counts[:, 1] * math.sqrt(2.0)
         length[counts[:, 0] < 0] = np.inf
         sizes = np.concatenate([np.diff(part[0]) for part in found])
         path_start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        cells = np.concatenate([part[1] for part in found])
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
     def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
-        with self._works.lent() as work:
-            found: tuple[Any, Any, Any] = kernels.paths(
-                self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
-            )
+        work = self._works.take()
+        found: tuple[Any, Any, Any] = kernels.paths(
+            self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
+        )
+        self._works.give(work)
         return found

@@ -8,12 +8,12 @@ import numpy as np
 
 from hybridnav._base.moves import FAR, length_in_cells
 from hybridnav.search.distance_table import BLOCK, climbing_room
+from hybridnav.search.octile.jumps import JumpSearch, build_jump_graph, contract_graph
 from hybridnav.search.octile.kernels.ends import direct_costs, labels_of_cells
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.search.distance_table import Ends, Labels
-    from hybridnav.search.octile import JumpSearch
 
 
 class JumpLabels:
@@ -57,3 +57,10 @@ class JumpLabels:
         reached = table < FAR
         found[reached] = length_in_cells(table[reached])
         return found
+
+
+def jump_labels(free: BoolArray) -> JumpLabels | None:
+    """Build a contracted graph of free cells, bool (rows, cols), for labels; None where contraction
+    takes too long."""
+    graph = contract_graph(build_jump_graph(free))
+    return JumpLabels(JumpSearch(graph)) if graph.is_contracted else None

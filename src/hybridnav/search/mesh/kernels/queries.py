@@ -8,6 +8,7 @@ from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
@@ -131,6 +132,41 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
     return DONE, path_to(mesh, endpoints, nodes[0], counts[LAST])
 
 
+@guarded
+@njit(cache=True, nogil=True)
+def answer(mesh, graph, place, ends, work, effort):
+    """Answer one query on any graph, or resume the search.
+
+    Parameters
+    ----------
+    mesh, graph, place
+        See `many`.
+    ends
+        Row and column of the cells of start and goal, and x and y of both, which are rounded and
+        moved into the closed squares of these cells.
+    work
+        Arrays of one query, see the kernel of one query on such a graph; its counts and bounds.
+    effort
+        See `query`.
+
+    Returns
+    -------
+    tuple
+        Status and path of `query`, the length and the lower bound, and what was expanded.
+    """
+    (row, col, to_row, to_col), (x, y, to_x, to_y) = ends
+    points = _into(col, x), _into(row, y), _into(to_col, to_x), _into(to_row, to_y)
+    arrays, (counts, bounds) = work
+    status, path = _answer(mesh, graph, place, ends[0], points, arrays, effort)
+    return status, path, bounds[UPPER], bounds[LOWER], counts[EXPANDED]
+
+
+@njit(cache=True, nogil=True)
+def _into(low, at):
+    """Round a coordinate to the grain of exact tests, and move it into a cell."""
+    return min(max(np.rint(at * GRAIN) / GRAIN, float(low)), low + 1.0)
+
+
 # Kernel of many queries on a mesh, one after the other.
 
 ANSWERS_FULL = 3
@@ -189,12 +225,16 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
 
 
 def _answer(mesh, graph, place, where, points, work, effort):
-    """Answer one query by the kernel for its kind of graph, which the types of arrays tell."""
+    """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
+    if isinstance(graph[1], tuple):
+        return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
+    kernel = query_corners if len(graph) == 3 else query_hierarchy
+    return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
 @overload(_answer)
 def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: ARG001 - numba's rule
-    """Return what stands for `_answer`, as numba asks for it: a function with equal arguments."""
+    """Return what is compiled for `_answer`, as numba asks for it: by the types of the arrays."""
 
     def by_intervals(mesh, graph, place, where, points, work, effort):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
