@@ -587,7 +587,7 @@ def test_rooms_beside_the_map_are_listed_and_found_anew_on_demand(cli, rooms, tm
     assert [one["name"] for one in cli("rooms", rooms, *radius, "--json").answer["rooms"]] == [
         "kitchen"
     ]
-    for option in (("--find",), ("--method", "walls"), ("--least-area", 0.5)):
+    for option in (("--find",), ("--least-area", 0.5)):
         found = cli("rooms", rooms, *radius, *option, "--json").answer["rooms"]
         assert "kitchen" not in [one["name"] for one in found]
     before = beside.read_text()

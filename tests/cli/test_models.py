@@ -77,7 +77,7 @@ def test_rooms_of_a_model_are_listed_and_planned_between(cli, tmp_path):
     listed = cli("rooms", path)
     assert (listed.code, listed.err) == (0, "")
     assert "west" in listed.out
-    assert "west" not in cli("rooms", path, "--method", "walls").out
+    assert "west" not in cli("rooms", path, "--find").out
     done = cli("plan", path, "--from", "west", "--to", "east", "--json")
     assert (done.code, done.err) == (0, "")
     assert done.answer["status"] == "solved"

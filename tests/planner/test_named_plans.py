@@ -429,7 +429,7 @@ def test_rooms_lists_those_of_a_file(cli, map_file):
     assert "hall (1: 0.50 m)" in done.out
 
 
-@pytest.mark.parametrize("option", [("--method", "walls"), ("--least-area", "1")])
+@pytest.mark.parametrize("option", [("--find",), ("--least-area", "1")])
 def test_rooms_of_a_file_are_not_found_too(cli, map_file, option):
     query = ("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", *option)
     assert cli(*query).refuses(2, option[0], "--rooms")
@@ -437,7 +437,3 @@ def test_rooms_of_a_file_are_not_found_too(cli, map_file, option):
 
 def test_rooms_refuses_an_endless_least_area(cli, map_file):
     assert cli("rooms", map_file, "--least-area", "inf").refuses(2, "least area", "inf")
-
-
-def test_rooms_refuses_an_unknown_method(cli, map_file):
-    assert cli("rooms", map_file, "--method", "magic").refuses(2, "walls, watershed", "'magic'")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,7 +33,7 @@ from hybridnav.cli.options import (
 )
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
-from hybridnav.maps.names import Segmentation, read_point
+from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,15 +44,6 @@ if TYPE_CHECKING:
     from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.topology.rooms.files.text import RoomMeasures
 
-MethodOption = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        metavar="NAME",
-        help=f"How rooms are found: {', '.join(get_args(Segmentation))}.",
-        show_default="judged",
-    ),
-]
 LeastAreaOption = Annotated[
     float | None,
     typer.Option(
@@ -108,7 +99,6 @@ FindOption = Annotated[
 def rooms(
     map_file: MapArgument[Path],
     out: OutOption[Path | None] = None,
-    method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
     find: FindOption = False,
@@ -130,12 +120,11 @@ def rooms(
     """
     asked = _asked_point(at, out, plot)
     _check_files(out, plot, tolerance_m, force=force)
-    finding = {"--method": method, "--least-area": least_area_m2, "--find": find or None}
+    finding = {"--least-area": least_area_m2, "--find": find or None}
     asked_for = [option for option, value in finding.items() if value is not None]
     if rooms_file is not None and asked_for:
         raise UsageError(f"{asked_for[0]} is for rooms that are found, --rooms reads them")
     finds = bool(asked_for)
-    checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
     older = older_files(names_from, names_map)
     settings = reading.settings(map_file)
@@ -153,7 +142,7 @@ def rooms(
         if rooms_file is not None:
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:
-            labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
+            labels = hn.find_rooms(grid, least_area_m2=area_m2)
     old = None
     if older is not None:
         with stage("carrying names", seconds, "names"):
@@ -221,14 +210,6 @@ def _check_files(
     if tolerance_m is not None and (out is None or not 0 < tolerance_m < math.inf):
         needed = "needs --out" if out is None else "must be positive and finite"
         raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")
-
-
-def _checked_method(method: str) -> Segmentation:
-    for known in get_args(Segmentation):
-        if known == method:
-            return cast("Segmentation", known)
-    known = ", ".join(get_args(Segmentation))
-    raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
 
 
 def _asked_point(text: str | None, out: Path | None, plot: Path | None) -> Point | None:
