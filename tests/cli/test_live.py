@@ -262,7 +262,7 @@ def test_a_log_is_replayed_scan_by_scan_and_drawn(cli: Any, tmp_path: Path) -> N
         assert image.width == 1100
 
 
-def test_regions_and_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> None:
+def test_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> None:
     first, second = two_maps(tmp_path)
     grid = hn.load_map(second, robot_radius_m=0)
     labels = np.zeros(grid.shape, np.int32)
@@ -272,15 +272,13 @@ def test_regions_and_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> No
     gone = tmp_path / "gone.yaml"
     probability = np.where(np.arange(25) > 11, 1.0, grid.probability)
     hn.write_ros_map(hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0), gone)
-    options = "--robot-radius", "0", "--rooms-every", "1", "--regions", "50"
+    options = "--robot-radius", "0", "--rooms-every", "1"
     done = cli("replay", first, second, gone, *options, "--rooms", rooms)
     assert (done.code, done.err) == (0, "")
     lines = done.out.splitlines()
-    assert " regions, 1 rooms, 0 doors" in lines[1]
-    assert any(line.startswith("regions    2 updates") for line in lines)
+    assert ", 1 rooms, 0 doors" in lines[1]
     assert "names      lost with their rooms: hall" in lines
     found = json.loads(cli("replay", first, second, *options, "--json").out)
-    assert found["regions"]["updates"] == 1
     assert (found["lost_names"], found["faults"]) == ([], [])
 
 
@@ -306,7 +304,6 @@ def test_scans_that_need_too_many_cells_are_counted(cli: Any, tmp_path: Path) ->
         (["a.log", "b.log"], [], "got 2 logs"),
         (["a.yaml"], ["--every", "2"], "are for a log"),
         (["a.log"], ["--rooms", "rooms.yaml"], "--rooms is for map files"),
-        (["a.yaml"], ["--regions", "0"], "--regions"),
         (["a.log"], ["--plot", "a.png"], "--plot must end in .gif"),
         (["a.log"], ["--every", "0"], "--every"),
     ],
