@@ -57,7 +57,7 @@ def test_the_rule_of_the_next_goal_decides_how_far_the_robot_drives(cli: Any, pl
 
 
 def test_the_end_by_the_number_of_goals_is_stated(cli: Any, plan: Path) -> None:
-    options = ("--sensor", "sonar", "--range", 2, "--most-goals", 1)
+    options = ("--range", 2, "--most-goals", 1)
     done = cli("explore", plan, "--robot-radius", 0.2, *options)
     assert done.code == 0
     assert "ended by --most-goals" in done.out
@@ -69,7 +69,6 @@ def test_the_end_by_the_number_of_goals_is_stated(cli: Any, plan: Path) -> None:
         (("--start", "here"), "--start must be two finite numbers X,Y in metres, got 'here'"),
         (("--start", "nan,1"), "--start must be two finite numbers X,Y in metres, got 'nan,1'"),
         (("--start", "0.05,0.05"), "the start (0.05, 0.05) is not in a free cell of the plan"),
-        (("--sensor", "eyes"), "--sensor must be laser or sonar, got 'eyes'"),
         (("--range", "nan"), "max_range_m is nan, expected a finite number > 0"),
         (("--noise", "-1"), "noise_m is -1.0, expected a finite length >= 0"),
         (("-o", "made.png"), "--out"),
