@@ -10,7 +10,6 @@ import typer
 
 from hybridnav._base.extension import extension
 from hybridnav.cli import options
-from hybridnav.cli.build import KeepInOption, KeepOption, Source
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_output, check_picture
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import (
@@ -136,7 +135,7 @@ WhyOption = Annotated[
 
 
 @with_map(
-    before="keep",
+    before="compare",
     over_floors=lambda: extension("formats", "building").plan_over_floors,
     alone=("no_stairs",),
 )
@@ -157,8 +156,6 @@ def plan(
     profile: options.ProfileOption = None,
     costs: options.CostsOption = None,
     smooth: options.SmoothOption = None,
-    keep: KeepOption = False,
-    keep_in: KeepInOption = None,
     compare: CompareOption = False,
     why: WhyOption = False,
     plot: options.PlotOption = None,
@@ -195,7 +192,9 @@ def plan(
         raise UsageError("--alternatives does not go with --via")
     wanted = wanted_of(alternatives, max_overlap, max_stretch)
     request = Request(
-        source=Source(map_file, settings, reading, keep, keep_in),
+        map_file=map_file,
+        settings=settings,
+        reading=reading,
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
         closing=closing,
         profile=profile,

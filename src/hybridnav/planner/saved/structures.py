@@ -294,8 +294,6 @@ JUMP_GRAPH = Structure(
 
 PRESET = Structure("preset", 2, (), {})
 
-KEY = Structure("key", 1, (), {})
-"""Key by which a kept model is found."""
 
 BUILDING = Structure(
     "building",
@@ -315,7 +313,6 @@ KINDS = frozenset(
         ROOMS,
         PYRAMID,
         PRESET,
-        KEY,
         MESH,
         CORNER_GRAPH,
         CORNER_EDGES,
@@ -325,5 +322,5 @@ KINDS = frozenset(
 )
 """The kinds of all parts of a model."""
 
-GONE = frozenset({"portals", "portal tables"})
+GONE = frozenset({"key", "portals", "portal tables"})
 """Kinds of parts that models of earlier versions have."""
