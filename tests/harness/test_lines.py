@@ -327,7 +327,6 @@ MARK = "HYBRIDNAV_TEST_MARK"
         ("space: se2", "space se2 needs headings"),
         ("{space: dubins, turning_radius_m: 0.5}", "space dubins needs headings"),
         ("{space: reeds-shepp, turning_radius_m: 0.5}", "space reeds-shepp needs headings"),
-        ("{objective: clearance}", "objective clearance"),
     ],
 )
 def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):

@@ -36,7 +36,6 @@ Metric = Literal[
     "weighted",
     "any-angle",
     "any-angle-weighted",
-    "clearance-weighted",
     "dubins",
     "reeds-shepp",
 ]

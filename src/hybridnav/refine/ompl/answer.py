@@ -16,7 +16,7 @@ from ompl import base, util
 
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import atan2, cos, sin
-from hybridnav.refine.ompl.attempts import Attempts, Simplifier
+from hybridnav.refine.ompl.attempts import Attempts, Simplifier, objective_of
 from hybridnav.refine.ompl.problem import Base, Box, SearchArea, bounds_of, search_area_of
 from hybridnav.refine.ompl.solve import IMPROVING, Problem, StateSpace, solve
 
@@ -148,7 +148,7 @@ def _leg(
     turns_and_drives = attempts.settings.space == "differential"
     if turns_and_drives and len(direct := space.driven(straight)):
         return direct
-    objective = attempts.objective.of(space)
+    objective = objective_of(space)
     most = _TRIES * len(cells) if flat or turns_and_drives else None
     found = solve(
         Problem(space, *endpoints, objective),
@@ -158,9 +158,7 @@ def _leg(
     )
     if not found.is_exact or not flat:
         return found.points if found.is_exact else None
-    points = Simplifier(space, attempts.objective).shorter(found.points)
-    if attempts.settings.objective != "length":
-        return points
+    points = Simplifier(space).shorter(found.points)
     limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
     return points if space.length(points) <= limit_m else None
 
@@ -186,7 +184,7 @@ def _improve(
 ) -> None:
     """Plan windows of the path again, each in the ellipse that can shorten it."""
     budget = attempts.budget
-    cost_of = attempts.objective.cost
+    cost_of = whole.length
     cost, fruitless, window = cost_of(points), 0, _LEAST_WINDOWS
     while fruitless < _ROUNDS_WITHOUT_GAIN and budget.left() > 0 and len(points) > 2:  # noqa: PLR2004
         before = cost
@@ -212,12 +210,12 @@ def _window(
     first, last = _between(points, along)
     if last - first < 2:  # noqa: PLR2004 - one motion
         return points
-    cost_of, inner = attempts.objective.cost, points[first : last + 1]
+    cost_of, inner = whole.length, points[first : last + 1]
     cost, least = cost_of(inner), whole.length(inner[[0, -1]])
     if cost <= least * (1 + _LEAST_GAIN):
         return points
     space = attempts.space(corridor, *_ellipse(corridor, inner, cost))
-    objective = attempts.objective.of(space)
+    objective = objective_of(space)
     problem = Problem(space, inner[0], inner[-1], objective, least * (1 + _LEAST_GAIN))
     found = solve(problem, attempts.settings, attempts.budget.stopper(_WINDOW))
     if not found.is_exact or cost_of(found.points) >= cost:
@@ -369,7 +367,7 @@ def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, par
         whole,
         attempts.query.start,
         attempts.query.goal,
-        attempts.objective.of(whole),
+        objective_of(whole),
         _ENOUGH * attempts.bound_m if improves else math.inf,
     )
     share = part * (_SEARCHED if improves and settings.simplify else 1.0)
@@ -377,7 +375,7 @@ def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, par
         problem,
         settings,
         attempts.budget.stopper(share),
-        on_path=lambda points: attempts.better(points, attempts.objective.cost(points)),
+        on_path=lambda points: attempts.better(points, whole.length(points)),
         search=attempts.search,
     )
     if found.is_exact:

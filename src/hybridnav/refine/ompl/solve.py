@@ -64,6 +64,8 @@ class StateSpace:
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
         self.is_straight = settings.space in {"r2", "se2", "differential"}
+        self.spins = settings.space in {"se2", "differential"}
+        self.is_roadmap = settings.planner in ROADMAPS
         self._spells = settings.space == "differential"
         self._reverses = settings.reverses
         self.dimension = _STATES[settings.space]
