@@ -193,14 +193,13 @@ def _takes_costs(path: str) -> bool:
     return "costs" in inspect.signature(made_of).parameters
 
 
-def run(  # noqa: PLR0913 - two have defaults
+def run(
     maps: Sequence[StudyMap],
     folder: Path,
     plan: Plan,
     parts: Sequence[Part],
     *,
     workers: int = 1,
-    scheduler: str | None = None,
 ) -> None:
     """Answer all that is not answered yet, and note how long it took.
 
@@ -214,7 +213,7 @@ def run(  # noqa: PLR0913 - two have defaults
         How much to ask.
     parts
         The parts to run.
-    workers, scheduler
+    workers
         As in `RunSettings`.
 
     Raises
@@ -235,7 +234,6 @@ def run(  # noqa: PLR0913 - two have defaults
             repeat=part.repeat,
             costs=part.costs,
             workers=workers,
-            scheduler=scheduler,
             timeout_s=plan.limit_s + _LATE_S,
             limit_s=plan.limit_s,
         )

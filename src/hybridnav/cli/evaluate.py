@@ -76,10 +76,6 @@ RepeatOption = Annotated[
 WorkersOption = Annotated[
     int, typer.Option("--workers", metavar="W", help="Processes on this machine.")
 ]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler instead."),
-]
 CornersOption = Annotated[
     bool, typer.Option("--corner-cutting", help="Let diagonals cut corners: breaks consistency.")
 ]
@@ -120,7 +116,6 @@ def evaluate(
     seed: options.SeedOption[int] = 0,
     repeat: RepeatOption = 0,
     workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
     overrides: options.SetOption = None,
     robot_radius_m: options.RadiusOption = None,
     merge_distance_m: options.MergeDistanceOption[float | None] = None,
@@ -183,7 +178,6 @@ def evaluate(
         costs=tuple(costs or ()),
         max_cells=max_cells,
         workers=workers,
-        scheduler=scheduler,
         timeout_s=timeout_s,
         limit_s=limit_s,
     )
