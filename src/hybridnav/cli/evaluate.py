@@ -246,11 +246,7 @@ def _run(settings: RunSettings, out: Path) -> None:
         run(settings, out, progress=advance)
 
 
-def compare(
-    first: RunArgument,
-    second: RunArgument,
-    metric: MetricOption = "both",
-) -> None:
+def compare(first: RunArgument, second: RunArgument, metric: MetricOption = "both") -> None:
     """Set two runs side by side, pair by pair, with the significance of the difference."""
     from hybridnav.harness.tables import compare_runs, to_markdown  # noqa: PLC0415 - on demand
 

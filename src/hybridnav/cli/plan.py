@@ -82,9 +82,7 @@ ViaOption = Annotated[
 AtOption = Annotated[
     str,
     typer.Option(
-        "--at",
-        metavar="WHERE",
-        help="Where in a room: anywhere (the nearest cell), or its point.",
+        "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
     ),
 ]
 _POSES = (".csv", ".json", ".geojson")
@@ -92,9 +90,7 @@ _POSES = (".csv", ".json", ".geojson")
 LanguageOption = Annotated[
     str,
     typer.Option(
-        "--language",
-        metavar="CODE",
-        help=f"Language of the words: {', '.join(languages())}.",
+        "--language", metavar="CODE", help=f"Language of the words: {', '.join(languages())}."
     ),
 ]
 PosesOption = Annotated[
@@ -181,10 +177,7 @@ def plan(
     given = options.parsed_costs(costs)
     check_language(language)
     settings = reading.settings(
-        map_file,
-        preset=options.PRESET if given else None,
-        overrides=given.overrides,
-        smooth=smooth,
+        map_file, preset=options.PRESET if given else None, overrides=given.overrides, smooth=smooth
     )
     closing = options.parsed_closing([*(blocked or ()), *options.out_of_order(map_file)])
     first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)

@@ -204,10 +204,7 @@ class Request:
         return {"why": tightest.to_dict() | {"words": tightest.words(self.language)}}
 
     def _on_whole_grid(
-        self,
-        topology: hn.TopologicalMap,
-        closed: hn.Blocked | None,
-        costs: hn.CostLayer | None,
+        self, topology: hn.TopologicalMap, closed: hn.Blocked | None, costs: hn.CostLayer | None
     ) -> hn.PlanResult:
         # Loads pydantic, which help can do without.
         from hybridnav.planner import CostSettings, planner_settings  # noqa: PLC0415

@@ -90,8 +90,7 @@ NamesMapOption = Annotated[
     ),
 ]
 FindOption = Annotated[
-    bool,
-    typer.Option("--find", help="Find rooms anew, although the map has some, or its folder."),
+    bool, typer.Option("--find", help="Find rooms anew, although the map has some, or its folder.")
 ]
 
 

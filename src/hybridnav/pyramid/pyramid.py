@@ -174,12 +174,7 @@ class DualGraphPyramid:
             rooms=None if self.rooms is None else self.rooms.label_of,
         )
         return replace(
-            self,
-            stats=stats,
-            region_cells=most_cells,
-            _record=record,
-            _levels={},
-            _below=self,
+            self, stats=stats, region_cells=most_cells, _record=record, _levels={}, _below=self
         )
 
     @property

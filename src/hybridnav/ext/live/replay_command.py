@@ -98,10 +98,7 @@ def replay(
             grids = log.grids(side_m, every, robot_radius_m, advance)
         rooms, grids = _with_rooms(grids, rooms_file)
         for step in follow(
-            grids,
-            merge_distance_m=merge_distance_m,
-            rooms_every=rooms_every,
-            rooms=rooms,
+            grids, merge_distance_m=merge_distance_m, rooms_every=rooms_every, rooms=rooms
         ):
             figures.add(step)
             if animation is not None:

@@ -36,12 +36,7 @@ if TYPE_CHECKING:
     )
 
 
-def save(
-    thing: Saved,
-    path: PathLike,
-    *,
-    compress: bool = False,
-) -> None:
+def save(thing: Saved, path: PathLike, *, compress: bool = False) -> None:
     """Write a model: a map, or the maps of a building, with everything that was prepared on it.
 
     Parameters

@@ -68,8 +68,7 @@ class ArraySpec:
         wanted = [evaluated(size, sizes) for size in self.shape]
         if at.shape != wanted or at.dtype not in self.dtypes.split():
             raise refusal(
-                part,
-                f"{self.name} is {at.dtype} {at.shape}, expected {self.dtypes} {wanted}",
+                part, f"{self.name} is {at.dtype} {at.shape}, expected {self.dtypes} {wanted}"
             )
 
     def check_values(self, part: FiledPart, sizes: Mapping[str, int], array: AnyArray) -> None:

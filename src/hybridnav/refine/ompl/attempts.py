@@ -38,12 +38,7 @@ class Attempts:
         Called with each better path.
     """
 
-    def __init__(
-        self,
-        base: Base,
-        query: OmplQuery,
-        send: Callable[[Reply], None],
-    ) -> None:
+    def __init__(self, base: Base, query: OmplQuery, send: Callable[[Reply], None]) -> None:
         began = time.monotonic()
         setup = base.setup
         self.setup, self.query, self.settings = setup, query, setup.settings

@@ -92,9 +92,7 @@ class Base:
         field_of = setup.field_of
         self.boxes = np.empty((0, 4), np.int64) if field_of is None else boxes_of(field_of)
         self.check = MotionCheck(
-            setup.grid,
-            footprint=setup.settings.body,
-            allow_unexplored=setup.allow_unexplored,
+            setup.grid, footprint=setup.settings.body, allow_unexplored=setup.allow_unexplored
         )
 
 

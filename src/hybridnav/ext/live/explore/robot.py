@@ -22,11 +22,7 @@ from hybridnav.ext.live.explore.goals import (
     walled,
     widest_point,
 )
-from hybridnav.ext.live.mapping import (
-    LaserModel,
-    Mapper,
-    SimulatedLaser,
-)
+from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
 from hybridnav.ext.live.mapping.sensors import in_sight
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner

@@ -9,18 +9,8 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.mapping.kernels import (
-    add_hits,
-    add_passes,
-    beam_ends,
-    probabilities,
-)
-from hybridnav.ext.live.mapping.scans import (
-    LaserScan,
-    checked_array,
-    checked_count,
-    checked_number,
-)
+from hybridnav.ext.live.mapping.kernels import add_hits, add_passes, beam_ends, probabilities
+from hybridnav.ext.live.mapping.scans import LaserScan, checked_array, checked_count, checked_number
 from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, log_odds_of
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type

@@ -11,12 +11,7 @@ import numpy as np
 from hybridnav._base.trig import log, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import ray_lengths
-from hybridnav.ext.live.mapping.scans import (
-    MOST_READINGS,
-    LaserScan,
-    checked_count,
-    checked_number,
-)
+from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_count, checked_number
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 
