@@ -86,7 +86,7 @@ def test_every_planner_solves_the_office_near_the_optimum(planner_of: Any, name:
 
 @pytest.mark.parametrize(
     ("planner", "confine"),
-    [("RRTConnect", "chain"), ("BITstar", "chain"), ("BITstar", "mask"), ("PRMstar", "prm")],
+    [("RRTConnect", "chain"), ("BITstar", "chain"), ("BITstar", "mask"), ("PRMstar", "mask")],
 )
 def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> None:
     grid = field_of_pillars()

@@ -63,7 +63,7 @@ def test_the_parameters_are_those_that_ompl_declares(planner: str) -> None:
         ("space: se2, footprint: '[[0, 0], [1'", ["footprint", "[[x, y], ...]"]),
         ("space: se2, footprint: 'LINESTRING (0 0, 1 1)'", ["footprint"]),
         ("space: se2, footprint: [[0, 0], [1, 0]]", ["footprint", "3"]),
-        ("confine: prm", ["PRM"]),
+        ("confine: prm", ["confine", "chain"]),
         ("budget_s: .inf", ["budget_s"]),
         ("budget_s: 0", ["budget_s"]),
         ("seed: 0", ["seed"]),

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ompl import base, util
 
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import atan2, cos, sin
@@ -354,14 +353,12 @@ def _attempt(attempts: Attempts, corridor: SearchArea, *, part: float) -> None:
         first_part = part * _CHAIN if settings.has_heading else part
         if attempt(attempts, corridor, whole, part=first_part) or not settings.has_heading:
             return
-    _at_once(attempts, corridor, whole, part=part)
+    _at_once(attempts, whole, part=part)
 
 
-def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float) -> None:
+def _at_once(attempts: Attempts, whole: StateSpace, *, part: float) -> None:
     """Solve the whole corridor as one problem."""
     settings = attempts.settings
-    if settings.confine == "prm":
-        draw_from(corridor, whole)
     improves = settings.planner in IMPROVING
     problem = Problem(
         whole,
@@ -382,41 +379,3 @@ def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, par
         attempts.finish(whole, found.points)
     else:
         attempts.partial(found.points)
-
-
-# States drawn from the cells of a corridor, for planners with a valid-state sampler.
-
-
-class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the bindings have no types
-    """Points in cells, each cell as likely as any other, with any heading."""
-
-    def __init__(self, information: Any, corridor: SearchArea, space: StateSpace) -> None:
-        super().__init__(information)
-        self._cells = corridor.cells
-        self._frame = corridor.grid.frame
-        self._space = space
-        self._random = util.RNG()
-
-    def sample(self, state: Any) -> bool:
-        """Fill a state and return whether it is valid."""
-        uniform = self._random.uniformReal
-        row, col = self._cells[self._random.uniformInt(0, len(self._cells) - 1)].tolist()
-        x, y = self._frame.points_of_grid((row + uniform(0, 1), col + uniform(0, 1))).tolist()
-        self._space.fill(state, (x, y, uniform(-math.pi, math.pi)))
-        return bool(self._space.state_valid(state))
-
-    def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802, ARG002
-        """Fill a state anywhere: only PRM's expansion asks for near ones, and it is not used."""
-        return self.sample(state)
-
-
-def draw_from(corridor: SearchArea, space: StateSpace) -> None:
-    """Make a space draw its valid states from the cells of a corridor."""
-
-    def allocate(information: Any) -> _CellSampler:
-        sampler = _CellSampler(information, corridor, space)
-        space.keep(sampler)
-        return sampler
-
-    space.information.setValidStateSamplerAllocator(allocate)
-    space.information.setup()

@@ -112,16 +112,6 @@ class SearchArea:
         """Lowest and highest x and y, float64 (2,) each, metres, map frame."""
         return bounds_of(self.grid, self.box)
 
-    @cached_property
-    def cells(self) -> LongArray:
-        """int64 (n, 2), the cells of the corridor that may be entered."""
-        top, bottom, left, right = self.box
-        free = self.grid.enterable(allow_unexplored=self.allow_unexplored)[top:bottom, left:right]
-        if self.inside is not None:
-            free &= self.inside[top:bottom, left:right]
-        cells: LongArray = np.argwhere(free) + np.array([top, left])
-        return cells
-
 
 def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
     """Return the lowest and highest x and y of a box of cells, float64 (2,) each."""

@@ -90,7 +90,7 @@ DIRECTED = frozenset({"BITstar", "RRT", "RRTConnect"})
 """Planners that check each motion in its own direction in every state space; the others assume that
 a motion valid one way is valid the other."""
 Space = Literal["r2", "se2", "differential", "dubins", "reeds-shepp"]
-Confinement = Literal["chain", "mask", "prm"]
+Confinement = Literal["chain", "mask"]
 
 
 def _no_boolean(value: Any) -> Any:
@@ -177,8 +177,7 @@ class OmplSettings(BaseModel):
     """Seed of OMPL's random numbers."""
     confine: Confinement = "chain"
     """Confinement to the corridor. `chain`: a chain of small problems, field by field. `mask`: one
-    problem that refuses states and motions outside. `prm`: PRM and PRMstar draw their states from
-    the corridor's cells."""
+    problem that refuses states and motions outside."""
     simplify: bool = True
     """Whether paths are shortened by OMPL's PathSimplifier."""
 
@@ -206,8 +205,6 @@ class OmplSettings(BaseModel):
                     },
                 )
             _check_parameter(name, value)
-        if self.confine == "prm" and self.planner not in ROADMAPS:
-            raise PydanticCustomError("prm", "confine: prm goes with planner PRM or PRMstar")
         return self
 
     @model_validator(mode="after")

@@ -79,11 +79,6 @@ class StateSpace:
         self.information.setMotionValidator(self._motions)
         self.information.setStateValidityCheckingResolution(FINE)
         self.information.setup()
-        self._kept: list[Any] = []
-
-    def keep(self, thing: Any) -> None:
-        """Keep an object alive as long as the space: OMPL holds no references to Python objects."""
-        self._kept.append(thing)
 
     def state(self, values: FloatArray) -> Any:
         """Return a state of OMPL from x, y and, if there is one, a heading."""
