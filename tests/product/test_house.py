@@ -5,11 +5,11 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 58_289,
-    "lines": 96_419,
-    "files": 398,
-    "code outside ext": 40_198,
-    "lines of a file, median": 263.5,
+    "code": 58_230,
+    "lines": 96_330,
+    "files": 396,
+    "code outside ext": 40_139,
+    "lines of a file, median": 265.0,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,

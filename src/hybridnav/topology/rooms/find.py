@@ -4,21 +4,31 @@ map, or anew in a part of it beside rooms that stay.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.maps.room_labels import MAX_ROOMS
+from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
-from hybridnav.topology.rooms.growing import Likely, Rule, Small, contract
 from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
-from hybridnav.topology.rooms.merging import Forest, JudgedSegments, grown, least_cells
+from hybridnav.topology.rooms.merging import (
+    Forest,
+    Growth,
+    JudgedSegments,
+    Likely,
+    Rule,
+    Small,
+    grown,
+    least_cells,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
@@ -81,6 +91,28 @@ def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
     return RoomLabels(names, reaching(labels, grid))
+
+
+def contract(segments: JudgedSegments, rules: Sequence[Rule]) -> DualGraphPyramid:
+    """Contract segments until every boundary between them resists.
+
+    Parameters
+    ----------
+    segments, rules
+        As of `Growth`; the segments merge as the fields do.
+
+    Returns
+    -------
+    DualGraphPyramid
+        Its places are the segments as they were, the fields of its apex those that are left.
+    """
+    free = segments.label_of >= 0
+    grid = OccupancyGrid(
+        np.where(free, 0.0, 1.0).astype(np.float32), Frame(1.0), robot_radius_m=0.0
+    )
+    return DualGraphPyramid.build(
+        grid, merge_distance_m=math.inf, resistance=Growth(segments, rules)
+    )
 
 
 def check_least_area(least_area_m2: float) -> None:
