@@ -79,7 +79,7 @@ maps: setup
 
 # Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
 lock:
-	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev --extra study --extra view --extra agent --extra docs pyproject.toml --output-file requirements.lock
+	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev --extra cluster --extra study --extra view --extra agent --extra docs pyproject.toml --output-file requirements.lock
 
 clean:
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

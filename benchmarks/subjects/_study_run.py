@@ -193,13 +193,14 @@ def _takes_costs(path: str) -> bool:
     return "costs" in inspect.signature(made_of).parameters
 
 
-def run(
+def run(  # noqa: PLR0913 - two have defaults
     maps: Sequence[StudyMap],
     folder: Path,
     plan: Plan,
     parts: Sequence[Part],
     *,
     workers: int = 1,
+    scheduler: str | None = None,
 ) -> None:
     """Answer all that is not answered yet, and note how long it took.
 
@@ -213,7 +214,7 @@ def run(
         How much to ask.
     parts
         The parts to run.
-    workers
+    workers, scheduler
         As in `RunSettings`.
 
     Raises
@@ -234,6 +235,7 @@ def run(
             repeat=part.repeat,
             costs=part.costs,
             workers=workers,
+            scheduler=scheduler,
             timeout_s=plan.limit_s + _LATE_S,
             limit_s=plan.limit_s,
         )

@@ -99,6 +99,7 @@ OPTIONS = [
     DATA,
     option("-o", "--out", type=Path, help="else out/study, or out/study-whole"),
     option("--workers", type=int, default=os.cpu_count() or 1),
+    option("--scheduler", metavar="ADDRESS", help="of a dask.distributed cluster"),
     option("--pairs", type=int, help="of each map; else the study's"),
     option("--repeat", type=int, help="queries of each pair; else the study's"),
     option("--map", action="append", default=[], metavar="GLOB"),
@@ -125,7 +126,7 @@ def main(given: Namespace) -> int:
     try:
         maps = maps_of(data, given.map)
         parts = [part for part in parts_of(plan) if given.part in {None, part.name}]
-        run(maps, given.out, plan, parts, workers=given.workers)
+        run(maps, given.out, plan, parts, workers=given.workers, scheduler=given.scheduler)
         kinds = {one.path.relative_to(data).with_suffix("").as_posix(): one.kind for one in maps}
         docs = ROOT / "docs" if is_whole else given.out / "docs"
         write_all(given.out, data, kinds, docs)

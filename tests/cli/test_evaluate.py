@@ -196,6 +196,7 @@ def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):
         ((rooms, "--workers", 0, *out), 2, "worker"),
         ((rooms, "--timeout", 0, *out), 2, "timeout"),
         ((rooms, "--robot-radius", -1, *out), 2, "radius"),
+        ((rooms, "--scheduler", "nonsense", *out), 2, "scheduler nonsense"),
         ((rooms, "--metric", "l2", *out), 2, "got metric 'l2'"),
         ((rooms, "--metric", "any-angle", "--corner-cutting", *out), 2, "take --metric octile"),
         ((rooms,), 2, "--out"),

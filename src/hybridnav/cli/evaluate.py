@@ -76,6 +76,10 @@ RepeatOption = Annotated[
 WorkersOption = Annotated[
     int, typer.Option("--workers", metavar="W", help="Processes on this machine.")
 ]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler instead."),
+]
 CornersOption = Annotated[
     bool, typer.Option("--corner-cutting", help="Let diagonals cut corners: breaks consistency.")
 ]
@@ -116,6 +120,7 @@ def evaluate(
     seed: options.SeedOption[int] = 0,
     repeat: RepeatOption = 0,
     workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
     overrides: options.SetOption = None,
     robot_radius_m: options.RadiusOption = None,
     merge_distance_m: options.MergeDistanceOption[float | None] = None,
@@ -178,6 +183,7 @@ def evaluate(
         costs=tuple(costs or ()),
         max_cells=max_cells,
         workers=workers,
+        scheduler=scheduler,
         timeout_s=timeout_s,
         limit_s=limit_s,
     )

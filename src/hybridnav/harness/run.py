@@ -37,7 +37,7 @@ from hybridnav.harness.scenes import (
 )
 from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
-from hybridnav.harness.workers import run_local
+from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
@@ -110,6 +110,8 @@ class RunSettings:
     max_cells: int = DEFAULT_MAX_CELLS
     """The most cells that a map may have; see `load_map`."""
     workers: int = 1
+    scheduler: str | None = None
+    """Address of a dask.distributed scheduler, instead of processes of this machine."""
     timeout_s: float = 600.0
     """Longest silence of a worker: one query, or a preparation."""
     limit_s: float | None = None
@@ -227,6 +229,8 @@ def _with(costs: str) -> str:
 def _run(settings: RunSettings, tasks: Sequence[Task | TimingTask]) -> Iterator[list[Record]]:
     if not tasks:
         return iter(())
+    if settings.scheduler is not None:
+        return run_on_cluster(tasks, address=settings.scheduler)
     return run_local(tasks, workers=settings.workers, timeout_s=settings.timeout_s)
 
 

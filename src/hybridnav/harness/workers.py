@@ -1,9 +1,11 @@
-"""Execution of tasks in processes of this machine."""
+"""Execution of tasks: in processes of this machine, or on a dask.distributed cluster."""
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from multiprocessing.connection import Connection
 
     from hybridnav.harness.records import Record
@@ -23,6 +25,14 @@ if TYPE_CHECKING:
 
 _FLUSH_S = 0.2
 _ATTEMPTS = 2
+
+CONNECT_S = 10.0
+"""Seconds within which a scheduler must answer."""
+
+NO_WORKER_S = 120.0
+"""Seconds for which a scheduler may be without a worker."""
+
+_LOOK_S = 5.0
 
 
 def _serve(connection: Connection, turn: Any) -> None:
@@ -176,3 +186,92 @@ def _give_up(worker: _Worker, waiting: list[Work], status: str) -> list[Record]:
     if left or task.ids[0] in worker.missing:
         waiting.append(replace(task, pairs=left, attempt=0))
     return [task.failed_record(index, status)]
+
+
+def _whole(task: Work) -> list[Record]:
+    return list(task.run())
+
+
+def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Record]]:
+    """Run tasks on a dask.distributed cluster; those of a lost worker run again elsewhere.
+
+    Parameters
+    ----------
+    tasks
+        In any order.
+    address
+        Address of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package and
+        the map files under the same paths.
+
+    Yields
+    ------
+    list of Record
+        Records of one task, when it ends.
+
+    Raises
+    ------
+    InvalidValueError
+        When dask.distributed is not installed, the scheduler cannot be reached, or it has had no
+        worker for `NO_WORKER_S`.
+    """
+    try:
+        from dask import distributed  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        raise InvalidValueError(
+            "a scheduler needs dask.distributed: pip install 'hybridnav[cluster]'"
+        ) from None
+    try:
+        _knock(address)
+        client: Any = distributed.Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InvalidValueError(f"scheduler {address}: {error}") from None
+    with client:
+        futures = client.map(_whole, tasks, retries=_ATTEMPTS, pure=False)
+        task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
+        suspects = []
+        for future in _as_completed(client, futures):
+            try:
+                yield future.result()
+            except distributed.KilledWorker:
+                suspects.append(task_of[future.key])
+        # dask blames all tasks that waited for a dead worker: run each again, by itself.
+        for task in suspects:
+            again = client.submit(_whole, task, pure=False)
+            try:
+                yield next(_as_completed(client, [again])).result()
+            except distributed.KilledWorker:
+                yield [task.failed_record(at, "lost") for at in range(len(task.ids))]
+
+
+def _as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
+    """Yield futures when they end; a cluster that no worker joins any more is not waited for."""
+    from dask import distributed  # noqa: PLC0415 - an optional extra
+
+    waiting, seen = set(futures), time.monotonic()
+    while waiting:
+        try:
+            done, waiting = distributed.wait(  # type: ignore[no-untyped-call]
+                waiting, timeout=_LOOK_S, return_when="FIRST_COMPLETED"
+            )
+        except TimeoutError:
+            if client.nthreads():
+                seen = time.monotonic()
+            elif time.monotonic() - seen > NO_WORKER_S:
+                raise InvalidValueError(
+                    f"scheduler {client.scheduler.address}: it has had no worker for "
+                    f"{NO_WORKER_S:g} s: start workers and run this again, what is recorded stays"
+                ) from None
+        else:
+            yield from done
+
+
+def _knock(address: str) -> None:
+    """Connect to a scheduler and hang up: a client that cannot lives on and complains at exit."""
+    from distributed.comm.core import connect  # noqa: PLC0415 - an optional extra
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+        await comm.close()
+
+    with ThreadPoolExecutor(1) as pool:  # a notebook has a running loop of its own
+        pool.submit(asyncio.run, knock()).result()

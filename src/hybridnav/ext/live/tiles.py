@@ -309,6 +309,20 @@ class Tiles:
         sums: LongArray = _tile_kernels.sums_of(runs, count)
         return sums
 
+    def differing_tiles(self, before: Tiles) -> Iterator[tuple[Tile, Tile]]:
+        """Yield the tiles that this version does not share with another one: theirs, and its own.
+
+        Their records may be shared or not.
+        """
+        for row in sorted(self._rows.keys() | before._rows.keys()):
+            mine, theirs = self._rows.get(row, {}), before._rows.get(row, {})
+            if mine is theirs:
+                continue
+            for col in sorted(mine.keys() | theirs.keys()):
+                old, new = theirs.get(col, _EMPTY), mine.get(col, _EMPTY)
+                if old.place is not new.place or old.of_class is not new.of_class:
+                    yield old, new
+
     def arrays(self) -> dict[tuple[int, int], Tile]:
         """Return each tile, by row and column of tiles."""
         return {(row, col): tile for row, of in self._rows.items() for col, tile in of.items()}

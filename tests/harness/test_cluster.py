@@ -1,0 +1,132 @@
+"""The harness on a dask.distributed cluster: the same records, and lost workers' tasks again."""
+
+import os
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import dask
+import distributed
+import pytest
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness import workers
+from hybridnav.harness.records import read_records
+from hybridnav.harness.run import RunSettings, evaluate
+from tests.harness import faulty_methods as faulty
+from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
+from tests.harness.test_run import timeless
+
+N_PAIRS = 30
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A scheduler in this process and one worker, no dashboard, nothing written."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(ROOT))
+        patch.setenv(faulty.FATAL_PAIR, "2,2>2,2")
+        with (
+            # What is asked of a worker that died is asked again soon.
+            dask.config.set({"distributed.comm.timeouts.connect": "5s"}),
+            distributed.LocalCluster(
+                n_workers=1,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                silence_logs=50,
+            ) as running,
+        ):
+            yield running
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory):
+    path = write_map(tmp_path_factory.mktemp("map"), ROOMS)
+    return RunSettings(
+        maps=(str(path),),
+        baselines=("simple-graph", name_of(faulty.Slow)),
+        pairs=N_PAIRS,
+        merge_distance_m=4.0,
+    )
+
+
+def test_a_cluster_makes_the_records_of_local_workers(cluster, settings, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    made = evaluate(settings, tmp_path / "local")
+    there = replace(settings, scheduler=cluster.scheduler_address)
+    assert evaluate(there, tmp_path / "cluster") == made
+    assert timeless(tmp_path / "cluster") == timeless(tmp_path / "local")
+    assert evaluate(there, tmp_path / "local") == 0
+
+
+def test_the_tasks_of_a_worker_that_is_lost_run_again(cluster, settings, tmp_path):
+    only = replace(
+        settings,
+        presets=(),
+        baselines=(name_of(faulty.Slow),),
+        pairs=150,
+        scheduler=cluster.scheduler_address,
+    )
+    killed = []
+
+    def kill_the_worker_at_work():
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline:
+            for worker in list(cluster.scheduler.workers.values()):
+                if any("_whole" in str(task.key) for task in worker.processing):
+                    time.sleep(0.5)
+                    pid = cluster.workers[worker.name].pid
+                    os.kill(pid, signal.SIGKILL)
+                    killed.append(pid)
+                    return
+            time.sleep(0.005)
+
+    thread = threading.Thread(target=kill_the_worker_at_work)
+    thread.start()
+    made = evaluate(only, tmp_path)
+    thread.join()
+    assert killed
+    records = read_records(tmp_path)
+    assert {record["status"] for record in records} <= {"ready", "solved", "no path"}
+    assert len({record["id"] for record in records}) == len(records) == made > 2 * 150
+
+
+def test_a_task_that_kills_every_worker_is_recorded_as_lost(
+    cluster, settings, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
+    baselines = (name_of(faulty.Dies), "grid-dijkstra")
+    only = replace(settings, presets=(), baselines=baselines, scheduler=cluster.scheduler_address)
+    evaluate(only, tmp_path)
+    status: dict[str, set[str]] = {}
+    for record in read_records(tmp_path):
+        status.setdefault(record["method"], set()).add(record["status"])
+    assert status[name_of(faulty.Dies)] == {"lost"}
+    assert status["grid-dijkstra"] == {"ready", "solved", "no path"}
+
+
+@pytest.mark.parametrize("address", ["nonsense", "bogus://x:1", "tcp://127.0.0.1", ""])
+def test_an_address_that_is_none_is_refused_in_a_line(settings, tmp_path, address):
+    with pytest.raises(InvalidValueError, match="scheduler") as caught:
+        evaluate(replace(settings, scheduler=address), tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scheduler_that_is_not_there_is_missed_in_a_line(settings, tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "CONNECT_S", 1.0)
+    began = time.monotonic()
+    with pytest.raises(InvalidValueError, match=r"scheduler tcp://127\.0\.0\.1:9: ") as caught:
+        evaluate(replace(settings, scheduler="tcp://127.0.0.1:9"), tmp_path)
+    assert "\n" not in str(caught.value)
+    assert time.monotonic() - began < 8
+
+
+def test_a_scheduler_without_workers_is_not_waited_for(settings, tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "NO_WORKER_S", 0.5)
+    monkeypatch.setattr(workers, "_LOOK_S", 0.2)
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
+        only = replace(settings, scheduler=empty.scheduler_address)
+        with pytest.raises(InvalidValueError, match=r"has had no worker for 0\.5 s: start workers"):
+            evaluate(only, tmp_path)
