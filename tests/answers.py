@@ -20,7 +20,7 @@ import hybridnav as hn
 from benchmarks.subjects.explore import narrow_world, widest_point
 from hybridnav.ext.graphs import build_route_graph
 from hybridnav.ext.live.explore import explore
-from hybridnav.ext.live.mapping import Mapper, SimulatedLaser, SimulatedSonars
+from hybridnav.ext.live.mapping import Mapper, SimulatedLaser
 
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]
 """OMPL is a library of others, which takes its sines where it finds them."""
@@ -44,12 +44,11 @@ def features() -> list[str]:
 
 
 def scanned(world: hn.OccupancyGrid) -> str:
-    """Return the map that a laser and a ring of sonars make on a circle."""
+    """Return the map that a laser makes on a circle."""
     mapper, noise = Mapper(resolution_m=0.05), np.random.default_rng(0)
     x, y = widest_point(world)
     for turn in np.linspace(0.0, 6.0, 40).tolist():
-        for sensor in (SimulatedLaser(noise_m=0.02), SimulatedSonars(noise_m=0.02)):
-            mapper.add(sensor.scan(world, (x, y, turn), seed=noise))
+        mapper.add(SimulatedLaser(noise_m=0.02).scan(world, (x, y, turn), seed=noise))
     return digest(mapper.to_grid(robot_radius_m=0.0).probability)
 
 

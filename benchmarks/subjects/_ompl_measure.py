@@ -46,7 +46,7 @@ MAPS = (
 PLANNERS = ("RRTConnect", "InformedRRTstar", "BITstar")
 BUDGETS_S = (0.25, 1.0, 5.0)
 CONFINEMENTS = (("RRTConnect", "chain"), ("RRTConnect", "mask"), ("BITstar", "chain"),
-                ("BITstar", "mask"), ("PRMstar", "chain"), ("PRMstar", "prm"))  # fmt: skip
+                ("BITstar", "mask"), ("PRMstar", "chain"))  # fmt: skip
 NEAR = 1.02
 """A path is near the optimum when it is no longer than this times it."""
 
@@ -57,7 +57,7 @@ class Method:
 
     planner: str
     scope: str
-    """`whole map`, or how the corridor is kept: `chain`, `mask` or `prm`."""
+    """`whole map`, or how the corridor is kept: `chain` or `mask`."""
     budget_s: float
 
     @property

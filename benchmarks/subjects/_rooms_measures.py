@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +14,6 @@ from benchmarks.common import print_head, print_row
 from benchmarks.subjects._rooms_buildings import SITES, Building
 from benchmarks.subjects.train_rooms import Training, of_generated
 from hybridnav.harness.judges import compare_rooms
-from hybridnav.maps.names import Segmentation
 from hybridnav.topology.rooms.find import judged_rooms
 
 if TYPE_CHECKING:
@@ -95,25 +94,18 @@ def measures_table(data: Path, out: Path, n_generated: int = 0) -> None:
         if building.rose2 is not None:
             rows[building.name, "ROSE2"] = Measures.of(building, building.rose2, np.nan)
             drawn["ROSE2"] = building.rose2
-        for method in get_args(Segmentation):
-            shown = UNSEEN if method == "judged" else method
-            forest = training.without(building.site) if method == "judged" else None
-            began = time.process_time()
-            if forest is None:
-                drawn[shown] = hn.find_rooms(building.grid, method=method).label_of
-            else:
-                drawn[shown] = judged_rooms(building.grid, forest, 1.0)
-            seconds = time.process_time() - began
-            rows[building.name, shown] = Measures.of(building, drawn[shown], seconds)
+        forest = training.without(building.site)
+        began = time.process_time()
+        drawn[UNSEEN] = judged_rooms(building.grid, forest, 1.0)
+        seconds = time.process_time() - began
+        rows[building.name, UNSEEN] = Measures.of(building, drawn[UNSEEN], seconds)
         _draw(building, drawn, out)
         for (name, shown), found in rows.items():
             if name == building.name:
                 _print(name, shown, found)
-    columns = (*(m for m in get_args(Segmentation) if m != "judged"), UNSEEN)
-    for shown in columns:
-        _print("mean of all", shown, _mean([rows[b.name, shown] for b in buildings]))
+    _print("mean of all", UNSEEN, _mean([rows[b.name, UNSEEN] for b in buildings]))
     given = [building for building in buildings if building.rose2 is not None]
-    for shown in ("ROSE2", *columns):
+    for shown in ("ROSE2", UNSEEN):
         _print("mean of ROSE2's maps", shown, _mean([rows[b.name, shown] for b in given]))
 
 

@@ -1,6 +1,6 @@
 """The table of OMPL: on the whole map and in the corridor, and checks of what it returns.
 
-Parts: `table` (eight maps, three planners, three budgets), `confinements` (the three ways of
+Parts: `table` (eight maps, three planners, three budgets), `confinements` (the ways of
 keeping a search in the corridor, on three maps), `footprint` (600 plans of a long robot through
 doors, checked by shapely), `soak` (2,000 plans in one process), `pictures` (the search of a
 corridor beside that of the whole map, on the project's own office). All by default. DIR gets

@@ -1,4 +1,4 @@
-"""How stable the numbers of places, regions and rooms are while a robot maps a building.
+"""How stable the numbers of places and rooms are while a robot maps a building.
 
 The logs of Intel and Freiburg 079 are replayed in cells of 5 cm, with a robot of 0.25 m: a map
 after every so many scans. A cell flips if it stays free and changes the number of its place,
@@ -30,8 +30,6 @@ LOGS = {
     "Freiburg 079": "radish_logs/freiburg-079-corrected.log.gz",
 }
 RESOLUTION_M = 0.05
-MOST_CELLS = 20_000
-"""Most cells of a region: 50 square metres."""
 
 
 def agreement(rooms: OnlineRooms) -> float:
@@ -51,13 +49,12 @@ def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict
     read = itertools.islice(hn.ext.live.CarmenLog(log), scans)
     mapper = Mapper(resolution_m=RESOLUTION_M)
     grids = grids_of_scans(read, mapper, every=every, robot_radius_m=RADIUS_M)
-    for step in replay(grids, rooms_every=rooms_every, most_cells=MOST_CELLS):
+    for step in replay(grids, rooms_every=rooms_every):
         figures.add(step)
     found = {**figures.figures(), "scans": mapper.n_scans, "agreement": 0.0}
     if step is not None:
         found["agreement"] = agreement(step.rooms)
-        fresh = hn.DualGraphPyramid.build(step.places.grid).with_regions(MOST_CELLS)
-        found["fresh"] = [fresh[at].n_vertices for at in (fresh.place_level, fresh.region_level)]
+        found["fresh"] = hn.DualGraphPyramid.build(step.places.grid)[-1].n_vertices
     return found
 
 
@@ -98,13 +95,12 @@ def main(given: Namespace) -> None:
     for name, file in LOGS.items():
         log = given.data / file
         found = followed(log, given.every, given.rooms_every, given.scans)
-        for kind in ("places", "regions", "rooms"):
+        for kind in ("places", "rooms"):
             show(name, kind, found)
-        places, regions = found["fresh"]
         print(
             f"{name}: {found['levels']} levels, {len(found['faults'])} of them with faults; "
-            f"{found['n_places']} places, {found['n_regions']} regions (a fresh build has {places} "
-            f"and {regions}), {found['n_rooms']} rooms, "
+            f"{found['n_places']} places (a fresh build has {found['fresh']}), "
+            f"{found['n_rooms']} rooms, "
             f"agreement with those of a fresh build {found['agreement']:.3f}",
             flush=True,
         )

@@ -24,9 +24,15 @@ from benchmarks.subjects._rooms_buildings import SITES, Building
 from benchmarks.subjects._rooms_generated import generated
 from hybridnav.topology.rooms import merging
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
-from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, outside_of
-from hybridnav.topology.rooms.growing import Likely, Small, contract
-from hybridnav.topology.rooms.merging import EVIDENCE, Forest, JudgedSegments, least_cells
+from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
+from hybridnav.topology.rooms.merging import (
+    EVIDENCE,
+    Forest,
+    JudgedSegments,
+    Likely,
+    Small,
+    least_cells,
+)
 
 if TYPE_CHECKING:
     from argparse import Namespace

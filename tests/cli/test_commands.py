@@ -451,17 +451,6 @@ def test_show_goes_on_above_the_places_and_names_the_levels(cli, tmp_path):
     assert refused.refuses(2, "--regions")
 
 
-def test_show_counts_the_arcs_that_are_guesses_and_draws_the_graph(cli, tmp_path):
-    grid = hn.OccupancyGrid(np.array([[0.02, 0.02, 0.5], [0.02, 0.19, 0.02]]), robot_radius_m=0)
-    hn.write_ros_map(grid, tmp_path / "map.yaml")
-    picture = tmp_path / "graph.png"
-    done = cli("show", tmp_path / "map.yaml", "--robot-radius", 0, "--guess-below", 0.01)
-    assert "certainty  " not in cli("show", FIGURE, "--robot-radius", 0).out
-    assert " arcs are guesses: a threshold moved by less than 0.01 ends them\n" in done.out
-    drawn = cli("show", FIGURE, "--guess-below", 0.3, "--plot", picture)
-    assert (drawn.code, picture.stat().st_size > 10_000) == (0, True)
-
-
 def test_show_tells_what_the_library_knows(cli):
     done = cli("show", FIGURE, "--robot-radius", 0, "--set", "pyramid.merge_distance_m=10")
     assert (done.code, done.err) == (0, "")
@@ -587,7 +576,7 @@ def test_rooms_beside_the_map_are_listed_and_found_anew_on_demand(cli, rooms, tm
     assert [one["name"] for one in cli("rooms", rooms, *radius, "--json").answer["rooms"]] == [
         "kitchen"
     ]
-    for option in (("--find",), ("--method", "walls"), ("--least-area", 0.5)):
+    for option in (("--find",), ("--least-area", 0.5)):
         found = cli("rooms", rooms, *radius, *option, "--json").answer["rooms"]
         assert "kitchen" not in [one["name"] for one in found]
     before = beside.read_text()

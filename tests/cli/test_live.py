@@ -57,7 +57,7 @@ def test_the_rule_of_the_next_goal_decides_how_far_the_robot_drives(cli: Any, pl
 
 
 def test_the_end_by_the_number_of_goals_is_stated(cli: Any, plan: Path) -> None:
-    options = ("--sensor", "sonar", "--range", 2, "--most-goals", 1)
+    options = ("--range", 2, "--most-goals", 1)
     done = cli("explore", plan, "--robot-radius", 0.2, *options)
     assert done.code == 0
     assert "ended by --most-goals" in done.out
@@ -69,7 +69,6 @@ def test_the_end_by_the_number_of_goals_is_stated(cli: Any, plan: Path) -> None:
         (("--start", "here"), "--start must be two finite numbers X,Y in metres, got 'here'"),
         (("--start", "nan,1"), "--start must be two finite numbers X,Y in metres, got 'nan,1'"),
         (("--start", "0.05,0.05"), "the start (0.05, 0.05) is not in a free cell of the plan"),
-        (("--sensor", "eyes"), "--sensor must be laser or sonar, got 'eyes'"),
         (("--range", "nan"), "max_range_m is nan, expected a finite number > 0"),
         (("--noise", "-1"), "noise_m is -1.0, expected a finite length >= 0"),
         (("-o", "made.png"), "--out"),
@@ -262,7 +261,7 @@ def test_a_log_is_replayed_scan_by_scan_and_drawn(cli: Any, tmp_path: Path) -> N
         assert image.width == 1100
 
 
-def test_regions_and_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> None:
+def test_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> None:
     first, second = two_maps(tmp_path)
     grid = hn.load_map(second, robot_radius_m=0)
     labels = np.zeros(grid.shape, np.int32)
@@ -272,15 +271,13 @@ def test_regions_and_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> No
     gone = tmp_path / "gone.yaml"
     probability = np.where(np.arange(25) > 11, 1.0, grid.probability)
     hn.write_ros_map(hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0), gone)
-    options = "--robot-radius", "0", "--rooms-every", "1", "--regions", "50"
+    options = "--robot-radius", "0", "--rooms-every", "1"
     done = cli("replay", first, second, gone, *options, "--rooms", rooms)
     assert (done.code, done.err) == (0, "")
     lines = done.out.splitlines()
-    assert " regions, 1 rooms, 0 doors" in lines[1]
-    assert any(line.startswith("regions    2 updates") for line in lines)
+    assert ", 1 rooms, 0 doors" in lines[1]
     assert "names      lost with their rooms: hall" in lines
     found = json.loads(cli("replay", first, second, *options, "--json").out)
-    assert found["regions"]["updates"] == 1
     assert (found["lost_names"], found["faults"]) == ([], [])
 
 
@@ -306,7 +303,6 @@ def test_scans_that_need_too_many_cells_are_counted(cli: Any, tmp_path: Path) ->
         (["a.log", "b.log"], [], "got 2 logs"),
         (["a.yaml"], ["--every", "2"], "are for a log"),
         (["a.log"], ["--rooms", "rooms.yaml"], "--rooms is for map files"),
-        (["a.yaml"], ["--regions", "0"], "--regions"),
         (["a.log"], ["--plot", "a.png"], "--plot must end in .gif"),
         (["a.log"], ["--every", "0"], "--every"),
     ],

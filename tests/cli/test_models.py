@@ -1,6 +1,5 @@
 """Models on the command line: built, planned on, listed, drawn, measured."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +76,7 @@ def test_rooms_of_a_model_are_listed_and_planned_between(cli, tmp_path):
     listed = cli("rooms", path)
     assert (listed.code, listed.err) == (0, "")
     assert "west" in listed.out
-    assert "west" not in cli("rooms", path, "--method", "walls").out
+    assert "west" not in cli("rooms", path, "--find").out
     done = cli("plan", path, "--from", "west", "--to", "east", "--json")
     assert (done.code, done.err) == (0, "")
     assert done.answer["status"] == "solved"
@@ -108,140 +107,3 @@ def test_wrong_use_is_told_before_the_work(cli, tmp_path):
 def test_a_model_of_more_cells_than_allowed_names_the_option(cli, model):
     refused = cli("plan", model, *QUERY, "--max-cells", "100")
     assert refused.refuses(3, "--max-cells")
-
-
-@pytest.fixture
-def kept(cli, tmp_path):
-    """Plan on a map and keep the structures; return the messages and the answer."""
-    for path in FIGURE.parent.iterdir():
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    map_file, folder = tmp_path / FIGURE.name, tmp_path / "kept"
-
-    def run(*options, query=QUERY):
-        done = cli("plan", map_file, *query, *SMALL, "--keep-in", folder, *options, "--json")
-        assert done.code == 0
-        assert done.err.count("\n") == 1 + ("rooms are found" in done.err)
-        return "using the model kept in" in done.err, done.answer
-
-    return run
-
-
-def test_what_is_kept_is_found_again(kept, tmp_path):
-    was_kept, first = kept()
-    assert not was_kept
-    was_kept, second = kept()
-    assert was_kept
-    assert "mesh" in first["seconds"]
-    assert "mesh" not in second["seconds"]
-    assert {**first, "seconds": 0} == {**second, "seconds": 0}
-    assert len(list((tmp_path / "kept").iterdir())) == 1
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("--robot-radius", "0.05"),
-        ("--free-threshold", "0.1"),
-        ("--least-island", "0.1"),
-        ("--set", "pyramid.merge_distance_m=1"),
-        ("--set", "planner.allow_unexplored=true"),
-        ("--preset", "octile"),
-        ("--seed", "3"),
-    ],
-)
-def test_what_is_kept_for_other_settings_is_not_used(kept, options):
-    kept()
-    was_kept, answer = kept(*options)
-    assert not was_kept
-    again, second = kept(*options)
-    assert again
-    assert {**answer, "seconds": 0} == {**second, "seconds": 0}
-    assert kept()[0]
-
-
-def test_what_is_kept_of_a_map_that_changed_is_not_used(kept, tmp_path):
-    kept()
-    (image,) = tmp_path.glob("*.pgm")
-    content = bytearray(image.read_bytes())
-    content[-1] ^= 255
-    image.write_bytes(content)
-    assert not kept()[0]
-    text = (tmp_path / FIGURE.name).read_text(encoding="utf-8")
-    (tmp_path / FIGURE.name).write_text(text + "# moved\n", encoding="utf-8")
-    assert not kept()[0]
-
-
-def test_what_is_kept_and_altered_is_built_anew(kept, tmp_path):
-    _, first = kept()
-    (path,) = (tmp_path / "kept").iterdir()
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    was_kept, second = kept()
-    assert not was_kept
-    assert second["points"] == first["points"]
-    assert kept()[0]
-    other = path.with_name("0" * 64 + ".hnm")
-    path.rename(other)
-    assert not kept()[0]
-    other.replace(path)
-
-
-def test_rooms_are_kept_too_and_found_again_as_they_are(kept, tmp_path):
-    grid = figure1_world().grid(robot_radius_m=0.0)
-    label_of = np.zeros(grid.shape, np.int32)
-    label_of[:, grid.shape[1] // 2 :] = 1
-    names = ("--from", "west", "--to", "east")
-    file = tmp_path / "rooms.yaml"
-    hn.save_rooms(file, hn.RoomLabels(("west", "east"), label_of), grid)
-    assert not kept(query=names)[0]
-    was_kept, answer = kept(query=names)
-    assert was_kept
-    assert answer["status"] == "solved"
-    hn.save_rooms(file, hn.RoomLabels(("east", "west"), label_of), grid)
-    was_kept, other = kept(query=names)
-    assert not was_kept
-    assert other["points"] != answer["points"]
-    file.unlink()
-    assert not kept()[0]
-
-
-def test_the_cache_folder_is_that_of_the_user(cli, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
-    done = cli("plan", FIGURE, *QUERY, *SMALL, "--keep")
-    assert f"MB in {tmp_path / 'caches' / 'hybridnav'}" in done.err
-    assert "using the model" in cli("plan", FIGURE, *QUERY, *SMALL, "--keep").err
-    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    done = cli("plan", FIGURE, *QUERY, *SMALL, "--keep")
-    assert str(tmp_path / "home" / ".cache" / "hybridnav") in done.err
-
-
-def test_a_folder_that_cannot_be_written_costs_no_answer(cli, tmp_path):
-    (tmp_path / "file").touch()
-    done = cli("plan", FIGURE, *QUERY, *SMALL, "--keep-in", tmp_path / "file")
-    assert done.code == 0
-    assert "solved" in done.out
-    assert "cannot be kept" in done.err
-    assert done.err.count("\n") == 1
-
-
-def test_what_was_not_used_for_longest_makes_room(kept, tmp_path, monkeypatch):
-    kept()
-    (first,) = (tmp_path / "kept").iterdir()
-    os.utime(first, (0, 0))
-    left = tmp_path / "kept" / ".hybridnav.1.1"
-    left.touch()
-    os.utime(left, (0, 0))
-    monkeypatch.setattr("hybridnav.planner.saved.kept.MOST_BYTES", first.stat().st_size + 1)
-    kept("--seed", "1")
-    (second,) = (tmp_path / "kept").iterdir()
-    assert second != first
-
-
-def test_a_model_is_planned_on_though_keeping_was_asked_for(cli, model, tmp_path):
-    done = cli("plan", model, *QUERY, "--keep-in", tmp_path / "kept")
-    assert (done.code, done.err) == (0, "")
-    assert not (tmp_path / "kept").exists()
-    missing = cli("plan", tmp_path / "no.yaml", *QUERY, "--keep-in", tmp_path / "kept")
-    assert missing.refuses(3, "no.yaml")

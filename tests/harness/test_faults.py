@@ -12,10 +12,10 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.harness.analysis import load_study, to_frame
-from hybridnav.harness.cases import command_of
 from hybridnav.harness.columns import MEANINGS, consistency_row, rows_of_study
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
+from hybridnav.harness.report import command_of
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.yardstick import KINDS
 from tests.harness import faulty_methods as faulty

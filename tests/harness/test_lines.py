@@ -18,13 +18,13 @@ from benchmarks.subjects._study_data import part_figures
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
-from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.outcome import query_key
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.harness.tables import compare_runs
 from hybridnav.harness.yardstick import Yardstick, contradiction
 from hybridnav.maps.files import load_map
 from hybridnav.planner import load_preset
@@ -327,7 +327,6 @@ MARK = "HYBRIDNAV_TEST_MARK"
         ("space: se2", "space se2 needs headings"),
         ("{space: dubins, turning_radius_m: 0.5}", "space dubins needs headings"),
         ("{space: reeds-shepp, turning_radius_m: 0.5}", "space reeds-shepp needs headings"),
-        ("{objective: clearance}", "objective clearance"),
     ],
 )
 def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):

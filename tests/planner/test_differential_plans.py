@@ -154,11 +154,3 @@ def test_equal_seeds_give_equal_paths_and_a_turn_alone_is_one(rooms: hn.Topologi
     result = made.plan((3.0, 3.0, 0.5), (3.0, 3.0, -2.0))
     np.testing.assert_allclose(poses_of(result), [[3, 3, 0.5], [3, 3, -2.0]], atol=1e-9)
     assert (result.cost, result.lower_bound, result.gap) == (0.0, 0.0, 0.0)
-
-
-def test_clearance_keeps_the_robot_off_walls(rooms: hn.TopologicalMap) -> None:
-    made = planner_of(rooms, "planner=BITstar", "objective=clearance", "budget_s=2")
-    result = made.plan((2.0, 3.0, 0.5), (9.0, 9.0, 1.0))
-    assert result.metric == "clearance-weighted"
-    assert result.path is not None
-    assert result.cost > result.path.length_m

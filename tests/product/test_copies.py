@@ -20,7 +20,7 @@ from shapely import box
 
 import hybridnav as hn
 from hybridnav._base.threads import Pool
-from hybridnav.ext.live import OnlinePyramid, OnlineRegions, OnlineRooms
+from hybridnav.ext.live import OnlinePyramid, OnlineRooms
 from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.baselines.thrun import ThrunMap
@@ -96,9 +96,8 @@ def things() -> dict[str, Any]:
 
 
 def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
-    """Versions of places, regions and rooms, and what became of them by an update."""
+    """Versions of places and rooms, and what became of them by an update."""
     places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
-    regions = OnlineRegions.of(places, most_cells=200)
     rooms = OnlineRooms.of(grid, topology().rooms.labels).with_name(1, "first")
     probability = grid.probability.copy()
     probability[5:8, 5:14] = 1.0
@@ -106,7 +105,6 @@ def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
     now = update.version.pyramid.grid  # levels are found lazily
     return {
         "places": update,
-        "regions update": regions.update(update.version),
         "rooms update": rooms.update(now),
     }
 
@@ -114,14 +112,9 @@ def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
 @WAYS
 def test_copies_of_versions_follow_a_map_alike(copied: Any) -> None:
     grid = topology().grid
-    for name, update in followed(grid).items():
+    for update in followed(grid).values():
         version, other = update.version, copied(update).version
-        if name == "regions update":
-            places = version.places.update(grid).version
-            after = [each.update(places) for each in (version, other)]
-        else:
-            after = [each.update(grid) for each in (version, other)]
-        one, two = after
+        one, two = (each.update(grid) for each in (version, other))
         np.testing.assert_array_equal(one.version.number_of, two.version.number_of)
         assert (one.born, one.died, one.merged) == (two.born, two.died, two.merged)
 

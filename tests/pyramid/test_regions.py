@@ -227,46 +227,6 @@ def test_a_size_that_is_no_number_of_cells_is_refused(most_cells: Any) -> None:
         pyramid.with_regions(most_cells)
 
 
-@given(made=grown(max_side=min(MAX_SIDE, 24)), kinds=st.sampled_from([3, 70_000]))
-@SOME
-def test_known_regions_are_taken_as_they_are(
-    made: tuple[Scene, hn.DualGraphPyramid], kinds: int
-) -> None:
-    scene, found = made
-    assert found.region_cells is not None
-    places, regions = found[found.place_level], found[found.region_level]
-    known = regions.field_of[tuple(places.cells.T)] * np.int64(kinds)
-    pyramid = scene.pyramid(found.linkage).with_regions(found.region_cells, region_of=known)
-    base = Base.of(scene.classes)
-    for level in above(pyramid):
-        check_level(level, base)
-    for lower, upper in itertools.pairwise(above(pyramid)):
-        check_step(lower, upper)
-    assert same_partition(pyramid[pyramid.region_level].field_of, regions.field_of)
-    assert pyramid[-1].n_vertices == parts_of(scene.classes)
-    assert pyramid.with_regions(found.region_cells) is pyramid
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda known: known[:-1], "expected whole numbers >= 0 for the"),
-        (lambda known: known.astype(float), "expected whole numbers >= 0 for the"),
-        (lambda known: known - 1, "expected whole numbers >= 0 for the"),
-        (lambda known: known * 0, r"a region of \d+ places has 61 cells, expected at most 40"),
-        (lambda known: np.arange(len(known)) % (len(known) - 1), "regions were given, but"),
-    ],
-)
-def test_regions_that_are_none_are_refused(change: Any, message: str) -> None:
-    pyramid = hn.DualGraphPyramid.build(occupancy_grid(TWO_ROOMS), merge_distance_m=2.0)
-    places, made = pyramid[-1], pyramid.with_regions(40)
-    known = made[made.region_level].field_of[tuple(places.cells.T)]
-    most = 40 if "cells" in message else 100
-    with pytest.raises(hn.errors.InvalidValueError, match=message) as error:
-        pyramid.with_regions(most, region_of=change(known))
-    assert "\n" not in str(error.value)
-
-
 def test_cells_of_many_regions_have_kinds_of_their_own() -> None:
     classes = np.tile(np.array([1, 2], np.uint8), (2, 40_000))
     labels = np.tile(np.repeat(np.arange(40_000, dtype=np.int32), 2), (2, 1))

@@ -130,7 +130,7 @@ def test_what_was_found_before_the_trouble_counts(
         ("InformedRRTstar", "mask"),
         ("BITstar", "mask"),
         ("BITstar", "chain"),
-        ("PRMstar", "prm"),
+        ("PRMstar", "mask"),
     ],
 )
 def test_planners_that_go_on_keep_to_their_time(

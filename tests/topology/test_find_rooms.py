@@ -1,4 +1,4 @@
-"""Segmentation into rooms: what every method must find, and how agreement is counted."""
+"""Segmentation into rooms: what must be found, and how agreement is counted."""
 
 import math
 
@@ -12,11 +12,8 @@ import hybridnav as hn
 from hybridnav.harness.judges import compare_rooms
 from hybridnav.maps import CellClass
 from hybridnav.topology.rooms.find import divide_rooms
-from hybridnav.topology.rooms.merging import Segments
-from hybridnav.topology.rooms.segments import main_direction
 from tests.strategies import class_grids, occupancy_grid
 
-METHODS = ["judged", "walls", "watershed"]
 RESOLUTION_M = 0.1
 
 
@@ -43,10 +40,9 @@ def floor(turned_rad=0.0):
 
 
 @pytest.mark.parametrize("turned_rad", [0.0, 0.5])
-@pytest.mark.parametrize("method", METHODS)
-def test_every_method_parts_rooms_from_a_corridor(method, turned_rad):
+def test_rooms_are_parted_from_a_corridor(turned_rad):
     grid, true = floor(turned_rad)
-    rooms = hn.find_rooms(grid, method=method)
+    rooms = hn.find_rooms(grid)
     known = (true >= 0) & (grid.classes == CellClass.FREE)
     agreed = compare_rooms(true[known], rooms.label_of[known])
     assert agreed.n_found == 4
@@ -54,16 +50,15 @@ def test_every_method_parts_rooms_from_a_corridor(method, turned_rad):
     assert (agreed.recall > 0.9).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_names_count_up_from_the_top_whatever_the_radius_of_the_robot(method):
+def test_names_count_up_from_the_top_whatever_the_radius_of_the_robot():
     grid, _ = floor()
-    rooms = hn.find_rooms(grid, method=method)
+    rooms = hn.find_rooms(grid)
     assert rooms.names == ("room-1", "room-2", "room-3", "room-4")
     middles = [rooms.label_of[40, 20], rooms.label_of[40, 60], rooms.label_of[40, 100]]
     assert middles == [0, 1, 2]
     assert rooms.label_of[10, 60] == 3
     wide = hn.OccupancyGrid(grid.probability, grid.frame, robot_radius_m=0.3)
-    assert (hn.find_rooms(wide, method=method).label_of == rooms.label_of).all()
+    assert (hn.find_rooms(wide).label_of == rooms.label_of).all()
 
 
 def beside_a_closet(side_cells):
@@ -74,90 +69,77 @@ def beside_a_closet(side_cells):
     return free
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_closet_with_a_door_is_a_room_by_its_free_area(method):
+def test_a_closet_with_a_door_is_a_room_by_its_free_area():
     free = beside_a_closet(12)
     free[12:20, 42] = 1
     grid = occupancy_grid(free, resolution_m=RESOLUTION_M)
-    small = hn.find_rooms(grid, method=method, least_area_m2=1.44)
+    small = hn.find_rooms(grid, least_area_m2=1.44)
     assert small.names == ("room-1", "room-2")
     assert small.label_of[15, 50] != small.label_of[15, 20]
     # Larger than the closet and its threshold are: it goes to the room it opens onto.
-    whole = hn.find_rooms(grid, method=method, least_area_m2=1.8)
+    whole = hn.find_rooms(grid, least_area_m2=1.8)
     assert whole.names == ("room-1",)
     assert (whole.label_of[free == 1] == 0).all()
 
 
 @pytest.mark.parametrize("beyond", [CellClass.FREE, CellClass.UNEXPLORED])
-@pytest.mark.parametrize("method", METHODS)
-def test_no_room_reaches_through_a_wall_of_one_cell(method, beyond):
+def test_no_room_reaches_through_a_wall_of_one_cell(beyond):
     cells = beside_a_closet(6)
     closet = np.zeros(cells.shape, dtype=bool)
     closet[10:16, 43:49] = True
     cells[closet] = beyond
-    rooms = hn.find_rooms(occupancy_grid(cells, resolution_m=RESOLUTION_M), method=method)
+    rooms = hn.find_rooms(occupancy_grid(cells, resolution_m=RESOLUTION_M))
     assert rooms.names == ("room-1",)
     assert (rooms.label_of[closet] == -1).all()
     assert rooms.label_of[12, 42] == 0  # into the wall, not out of it
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_rooms_reach_into_what_is_unexplored_on_their_side(method):
+def test_rooms_reach_into_what_is_unexplored_on_their_side():
     cells = beside_a_closet(0)
     cells[30:42, 30:42] = CellClass.UNEXPLORED
-    label_of = hn.find_rooms(
-        occupancy_grid(cells, resolution_m=RESOLUTION_M), method=method
-    ).label_of
+    label_of = hn.find_rooms(occupancy_grid(cells, resolution_m=RESOLUTION_M)).label_of
     assert (label_of[32:40, 30] == 0).all()
     assert label_of[36, 36] == -1
 
 
-@given(classes=class_grids(), method=st.sampled_from(METHODS))
-def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes, method):
+@given(classes=class_grids())
+def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes):
     grid = occupancy_grid(classes, resolution_m=0.25)
-    rooms = hn.find_rooms(grid, method=method, least_area_m2=0.2)
+    rooms = hn.find_rooms(grid, least_area_m2=0.2)
     free = grid.measured == CellClass.FREE
     counts = np.bincount(rooms.label_of[free & (rooms.label_of >= 0)], minlength=len(rooms.names))
     assert (counts >= 4).all()
-    again = hn.find_rooms(grid, method=method, least_area_m2=0.2)
+    again = hn.find_rooms(grid, least_area_m2=0.2)
     assert (again.label_of == rooms.label_of).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_walls_that_a_scan_left_unexplored_part_rooms_too(method):
+def test_walls_that_a_scan_left_unexplored_part_rooms_too():
     grid, true = floor()
     probability = np.where(grid.probability > 0, 0.5, 0.0).astype(np.float32)
-    rooms = hn.find_rooms(
-        hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0), method=method
-    )
+    rooms = hn.find_rooms(hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0))
     known = (true >= 0) & (grid.classes == CellClass.FREE)
     assert compare_rooms(true[known], rooms.label_of[known]).mcc > 0.9
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_closets_that_lie_whole_in_gaps_between_walls_are_rooms(method):
+def test_closets_that_lie_whole_in_gaps_between_walls_are_rooms():
     closets = np.pad(np.tile(np.pad(np.ones((4, 4), np.uint8), (0, 2)), (3, 3)), (2, 0))
-    found = hn.find_rooms(occupancy_grid(closets, resolution_m=0.25), method=method)
+    found = hn.find_rooms(occupancy_grid(closets, resolution_m=0.25))
     assert len(found.names) == 9
     assert (found.label_of[closets == 1] >= 0).all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_open_ground_without_a_wall_is_one_room(method):
+def test_open_ground_without_a_wall_is_one_room():
     grid = hn.OccupancyGrid(np.zeros((40, 60), np.float32), hn.Frame(0.1), robot_radius_m=0)
-    assert hn.find_rooms(grid, method=method).names == ("room-1",)
+    assert hn.find_rooms(grid).names == ("room-1",)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_map_without_free_cells_has_no_rooms(method):
+def test_a_map_without_free_cells_has_no_rooms():
     grid = hn.OccupancyGrid(np.ones((5, 5), np.float32), hn.Frame(0.1), robot_radius_m=0)
-    assert hn.find_rooms(grid, method=method).names == ()
+    assert hn.find_rooms(grid).names == ()
 
 
-def test_unknown_methods_and_areas_are_refused():
+def test_areas_out_of_range_are_refused():
     grid = hn.OccupancyGrid(np.zeros((5, 5), np.float32))
-    with pytest.raises(hn.errors.InvalidValueError, match="judged, walls, watershed"):
-        hn.find_rooms(grid, method="magic")  # type: ignore[arg-type]
     for area_m2 in (0.0, -1.0, math.nan, math.inf, 1e308):
         with pytest.raises(hn.errors.InvalidValueError, match="positive"):
             hn.find_rooms(grid, least_area_m2=area_m2)
@@ -179,33 +161,6 @@ def test_rooms_are_divided_by_the_way_to_walk_from_the_seeds(classes, seed):
         reached = {label: far[cell] for label, far in steps.items() if cell in far}
         nearest = {n for n, far in reached.items() if far == min(reached.values())}
         assert divided[cell] in (nearest or {-1})
-
-
-def test_the_main_direction_is_that_of_the_walls():
-    for angle_rad in (-0.6, -0.2, 0.0, 0.3, 0.7):
-        grid, _ = floor(angle_rad)
-        found = main_direction(grid.measured == CellClass.OCCUPIED)
-        assert abs(found - angle_rad) < 0.03
-
-
-def test_pieces_of_one_rectangle_merge_and_an_l_stays_apart():
-    labels = np.full((20, 30), -1, dtype=np.int32)
-    labels[0:10, 0:10], labels[0:10, 10:20], labels[10:20, 10:14] = 0, 1, 2
-    segments = Segments(labels, 1.0)
-    segments.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
-    merged = segments.label_of
-    assert merged[5, 5] == merged[5, 15] != merged[15, 12]
-    segments.merge_small(50.0)
-    assert (segments.label_of[labels >= 0] == 0).all()
-
-
-def test_a_wall_between_two_pieces_keeps_them_apart():
-    labels = np.full((20, 41), -1, dtype=np.int32)
-    labels[:, :20], labels[:, 21:] = 0, 1
-    labels[8:10, 20] = 0
-    segments = Segments(labels, 0.1)
-    segments.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
-    assert segments.label_of.max() == 1
 
 
 @given(

@@ -10,8 +10,15 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.topology.rooms.cutting import Ground, closed_by_disc, fine_segments, wall_directions
-from hybridnav.topology.rooms.growing import Growth, Likely, Small, contract
-from hybridnav.topology.rooms.merging import EVIDENCE, Forest, JudgedSegments
+from hybridnav.topology.rooms.find import contract
+from hybridnav.topology.rooms.merging import (
+    EVIDENCE,
+    Forest,
+    Growth,
+    JudgedSegments,
+    Likely,
+    Small,
+)
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
 from tests.topology.test_find_rooms import floor
 

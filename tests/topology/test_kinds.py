@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.subjects._rooms_buildings import Building
-from hybridnav.topology.rooms.kinds import kinds_of
+from hybridnav.topology.rooms.listing import kinds_of
 
 SEEN = {
     "2": ({2, 4, 5, 6, 8, 12, 13}, {9}),

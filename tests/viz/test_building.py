@@ -242,19 +242,18 @@ def test_rooms_have_names_and_doors_have_numbers() -> None:
     labels[:, 12:] = 1
     rooms = hn.RoomLabels(("kitchen", "lab"), labels, {}, {7: (3.1, 1.4)})
     animation = ReplayAnimation()
-    for step in steps(3, rooms=rooms, most_cells=40):
+    for step in steps(3, rooms=rooms):
         animation.add(step)
     frame = animation._last
     assert frame is not None
-    places, regions, of_rooms = animation._drawn(frame, known_view(frame.grid)).axes
+    places, of_rooms = animation._drawn(frame, known_view(frame.grid)).axes
     assert places.get_title(loc="left").startswith("map 3")
-    assert "free regions" in regions.get_title(loc="left")
     assert of_rooms.get_title(loc="left") == "2 rooms, 1 doors"
     written = {text.get_gid(): text.get_text() for text in of_rooms.findobj(Text)}
     assert (written["room-0"], written["room-1"], written["door-7"]) == ("kitchen", "lab", "7")
     (dots,) = (line for line in of_rooms.lines if line.get_gid() == "doors")
     assert np.array_equal(dots.get_xydata(), [frame.rooms.doors[7].position])
-    assert not any(text.get_gid() for text in regions.findobj(Text))
+    assert not any(text.get_gid() for text in places.findobj(Text))
 
 
 def test_long_replays_keep_few_frames_and_the_last(tmp_path: Path) -> None:

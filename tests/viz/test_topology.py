@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Curve
-from matplotlib.text import Text
 
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
@@ -293,27 +292,6 @@ def test_figure_1_is_drawn_on_four_given_axes(figure1):
     assert len(lines(axes[2], "parallel-arcs")) == 2
     with pytest.raises(hn.errors.InvalidValueError, match="4 panels, got 3 axes"):
         plot_figure1(figure1, axes=axes[:3])
-
-
-def test_guesses_are_dashed_and_the_title_counts_them():
-    probability = np.full((9, 24), 0.02, np.float32)
-    probability[:, 11] = 0.98
-    probability[[1, 7], 11] = 0.02, 0.19
-    labels = np.tile([0] * 12 + [1] * 12, (9, 1)).astype(np.int32)
-    grid = hn.OccupancyGrid(probability, robot_radius_m=0, name="doors")
-    pyramid = DualGraphPyramid.build(grid, rooms=hn.RoomLabels(("west", "east"), labels))
-    level = pyramid[pyramid.room_level]
-    ax = plot_topology(level, guess_below=0.05)
-    dashed, solid = found(ax, "guessed-parallel-arcs"), found(ax, "parallel-arcs")
-    (line,), (other,) = dashed.get_segments(), solid.get_segments()
-    assert line[:, 1].mean() > other[:, 1].mean()  # the door seen once is the upper one
-    assert dashed.get_linestyle() != solid.get_linestyle()
-    assert "2 arcs, 1 of them guesses" in ax.get_title()
-    texts = [text.get_text() for text in ax.figure.findobj(Text)]
-    assert "guess: margin below 0.05" in texts
-    assert found(plot_topology(level), "guessed-parallel-arcs") is None
-    with pytest.raises(hn.errors.InvalidValueError, match="guess_below must be a margin"):
-        plot_topology(level, guess_below=float("nan"))
 
 
 @pytest.mark.parametrize("plot", [plot_topology, plot_dual])

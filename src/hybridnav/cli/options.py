@@ -25,8 +25,7 @@ T = TypeVar("T")
 """What a command takes: one value or several, with a default or without."""
 
 MapArgument = Annotated[
-    T,
-    typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm)."),
+    T, typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm).")
 ]
 MapOrBuildingArgument = Annotated[
     Path,
@@ -52,12 +51,7 @@ SetOption = Annotated[
     ),
 ]
 RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--robot-radius",
-        metavar="R",
-        help="Robot radius in metres.",
-    ),
+    float | None, typer.Option("--robot-radius", metavar="R", help="Robot radius in metres.")
 ]
 SeedOption = Annotated[
     T,
@@ -160,8 +154,7 @@ LeastIslandOption = Annotated[
     ),
 ]
 MaxCellsOption = Annotated[
-    int,
-    typer.Option("--max-cells", metavar="N", min=1, help="The most cells that a map may have."),
+    int, typer.Option("--max-cells", metavar="N", min=1, help="The most cells that a map may have.")
 ]
 RoomsOption = Annotated[
     Path | None,

@@ -10,7 +10,6 @@ import typer
 
 from hybridnav._base.extension import extension
 from hybridnav.cli import options
-from hybridnav.cli.build import KeepInOption, KeepOption, Source
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_output, check_picture
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.cli.request import (
@@ -83,9 +82,7 @@ ViaOption = Annotated[
 AtOption = Annotated[
     str,
     typer.Option(
-        "--at",
-        metavar="WHERE",
-        help="Where in a room: anywhere (the nearest cell), or its point.",
+        "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
     ),
 ]
 _POSES = (".csv", ".json", ".geojson")
@@ -93,9 +90,7 @@ _POSES = (".csv", ".json", ".geojson")
 LanguageOption = Annotated[
     str,
     typer.Option(
-        "--language",
-        metavar="CODE",
-        help=f"Language of the words: {', '.join(languages())}.",
+        "--language", metavar="CODE", help=f"Language of the words: {', '.join(languages())}."
     ),
 ]
 PosesOption = Annotated[
@@ -136,7 +131,7 @@ WhyOption = Annotated[
 
 
 @with_map(
-    before="keep",
+    before="compare",
     over_floors=lambda: extension("formats", "building").plan_over_floors,
     alone=("no_stairs",),
 )
@@ -157,8 +152,6 @@ def plan(
     profile: options.ProfileOption = None,
     costs: options.CostsOption = None,
     smooth: options.SmoothOption = None,
-    keep: KeepOption = False,
-    keep_in: KeepInOption = None,
     compare: CompareOption = False,
     why: WhyOption = False,
     plot: options.PlotOption = None,
@@ -184,10 +177,7 @@ def plan(
     given = options.parsed_costs(costs)
     check_language(language)
     settings = reading.settings(
-        map_file,
-        preset=options.PRESET if given else None,
-        overrides=given.overrides,
-        smooth=smooth,
+        map_file, preset=options.PRESET if given else None, overrides=given.overrides, smooth=smooth
     )
     closing = options.parsed_closing([*(blocked or ()), *options.out_of_order(map_file)])
     first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
@@ -195,7 +185,9 @@ def plan(
         raise UsageError("--alternatives does not go with --via")
     wanted = wanted_of(alternatives, max_overlap, max_stretch)
     request = Request(
-        source=Source(map_file, settings, reading, keep, keep_in),
+        map_file=map_file,
+        settings=settings,
+        reading=reading,
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
         closing=closing,
         profile=profile,

@@ -14,17 +14,8 @@ import typer
 import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, check_writable, complain, stage
-from hybridnav.cli.options import (
-    FreeOption,
-    LeastIslandOption,
-    MaxCellsOption,
-    OccupiedOption,
-    PresetOption,
-    RadiusOption,
-    SeedOption,
-    SetOption,
-)
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
@@ -40,14 +31,14 @@ _SMOOTH = ("none", "line-of-sight", "arcs")
 class MapOptions:
     """How a command reads its map, and the preset that it takes for it: one group of options."""
 
-    preset: PresetOption[str | None] = None
-    overrides: SetOption = None
-    robot_radius_m: RadiusOption = None
-    seed: SeedOption[int | None] = None
-    free_threshold: FreeOption = None
-    occupied_threshold: OccupiedOption = None
-    least_island_m2: LeastIslandOption = 0.0
-    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS
+    preset: options.PresetOption[str | None] = None
+    overrides: options.SetOption = None
+    robot_radius_m: options.RadiusOption = None
+    seed: options.SeedOption[int | None] = None
+    free_threshold: options.FreeOption = None
+    occupied_threshold: options.OccupiedOption = None
+    least_island_m2: options.LeastIslandOption = 0.0
+    max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS
 
     def settings(
         self,

@@ -11,14 +11,20 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import replace_file
 from hybridnav.cli.common import UsageError, complain, islands_figures, stage
-from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
+from hybridnav.cli.reading import (
+    MapOptions,
+    check_room_to_be,
+    grow_topology,
+    load_model,
+    outside,
+    refused_result,
+)
 from hybridnav.cli.rendering import draw, query_of, respond
 from hybridnav.cli.warm import compiling_beside
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav.cli.build import Source
     from hybridnav.cli.options import Closing, Costs
     from hybridnav.cli.rendering import Waypoint
     from hybridnav.planner.named import At
@@ -37,7 +43,9 @@ class Wanted:
 class Request:
     """What a command line asks for: a plan between two points, or a tour described in rooms."""
 
-    source: Source
+    map_file: Path
+    settings: hn.Preset
+    reading: MapOptions
     waypoints: list[Waypoint]
     """The start, what lies between, the goal."""
     closing: Closing
@@ -69,8 +77,8 @@ class Request:
     def run(self) -> bool:
         """Plan, print the answer, draw it, and return whether it is solved."""
         seconds: dict[str, float] = {}
-        settings, rooms_file = self.source.settings, self._rooms_file()
-        model, key = self.source.load(seconds, rooms_file=rooms_file, needs_rooms=self.is_tour)
+        settings = self.settings
+        model = load_model(self.map_file, settings, seconds, self.reading)
         grid = model.grid
         check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
         closed, costs = self.closing.read(grid), self.costs.read(grid)
@@ -80,15 +88,13 @@ class Request:
             outcome = hn.Tour((refused,), ()) if self.is_tour else refused
             self._respond(grid, outcome, self._beside_refusal(refused), seconds)
             return False
-        topology = self._grown(model, rooms_file, seconds)
+        topology = self._grown(model, seconds)
         with stage("preparing the planner", seconds, "prepare"):
             planner = model.planner(settings, topology=topology, costs=costs)
-            given = planner
             if self.profile is not None:
                 planner = planner.under(self.profile)
                 topology, grid = planner.topology, planner.grid
         outcome = self._planned(planner, closed, seconds)
-        self.source.keep(given, key)
         found = self._alternatives(planner, closed, seconds)
         beside: dict[str, Any] = {}
         if found is not None:
@@ -118,23 +124,20 @@ class Request:
             )
         return outcome.solved
 
-    def _rooms_file(self) -> Path | None:
-        """Return the file of a tour's rooms, by default one in the map's folder."""
-        beside = self.source.map_file.parent / "rooms.yaml"
-        default = beside if self.is_tour and beside.is_file() else None
-        return self.rooms_file or default
+    def _grown(self, model: hn.Model, seconds: dict[str, float]) -> hn.TopologicalMap:
+        """Build the pyramid, with rooms for a tour, while the search is compiled.
 
-    def _grown(
-        self, model: hn.Model, rooms_file: Path | None, seconds: dict[str, float]
-    ) -> hn.TopologicalMap:
-        """Build the pyramid, with rooms for a tour, while the search is compiled."""
-        if model.rooms is not None and (self.rooms_file is None or model.key is not None):
-            rooms_file = None  # the model has them
-        elif self.is_tour and rooms_file is None:
+        They are those of a file that is named, of the model, of a file in the map's folder, or
+        found.
+        """
+        rooms_file, beside = self.rooms_file, self.map_file.parent / "rooms.yaml"
+        if rooms_file is None and model.rooms is None and self.is_tour:
+            rooms_file = beside if beside.is_file() else None
+        if self.is_tour and rooms_file is None and model.rooms is None:
             complain(
                 "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
             )
-        settings = self.source.settings
+        settings = self.settings
         with compiling_beside(settings) as compiled:
             topology = grow_topology(
                 model,
@@ -201,15 +204,12 @@ class Request:
         return {"why": tightest.to_dict() | {"words": tightest.words(self.language)}}
 
     def _on_whole_grid(
-        self,
-        topology: hn.TopologicalMap,
-        closed: hn.Blocked | None,
-        costs: hn.CostLayer | None,
+        self, topology: hn.TopologicalMap, closed: hn.Blocked | None, costs: hn.CostLayer | None
     ) -> hn.PlanResult:
         # Loads pydantic, which help can do without.
         from hybridnav.planner import CostSettings, planner_settings  # noqa: PLC0415
 
-        settings = self.source.settings
+        settings = self.settings
         own, by = settings.planner, CostSettings(clearance=settings.planner.clearance)
         allowed = own.allow_unexplored
         whole = planner_settings("grid-astar", allow_unexplored=allowed, costs=by)
@@ -234,7 +234,7 @@ class Request:
         beside: dict[str, Any],
         seconds: dict[str, float],
     ) -> None:
-        figures = outcome.to_dict() | {"map": str(self.source.map_file)}
+        figures = outcome.to_dict() | {"map": str(self.map_file)}
         if isinstance(outcome, hn.Tour):
             figures["words"] = outcome.words(self.language)
         islands, closed = islands_figures(grid), self.closing.to_dict()

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import options
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     EXIT_SOLVED,
@@ -22,18 +24,9 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.older import Older, older_files
-from hybridnav.cli.options import (
-    ForceOption,
-    JsonOption,
-    MapArgument,
-    OutOption,
-    PlotOption,
-    RoomsOption,
-)
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
 from hybridnav.maps import CellClass
-from hybridnav.maps.names import Segmentation, read_point
+from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,18 +34,9 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.room_labels import Point
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.topology.rooms import CarriedNames, Door, Rooms
     from hybridnav.topology.rooms.files.text import RoomMeasures
 
-MethodOption = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        metavar="NAME",
-        help=f"How rooms are found: {', '.join(get_args(Segmentation))}.",
-        show_default="judged",
-    ),
-]
 LeastAreaOption = Annotated[
     float | None,
     typer.Option(
@@ -99,27 +83,25 @@ NamesMapOption = Annotated[
     ),
 ]
 FindOption = Annotated[
-    bool,
-    typer.Option("--find", help="Find rooms anew, although the map has some, or its folder."),
+    bool, typer.Option("--find", help="Find rooms anew, although the map has some, or its folder.")
 ]
 
 
 @with_map(before="at")
 def rooms(
-    map_file: MapArgument[Path],
-    out: OutOption[Path | None] = None,
-    method: MethodOption = None,
+    map_file: options.MapArgument[Path],
+    out: options.OutOption[Path | None] = None,
     least_area_m2: LeastAreaOption = None,
-    rooms_file: RoomsOption = None,
+    rooms_file: options.RoomsOption = None,
     find: FindOption = False,
     names_from: NamesFromOption = None,
     names_map: NamesMapOption = None,
     at: AtOption = None,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
     tolerance_m: ToleranceOption = None,
     everything: AllOption = False,
-    as_json: JsonOption = False,
-    plot: PlotOption = None,
+    as_json: options.JsonOption = False,
+    plot: options.PlotOption = None,
     *,
     reading: MapOptions,
 ) -> None:
@@ -130,12 +112,10 @@ def rooms(
     """
     asked = _asked_point(at, out, plot)
     _check_files(out, plot, tolerance_m, force=force)
-    finding = {"--method": method, "--least-area": least_area_m2, "--find": find or None}
-    asked_for = [option for option, value in finding.items() if value is not None]
-    if rooms_file is not None and asked_for:
-        raise UsageError(f"{asked_for[0]} is for rooms that are found, --rooms reads them")
-    finds = bool(asked_for)
-    checked = _checked_method("judged" if method is None else method)
+    finds = find or least_area_m2 is not None
+    if rooms_file is not None and finds:
+        option = "--find" if least_area_m2 is None else "--least-area"
+        raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
     older = older_files(names_from, names_map)
     settings = reading.settings(map_file)
@@ -153,7 +133,7 @@ def rooms(
         if rooms_file is not None:
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:
-            labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
+            labels = hn.find_rooms(grid, least_area_m2=area_m2)
     old = None
     if older is not None:
         with stage("carrying names", seconds, "names"):
@@ -223,14 +203,6 @@ def _check_files(
         raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")
 
 
-def _checked_method(method: str) -> Segmentation:
-    for known in get_args(Segmentation):
-        if known == method:
-            return cast("Segmentation", known)
-    known = ", ".join(get_args(Segmentation))
-    raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
-
-
 def _asked_point(text: str | None, out: Path | None, plot: Path | None) -> Point | None:
     """Return the point of `--at`, which stands alone."""
     if text is None:
@@ -273,7 +245,7 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "area_m2": round(area_m2, 6),
                 "kind": None if kind is None else kind.name,
                 "kind_confidence": None if kind is None else round(kind.confidence, 3),
-                "point_m": _at(rooms, name),
+                "point_m": _rounded(rooms.point_of(name)),
                 "centre_m": _rounded(facts.centre_m),
                 "extent_m": [_rounded(facts.low_m), _rounded(facts.high_m)],
                 "fits": fits,
@@ -311,10 +283,6 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
             for door in rooms.doors
         ],
     }
-
-
-def _at(rooms: Rooms, name: str) -> list[float]:
-    return _rounded(rooms.point_of(name))
 
 
 def _rounded(point: tuple[float, float]) -> list[float]:
@@ -359,7 +327,7 @@ def _listing(rooms: Rooms, areas_m2: FloatArray, *, everything: bool) -> str:
     for number, (name, kind, area_m2, fits, facts, beside) in enumerate(each, start=1):
         if not is_shown[number - 1]:
             continue
-        point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
+        point = "({:.2f}, {:.2f})".format(*_rounded(rooms.point_of(name)))
         size = "{:.1f} x {:.1f} m".format(*facts.size_m)
         stated = [] if kind is None else [kind.name]
         stated += [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
@@ -375,3 +343,107 @@ def _door(door: Door, other: str | None) -> str:
     narrow = "" if door.passable else ", too narrow"
     opening = "opening " if door.is_opening else ""
     return f"{other or '-'} ({opening}{door.number}: {door.width_m:.2f} m{narrow})"
+
+
+_MOST_HEAD = 4096
+"""Bytes of a file in which the image of a map is named."""
+
+
+def older_files(names_from: Path | None, names_map: Path | None) -> tuple[Path, Path] | None:
+    """Return a file of rooms and its map: the given one, or the only one in the folder; None
+    without a file."""
+    if names_from is None:
+        if names_map is not None:
+            raise UsageError("--names-map is the map of --names-from: give both")
+        return None
+    if not names_from.is_file():
+        raise hn.errors.RoomsNotFoundError(f"rooms {printable(names_from)}: no such file")
+    if names_map is not None:
+        return names_from, names_map
+    found = []
+    for path in sorted(names_from.absolute().parent.glob("*.yaml")):
+        with path.open("rb") as file:
+            lines = file.read(_MOST_HEAD).splitlines()
+        found += [path] if any(line.startswith(b"image:") for line in lines) else []
+    if len(found) != 1:
+        raise UsageError(
+            f"--names-from needs the map of these rooms, and their folder has {len(found)}: "
+            "name it with --names-map OLD"
+        )
+    return names_from, found[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Older:
+    """The older map, and what its names became."""
+
+    rooms: hn.RoomLabels
+    grid: hn.OccupancyGrid
+    carried: CarriedNames
+
+    @classmethod
+    def of(
+        cls,
+        files: tuple[Path, Path],
+        reading: MapOptions,
+        new: tuple[hn.RoomLabels, hn.OccupancyGrid],
+    ) -> Older:
+        """Read a file of rooms and its map, and carry the names; refuse a map that does not fit."""
+        from hybridnav.topology.rooms import carry_names  # noqa: PLC0415 - loads numba
+
+        before = hn.load_map(
+            files[1],
+            robot_radius_m=new[1].robot_radius_m,
+            free_threshold=reading.free_threshold,
+            occupied_threshold=reading.occupied_threshold,
+            max_cells=reading.max_cells,
+        )
+        rooms = hn.load_rooms(files[0], before)
+        carried = carry_names(rooms, before, *new)
+        if carried.transform is None:
+            raise hn.errors.RoomsError(
+                f"rooms {printable(files[0])}: no name is carried from "
+                f"{printable(before.name)} to {printable(new[1].name)}: {carried.reason}"
+            )
+        return cls(rooms, before, carried)
+
+    @property
+    def topology(self) -> hn.TopologicalMap:
+        """The older map with its rooms, for a picture."""
+        return hn.TopologicalMap(hn.DualGraphPyramid.build(self.grid, rooms=self.rooms))
+
+    def lines(self) -> list[str]:
+        """Return what became of the names, for people."""
+        to = self.carried
+        assert to.transform is not None  # noqa: S101 - `of` refuses it
+        counts = []
+        for what, each in (("rooms", to.rooms), ("doors", to.doors)):
+            kept = sum(one.status == "carried" for one in each.values())
+            counts.append(f"{kept} of {len(each)} {what}")
+        x, y = to.transform.translation_m
+        turn = math.degrees(to.transform.rotation_rad)
+        moved = f"turned by {turn:.2f} degrees, moved by ({x:.2f}, {y:.2f}) m"
+        whose = printable(self.grid.name)
+        lines = [f"names      of {whose}: {' and '.join(counts)} carried; {moved}"]
+        for status in ("undecided", "lost"):
+            rooms = [(name, one.reason) for name, one in to.rooms.items() if one.status == status]
+            lines += [f"{status:<10} {name}: {reason}" for name, reason in rooms]
+            gone = [str(n) for n, one in to.doors.items() if one.status == status]
+            lines += [f"{status:<10} doors {', '.join(gone)}"] if gone else []
+        lines += [f"new        {', '.join(to.new_rooms)}"] if to.new_rooms else []
+        if to.lost_points:
+            lines.append(f"lost       points {', '.join(to.lost_points)}")
+        return lines
+
+    def figures(self) -> dict[str, Any]:
+        """Return what became of the names, as plain values."""
+        to = self.carried
+        assert to.transform is not None  # noqa: S101 - `of` refuses it
+        return {
+            **asdict(to.transform),
+            "rooms": {name: asdict(one) for name, one in to.rooms.items()},
+            "doors": {str(number): asdict(one) for number, one in to.doors.items()},
+            "new_rooms": to.new_rooms,
+            "new_doors": to.new_doors,
+            "lost_points": to.lost_points,
+        }

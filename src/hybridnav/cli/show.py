@@ -30,17 +30,6 @@ LevelOption = Annotated[
         help="Level to describe and draw: 0 the base, -1 the apex; else the apex, or the regions.",
     ),
 ]
-GuessOption = Annotated[
-    float | None,
-    typer.Option(
-        "--guess-below",
-        metavar="M",
-        min=0,
-        max=1,
-        help="Count the arcs that end to exist if a threshold moves by less than M, and draw the "
-        "graph, these arcs dashed.",
-    ),
-]
 ProofArgument = Annotated[
     Path,
     typer.Argument(metavar="PROOF", help="JSON of hybridnav plan --proof, or of PlanResult.proof."),
@@ -52,7 +41,6 @@ def show(
     map_file: MapArgument[Path],
     level: LevelOption = None,
     regions: RegionsOption = None,
-    guess_below: GuessOption = None,
     plot: PlotOption = None,
     *,
     reading: MapOptions,
@@ -72,17 +60,12 @@ def show(
     if not model.is_filed:
         seconds = {"load": seconds["load"], **pyramid.stats.seconds}
     shown = pyramid[level]
-    about = _describe_level(shown) + _describe_guesses(shown, guess_below)
-    parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), about]
+    parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
     if plot is not None:
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
-        if guess_below is None:
-            axes = viz.plot_level(shown)
-        else:
-            axes = viz.plot_topology(shown, guess_below=guess_below)
-        viz.save_figure(axes, plot)
+        viz.save_figure(viz.plot_level(shown), plot)
 
 
 def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
@@ -144,17 +127,6 @@ def _describe_level(level: hn.Level) -> str:
     return (
         f"level {level.index:<4} {vertices}, "
         f"the largest of {largest_m2:.2f} m²; {parallel:,} parallel arcs"
-    )
-
-
-def _describe_guesses(level: hn.Level, guess_below: float | None) -> str:
-    """Return a line on the arcs that a small move of a threshold ends, where asked for."""
-    if guess_below is None:
-        return ""
-    guesses = int((level.certainty.margin < guess_below).sum())
-    return (
-        f"\ncertainty  {guesses:,} of {level.n_arcs:,} arcs are guesses: "
-        f"a threshold moved by less than {guess_below:g} ends them"
     )
 
 

@@ -157,11 +157,6 @@ def _check_metric(preset: Preset, *, by_costs: bool) -> None:
             f"preset {preset.name}: space {ompl.space} needs headings at start and goal, and the "
             "harness asks for paths between cells: it evaluates space r2"
         )
-    if ompl.objective != "length":
-        raise InvalidValueError(
-            f"preset {preset.name}: the harness measures lengths, objective {ompl.objective} makes "
-            "something else small: it evaluates objective length"
-        )
     from hybridnav.refine.ompl import require_ompl  # noqa: PLC0415 - workers need it not
 
     require_ompl()

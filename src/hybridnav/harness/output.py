@@ -9,7 +9,6 @@ import numpy as np
 
 from hybridnav._base.files import replace_file, without_controls
 from hybridnav.harness.analysis import Study, load_study, pairs_in_common
-from hybridnav.harness.cases import cases_of, counter_examples
 from hybridnav.harness.columns import (
     CONSISTENCY_COLUMNS,
     DEFINITION,
@@ -22,7 +21,13 @@ from hybridnav.harness.columns import (
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
-from hybridnav.harness.report import MapSection, ReportData, render_report
+from hybridnav.harness.report import (
+    MapSection,
+    ReportData,
+    cases_of,
+    counter_examples,
+    render_report,
+)
 from hybridnav.harness.tables import (
     METHOD_COLUMNS,
     Table,
@@ -40,7 +45,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.cases import CaseKey
+    from hybridnav.harness.report import CaseKey
     from hybridnav.harness.tables import Row
     from hybridnav.harness.yardstick import Optimum, Yardstick
 

@@ -105,12 +105,7 @@ def _cells_over(positions: list[float], count: int) -> tuple[int, int]:
 
 def class_rules(grid: OccupancyGrid) -> tuple[float, ...]:
     """Return what decides on the class of a cell beside the probabilities."""
-    return (
-        grid.free_threshold,
-        grid.occupied_threshold,
-        grid.robot_radius_m,
-        grid.least_island_m2,
-    )
+    return (grid.free_threshold, grid.occupied_threshold, grid.robot_radius_m, grid.least_island_m2)
 
 
 def class_reach(grid: OccupancyGrid) -> int:

@@ -44,34 +44,6 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
     return _within_distance(occupied, squared)
 
 
-def greatest_within(values: FloatArray, *, radius_cells: float) -> FloatArray:
-    """Return the greatest value within a radius of each cell, of the same shape.
-
-    Parameters
-    ----------
-    values
-        Shape `(rows, cols)`, no NaN.
-    radius_cells
-        Radius in cells, finite and >= 0; distances are compared as in `within_radius`.
-    """
-    if radius_cells < 1:
-        return values.copy()
-    from scipy import ndimage  # noqa: PLC0415 - on demand, as above
-
-    reach = min(radius_cells, math.hypot(*values.shape))
-    squared = math.floor(reach * reach * (1 + _ROUNDING))
-    greatest = values.copy()
-    for down in range(min(math.isqrt(squared) + 1, len(values))):
-        width = 2 * min(math.isqrt(squared - down**2), values.shape[1]) + 1
-        in_row = ndimage.maximum_filter1d(values, width, axis=1, mode="constant", cval=-math.inf)
-        for here, there in (
-            (greatest[down:], in_row[: len(values) - down]),
-            (greatest[: len(values) - down], in_row[down:]),
-        ):
-            np.maximum(here, there, out=here)
-    return greatest
-
-
 def squares_near(occupied: BoolArray, reach: int) -> AnyArray:
     """Return the squared distance from each cell to the nearest occupied one, where it is small.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError, brief
 
@@ -16,9 +16,6 @@ MAX_NAME = 80
 """Characters of a name at most."""
 MAX_NUMBER = 1_000_000_000
 """Number of a door at most."""
-
-Segmentation = Literal["judged", "walls", "watershed"]
-"""How rooms may be found; see `hybridnav.topology.rooms.find_rooms`."""
 
 
 def read_point(text: str) -> tuple[float, ...] | None:

@@ -144,9 +144,7 @@ class OccupancyGrid:
             classes = np.where(blocked, np.uint8(CellClass.OCCUPIED), measured)
         if self.least_island_m2 > 0:
             classes, dropped = without_islands(
-                classes,
-                least_area_m2=self.least_island_m2,
-                cell_area_m2=self.frame.cell_area_m2,
+                classes, least_area_m2=self.least_island_m2, cell_area_m2=self.frame.cell_area_m2
             )
             object.__setattr__(self, "dropped", dropped)
         for name, array in (

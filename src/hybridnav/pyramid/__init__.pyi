@@ -1,4 +1,3 @@
-from .certainty import Certainty as Certainty
 from .graphs import (
     CombinatorialMap as CombinatorialMap,
     DualGraph as DualGraph,

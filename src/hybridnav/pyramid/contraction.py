@@ -12,8 +12,8 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
-from hybridnav.pyramid import darts as dart_kernels
 from hybridnav.pyramid.kernels import base as _base_kernels
+from hybridnav.pyramid.kernels import darts as dart_kernels
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels

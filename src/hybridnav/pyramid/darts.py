@@ -6,15 +6,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from hybridnav.pyramid.kernels.darts import (
-    CONTRACTED,
-    Darts,
-    base_sigma,
-    compact_darts,
-    contract,
-    next_at_cell,
-    simplify,
-)
+from hybridnav.pyramid.kernels.darts import Darts
 from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
 
 if TYPE_CHECKING:
@@ -22,15 +14,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import IntArray, LongArray
 
-__all__ = [
-    "CONTRACTED",
-    "Darts",
-    "base_sigma",
-    "compact_darts",
-    "contract",
-    "next_at_cell",
-    "simplify",
-]
+__all__ = ["WORST_RANK", "Darts", "Resists", "Steering"]
 
 
 WORST_RANK: int = ATTRIBUTE_MAX

@@ -161,13 +161,11 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
     most_cells: int,
     seed: int,
     rooms: IntArray | None = None,
-    regions: IntArray | None = None,
 ) -> tuple[Record, BuildStats]:
     """Contract the arcs of the place level in the order of the expansion rating, up to the apex.
 
     There are two rounds: up to a number of cells a field, which makes the regions, and without such
-    a limit. With rooms the first two stay inside them, and a third one forgets them. With regions
-    the first one stays inside these.
+    a limit. With rooms the first two stay inside them, and a third one forgets them.
 
     Parameters
     ----------
@@ -181,8 +179,6 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
         Breaks ties between arcs of equal rating.
     rooms
         int32, label of each cell's room, -1 for none.
-    regions
-        int32, the same for regions that are known; not with rooms.
 
     Returns
     -------
@@ -190,15 +186,12 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
         Up to the level of the places they describe the same levels.
     """
     classes = places.grid.classes
-    labels = rooms if regions is None else regions
-    kinds = classes if labels is None else kinds_of(classes, labels)
+    kinds = classes if rooms is None else kinds_of(classes, rooms)
     run = Decimation(start_at_level(places, record, kinds), seed)
     run.recall(stats)
     expansion = Expansion(places, most_cells)
     run.steer(expansion)
     run.exhaust()
-    if regions is not None:
-        run.forget_rooms()
     expansion.lift_limit()
     run.exhaust()
     if rooms is not None:

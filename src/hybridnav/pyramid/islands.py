@@ -55,11 +55,7 @@ class Islands:
         first = _first_cells(component_of, int(component_of.max(initial=-1)) + 1)
         rows, cols = np.divmod(first, classes.shape[1])
         return cls(
-            obstacle_of,
-            west,
-            component_of,
-            first,
-            label[rows + 1, cols].astype(np.int64) - 1,
+            obstacle_of, west, component_of, first, label[rows + 1, cols].astype(np.int64) - 1
         )
 
     @property

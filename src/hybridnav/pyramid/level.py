@@ -15,7 +15,6 @@ from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import STRAIGHT, length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
-from hybridnav.pyramid.certainty import Certainty, certainty_of
 from hybridnav.pyramid.cracks import boundaries_of, cell_pairs, endpoints_of, middles_of, sides_of
 from hybridnav.pyramid.graphs import (
     DualGraph,
@@ -258,14 +257,8 @@ class Level:
         outer = self.face_darts(self._islands.found.component_cell, _SOUTH)
         return DualGraph.of_map(self.darts, outer[outer >= 0])
 
-    def to_networkx(self, *, certainty: bool = False) -> nx.MultiGraph[int]:
+    def to_networkx(self) -> nx.MultiGraph[int]:
         """Return the level as a multigraph, with its parallel arcs and self-loops.
-
-        Parameters
-        ----------
-        certainty
-            Whether edges have `free_from`, `free_below`, `occupied_above` and `margin` of
-            `Certainty`, too.
 
         Returns
         -------
@@ -285,7 +278,6 @@ class Level:
             through_m=self.through_m.tolist(),
             n_cracks=self.n_cracks.tolist(),
             base_pair=self.base_pairs.tolist(),
-            **(self.certainty.columns() if certainty else {}),
         )
 
     def dual_to_networkx(self) -> nx.MultiGraph[int]:
@@ -381,12 +373,6 @@ class Level:
         turned = self.field_of[tuple(pairs[:, 0].T)] != self.arcs[arc, 0]
         pairs[turned] = pairs[turned, ::-1]
         return pairs
-
-    @cached_property
-    def certainty(self) -> Certainty:
-        """The thresholds of the map at which each arc exists."""
-        table = self.boundary_table
-        return certainty_of(self._grid, self.field_of, self.classes, self.arcs, table)
 
     @cached_property
     def boundary_middles(self) -> FloatArray:

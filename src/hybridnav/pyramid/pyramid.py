@@ -132,9 +132,7 @@ class DualGraphPyramid:
         vars(pyramid[pyramid.place_level])["darts"] = darts
         return pyramid
 
-    def with_regions(
-        self, most_cells: int, *, region_of: ArrayLike | None = None
-    ) -> DualGraphPyramid:
+    def with_regions(self, most_cells: int) -> DualGraphPyramid:
         """Let contraction go on above the places: to regions, and from there to the apex.
 
         All levels up to the places are those of this pyramid. Above them, the arcs with the
@@ -148,73 +146,36 @@ class DualGraphPyramid:
         ----------
         most_cells
             Most cells of a region, >= 1; a place that has more is a region by itself.
-        region_of
-            The regions, if they are known: whole numbers >= 0 (n_places,), one for each vertex of
-            the level of the places. None to find them.
 
         Returns
         -------
         DualGraphPyramid
-            This pyramid itself if it has such regions and none are given, else another one.
+            This pyramid itself if it has such regions, else another one.
 
         Raises
         ------
         InvalidValueError
-            When the number is not a whole number >= 1; when regions are given to a pyramid with
-            rooms, or they are no connected sets of places of one class with so many cells.
+            When the number is not a whole number >= 1.
         """
         most_cells = checked_most_cells(most_cells)
-        if self.region_cells == most_cells and region_of is None:
+        if self.region_cells == most_cells:
             return self
         if self._below is not None:
-            return self._below.with_regions(most_cells, region_of=region_of)
+            return self._below.with_regions(most_cells)
         # Loading a model needs no decimation.
         from hybridnav.pyramid.decimation import go_on_above  # noqa: PLC0415
 
-        places = self[self.place_level]
-        known = None if region_of is None else self._checked_regions(region_of, most_cells)
         record, stats = go_on_above(
-            places,
+            self[self.place_level],
             self._record,
             self.stats,
             most_cells=most_cells,
             seed=self.seed,
             rooms=None if self.rooms is None else self.rooms.label_of,
-            regions=None if known is None else np.append(known, -1)[places.field_of],
         )
-        n_regions = stats.sizes[stats.tops[1]].vertices
-        if known is not None and n_regions != len(np.unique(known)):
-            raise InvalidValueError(
-                f"{len(np.unique(known))} regions were given, but their places make {n_regions} "
-                "connected sets of one class: give each of these a number of its own"
-            )
         return replace(
-            self,
-            stats=stats,
-            region_cells=most_cells,
-            _record=record,
-            _levels={},
-            _below=self,
+            self, stats=stats, region_cells=most_cells, _record=record, _levels={}, _below=self
         )
-
-    def _checked_regions(self, region_of: ArrayLike, most_cells: int) -> IntArray:
-        """Return the regions of the places, int32, numbered from 0, after a check."""
-        given, places = np.asarray(region_of), self[self.place_level]
-        fits = given.shape == (places.n_vertices,) and np.issubdtype(given.dtype, np.integer)
-        if self.rooms is not None or not fits or given.min(initial=0) < 0:
-            raise InvalidValueError(
-                f"region_of is {region_of!s:.60}, expected whole numbers >= 0 for the "
-                f"{places.n_vertices} places of a pyramid without rooms"
-            )
-        _, known, n_places = np.unique(given, return_inverse=True, return_counts=True)
-        cells = np.bincount(known, places.areas, minlength=len(n_places))
-        too_large = np.flatnonzero((cells > most_cells) & (n_places > 1))
-        if len(too_large):
-            raise InvalidValueError(
-                f"a region of {n_places[too_large[0]]} places has {cells[too_large[0]]:.0f} cells, "
-                f"expected at most {most_cells}"
-            )
-        return known.astype(np.int32)
 
     @property
     def record(self) -> Record:

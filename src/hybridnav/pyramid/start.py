@@ -334,13 +334,7 @@ def make_templates() -> Templates:
         for u in (True, False)
     )
     return Templates(
-        vertex_end,
-        parent_rows,
-        parent_cols,
-        inside_east,
-        inside_north,
-        across_east,
-        across_north,
+        vertex_end, parent_rows, parent_cols, inside_east, inside_north, across_east, across_north
     )
 
 

@@ -72,11 +72,7 @@ class CostLine:
     """
 
     def __init__(
-        self,
-        grid: OccupancyGrid,
-        layer: CostLayer,
-        *,
-        allow_unexplored: bool = False,
+        self, grid: OccupancyGrid, layer: CostLayer, *, allow_unexplored: bool = False
     ) -> None:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting

@@ -286,11 +286,7 @@ class GridRefiner:
     """
 
     def __init__(
-        self,
-        grid: OccupancyGrid,
-        *,
-        allow_unexplored: bool = False,
-        costs: CostLayer | None = None,
+        self, grid: OccupancyGrid, *, allow_unexplored: bool = False, costs: CostLayer | None = None
     ) -> None:
         self.grid = grid
         self.costs = costs

@@ -37,7 +37,6 @@ Metric = Literal[
     "weighted",
     "any-angle",
     "any-angle-weighted",
-    "clearance-weighted",
     "dubins",
     "reeds-shepp",
 ]

@@ -24,10 +24,6 @@ PARALLEL = "#0077bb"
 SELF_LOOP = "#cc3311"
 SELF_LOOP_DASHES = (0.0, (3.0, 1.2))
 """Lengths in line widths. Printed in grey, self-loops are no darker than parallel arcs."""
-GUESS_DASHES = (0.0, (1.6, 1.6))
-"""Dashes of arcs that are guesses, shorter than those of self-loops."""
-GUESS_DOTS = (0.0, (0.8, 1.8))
-"""Dots of self-loops that are guesses."""
 HOLE = "#d55e00"
 OUTSIDE = "#882255"
 ROUTES = (PATH, "#4837b6", "#e49b34", "#110328", "#8c8d8c")

@@ -36,8 +36,6 @@ LEAST_AREA_M2 = 0.1
 FAINT = 0.4
 """Share of its colour that the map keeps under a graph."""
 _DASHED: dict[str, Any] = {"linestyles": [style.SELF_LOOP_DASHES], "capstyle": "butt"}
-_DOTTED: dict[str, Any] = {"linestyles": [style.GUESS_DOTS], "capstyle": "butt"}
-_GUESS: dict[str, Any] = {"linestyles": [style.GUESS_DASHES], "capstyle": "butt"}
 _CLASSES = (style.BLOCKED, style.FREE, style.UNEXPLORED)
 _CLEARANCE = 3.2  # points on a picture of full width
 _LEAST_CLEARANCE = 1.5  # cells: less would follow their steps
@@ -49,15 +47,6 @@ class Graph:
 
     level: Level
     least_area_m2: float
-    guess_below: float = 0.0
-
-    @cached_property
-    def guessed(self) -> BoolArray:
-        """Mask of the arcs that are guesses: their margin of certainty is below `guess_below`."""
-        if self.guess_below == 0:
-            return np.zeros(self.level.n_arcs, dtype=np.bool_)
-        guessed: BoolArray = self.level.certainty.margin < self.guess_below
-        return guessed
 
     @cached_property
     def positions(self) -> FloatArray:
@@ -127,7 +116,6 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     ax: Axes | None = None,
     simple: bool = False,
     least_area_m2: float = LEAST_AREA_M2,
-    guess_below: float = 0.0,
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
@@ -149,9 +137,6 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     least_area_m2
         Places under this area in square metres, their arcs, and self-loops round less than it are
         not drawn; the title counts such places.
-    guess_below
-        Arcs whose margin of certainty is below it are guesses, drawn dashed, and as self-loops
-        dotted: they end to exist if a threshold moves by less. 0 draws all alike.
     title
         Title instead of the map's name and the counts; empty for none.
     width_in
@@ -165,7 +150,7 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     Raises
     ------
     InvalidValueError
-        When the level has more than 20,000 vertices, or `guess_below` is not from 0 to 1.
+        When the level has more than 20,000 vertices.
 
     Examples
     --------
@@ -175,11 +160,9 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     'graph'
     """
     level = drawable(places)
-    if not 0 <= guess_below <= 1:
-        raise InvalidValueError(f"guess_below must be a margin from 0 to 1, got {guess_below}")
     canvas = Canvas.opened(ax, width_in, known_view(level.grid))
     draw_ground(canvas, level.grid, level.grid.classes, style.rgb(*_CLASSES))
-    graph = Graph(level, least_area_m2, guess_below)
+    graph = Graph(level, least_area_m2)
     draw_graph(canvas, graph, simple=simple)
     words = _words(graph, simple=simple) if title is None else [title]
     return finish(canvas, graph_entries(graph, canvas.sizes, simple=simple), words, framed=True)
@@ -215,14 +198,9 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
     else:
         curves = graph.curves(_CLEARANCE * sizes.line / metre)
         for mask, colour, gid in graph.kinds():
-            loops = gid == "self-loops"
-            for arcs, own, name in (
-                (mask & ~graph.guessed, _DASHED if loops else {}, gid),
-                (mask & graph.guessed, _DOTTED if loops else _GUESS, f"guessed-{gid}"),
-            ):
-                lines = [curves[arc] for arc in np.flatnonzero(arcs).tolist() if arc in curves]
-                if lines or name == gid:
-                    canvas.add_lines(lines, colors=colour, **look | own, gid=name)
+            own = _DASHED if gid == "self-loops" else {}
+            lines = [curves[arc] for arc in np.flatnonzero(mask).tolist() if arc in curves]
+            canvas.add_lines(lines, colors=colour, **look | own, gid=gid)
     free = level.classes == CellClass.FREE
     for mask, colour, size, gid in (
         (~free, style.UNEXPLORED_NODE, 4.2, "unexplored-dots"),
@@ -252,8 +230,7 @@ def _words(graph: Graph, *, simple: bool) -> list[str]:
         words.append(f"parallel arcs dropped: {report.n_parallel_dropped}")
         words.append(f"self-loops dropped: {report.n_self_loops_dropped}")
     else:
-        guesses = f", {graph.guessed.sum()} of them guesses" if graph.guess_below else ""
-        words.append(f"{level.n_arcs} arcs{guesses}")
+        words.append(f"{level.n_arcs} arcs")
     hidden = int((~graph.seen).sum())
     if hidden:
         words.append(f"places under {graph.least_area_m2:g} m² not drawn: {hidden}")
@@ -280,9 +257,6 @@ def graph_entries(graph: Graph, sizes: Sizes, *, simple: bool) -> list[Entry]:
     if not simple and graph.level.is_self_loop.any():
         loop = Line2D([], [], color=style.SELF_LOOP, lw=width, ls=style.SELF_LOOP_DASHES)
         entries.append((loop, "self-loop"))
-    if (graph.guessed & graph.plain).any() and not simple:
-        guess = Line2D([], [], color=style.INK, lw=width, ls=style.GUESS_DASHES)
-        entries.append((guess, f"guess: margin below {graph.guess_below:g}"))
     return entries
 
 

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections import Counter
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,8 +17,6 @@ from hybridnav.ext.live import OnlineRooms, ReplayFigures, grids_of_scans, repla
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser
 from hybridnav.ext.live.replay import faults_of
 from hybridnav.maps import Frame, OccupancyGrid
-from tests.ext.live.test_regions import check_events as check_regions_update
-from tests.ext.live.test_regions import check_levels, check_partition
 from tests.ext.live.test_rooms import check_update as check_rooms_update
 from tests.ext.live.test_rooms import check_version as check_rooms
 from tests.ext.live.test_updates import check_version as check_places
@@ -146,36 +143,7 @@ def test_a_replay_counts_what_happens():
     assert (found["maps"], found["n_rooms"], found["faults"]) == (5, 2, [])
     assert (found["rooms"]["updates"], found["rooms"]["born"], found["rooms"]["died"]) == (4, 1, 0)
     assert found["doors"] == dict.fromkeys([*EVENTS, "changed"], 0) | {"born": 1, "died": 1}
-    assert found["n_regions"] is None
-    assert "regions" not in found
     assert found["rooms"]["untouched"]["flipped"] == 0
-
-
-def test_regions_are_followed_if_asked_for():
-    steps: list[Any] = list(replay(changing_grids(), merge_distance_m=1.0, most_cells=60))
-    figures, n_events = ReplayFigures(), Counter[str]()
-    assert steps[0].regions_update is None
-    for before, after in itertools.pairwise(steps):
-        assert after.regions is after.regions_update.version
-        assert after.regions.places is after.places
-        old, new = Cells(before.places, before.regions), Cells(after.places, after.regions)
-        check_flips(after.region_flips, old, new, (old.grid.classes, new.grid.classes))
-        n_events.update({name: len(getattr(after.regions_update, name)) for name in EVENTS})
-    for step in steps:
-        figures.add(step)
-    found, last = figures.figures(), steps[-1]
-    assert found["n_regions"] == last.regions.n_regions > 1
-    assert found["levels"] == len(last.regions.pyramid) > len(last.places.pyramid)
-    assert found["faults"] == []
-    assert {name: found["regions"][name] for name in EVENTS} == n_events
-    assert n_events["born"] > 0
-
-
-class Cells:
-    """The numbers of cells of a version, with their map."""
-
-    def __init__(self, places, version):
-        self.grid, self.number_of = places.grid, version.number_of
 
 
 def test_named_rooms_are_followed_and_lost_names_are_counted():
@@ -204,23 +172,16 @@ def simulated_scans():
 def test_a_replay_of_scans_ends_in_what_the_oracle_reads():
     scans = simulated_scans()
     grids = grids_of_scans(scans, Mapper(resolution_m=0.25), every=2, robot_radius_m=0)
-    steps = list(replay(grids, merge_distance_m=1.5, rooms_every=2, most_cells=80))
+    steps = list(replay(grids, merge_distance_m=1.5, rooms_every=2))
     whole = Mapper(resolution_m=0.25)
     for scan in scans:
         whole.add(scan)
     grid, last = whole.to_grid(robot_radius_m=0), steps[-1]
     assert np.array_equal(last.places.grid.classes, grid.classes)
     assert last.number == 5
-    assert last.regions is not None
     check_places(last.places)
     check_rooms(last.rooms)
-    check_partition(last.regions)
-    check_levels(last.regions)
-    assert faults_of(last.regions.pyramid) == []
-    for before, after in itertools.pairwise(steps):
-        check_regions_update(
-            before.regions, after.regions_update, shift(before.places, after.places)
-        )
+    assert faults_of(last.places.pyramid) == []
     with_rooms = [steps[0], *(step for step in steps if step.rooms_update is not None)]
     for before, after in itertools.pairwise(with_rooms):
         check_rooms_update(before.rooms, after.rooms_update, shift(before.rooms, after.rooms))
@@ -273,8 +234,6 @@ def test_a_level_without_one_of_its_arcs_is_a_fault():
         (lambda: list(replay(changing_grids(), rooms_every=0)), "rooms_every is 0"),
         (lambda: list(replay(changing_grids(), rooms_every=WRONG)), "rooms_every is 'x'"),
         (lambda: list(grids_of_scans([], Mapper(), every=WRONG)), "every is 'x'"),
-        (lambda: list(replay(changing_grids(), most_cells=0)), "region"),
-        (lambda: list(replay(changing_grids(), most_cells=NAN)), "region"),
         (lambda: list(replay(changing_grids(), rooms=WRONG)), "labels is 'x'"),
         (lambda: list(replay(changing_grids(), rooms=OTHER_ROOMS)), "rooms are labels of"),
         (lambda: list(grids_of_scans([], Mapper(), every=0)), "every is 0"),

@@ -1,7 +1,6 @@
 from .replay import ReplayFigures as ReplayFigures
 from .plot import ReplayAnimation as ReplayAnimation
 from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
-from .regions import OnlineRegions as OnlineRegions, RegionsUpdate as RegionsUpdate
 from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay
 from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdate
 from .rooms_window import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor

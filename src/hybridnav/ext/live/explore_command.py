@@ -26,7 +26,7 @@ from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
-    from hybridnav.ext.live.explore import By, Exploration, Sensor, Step
+    from hybridnav.ext.live.explore import By, Exploration, Step
 
 StartOption = Annotated[
     str | None,
@@ -37,17 +37,8 @@ StartOption = Annotated[
         show_default="the point farthest from walls",
     ),
 ]
-SensorOption = Annotated[
-    str, typer.Option("--sensor", metavar="KIND", help="laser, all round, or sonar, a ring of 16.")
-]
 RangeOption = Annotated[
-    float | None,
-    typer.Option(
-        "--range",
-        metavar="R",
-        help="Range of the sensor in metres.",
-        show_default="8 for the laser, 6.477 for sonars",
-    ),
+    float, typer.Option("--range", metavar="R", help="Range of the laser in metres.")
 ]
 NoiseOption = Annotated[
     float, typer.Option("--noise", metavar="S", help="Standard deviation of readings in metres.")
@@ -76,8 +67,7 @@ def explore(
     map_file: options.MapArgument[Path],
     start: StartOption = None,
     out: options.OutOption[Path | None] = None,
-    sensor: SensorOption = "laser",
-    range_m: RangeOption = None,
+    range_m: RangeOption = 8.0,
     noise_m: NoiseOption = 0.01,
     robot_radius_m: options.RadiusOption = None,
     seed: options.SeedOption[int] = 0,
@@ -109,7 +99,7 @@ def explore(
         done = exploring.explore(
             world,
             point,
-            sensor=_sensor(sensor, range_m, noise_m),
+            sensor=exploring.laser_all_round(max_range_m=range_m, noise_m=noise_m),
             seed=seed,
             by=_rule(by),
             most_goals=exploring.MOST_GOALS if most_goals is None else most_goals,
@@ -178,17 +168,6 @@ def _check_kept(map_file: Path, out: Path) -> None:
             f"--out {str(out)!r:.80} would replace the floor plan, expected another name: "
             "choose one"
         )
-
-
-def _sensor(kind: str, range_m: float | None, noise_m: float) -> Sensor:
-    from hybridnav.ext.live.explore import laser_all_round  # noqa: PLC0415 - loads numba
-    from hybridnav.ext.live.mapping import SimulatedSonars  # noqa: PLC0415
-
-    if kind == "laser":
-        return laser_all_round(max_range_m=8.0 if range_m is None else range_m, noise_m=noise_m)
-    if kind == "sonar":
-        return SimulatedSonars(max_range_m=6.477 if range_m is None else range_m, noise_m=noise_m)
-    raise UsageError(f"--sensor must be laser or sonar, got {kind!r:.40}")
 
 
 def _figures(done: Exploration) -> str:

@@ -101,16 +101,15 @@ def check_sides(grid: OccupancyGrid) -> None:
         )
 
 
-# How stable the numbers of places, regions and rooms are over an update.
+# How stable the numbers of places and rooms are over an update.
 
 
 class Flips(NamedTuple):
-    """How stable the numbers of places, regions or rooms are over one update.
+    """How stable the numbers of places or rooms are over one update.
 
     A cell flips if it stays free and changes its number, although more than half of the cells of
     its old place stay free. A place is untouched if none of its cells changes class; it flips if
-    its number is not on more than half of its cells any more. The same holds for regions and
-    rooms.
+    its number is not on more than half of its cells any more. The same holds for rooms.
 
     An untouched place that flips has a changed cell beside it, if it is not among `apart`, or else
     a changed place beside it, if it is not among `far`.
@@ -143,12 +142,12 @@ class Flips(NamedTuple):
 
 
 class Numbered(NamedTuple):
-    """Cells with the numbers of their places, regions or rooms."""
+    """Cells with the numbers of their places or rooms."""
 
     grid: OccupancyGrid
     """Their map."""
     classes: ByteArray
-    """uint8 (rows, cols), `CellClass`, of the robot for places and regions, measured for rooms."""
+    """uint8 (rows, cols), `CellClass`, of the robot for places, measured for rooms."""
     number_of: IntArray
     """int32 (rows, cols), -1 for none."""
 

@@ -1,4 +1,4 @@
-"""Animations of replays: the map with its places, regions, rooms and doors, growing together."""
+"""Animations of replays: the map with its places, rooms and doors, growing together."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _MARGINS_IN = (0.65, 0.5, 0.12, 0.3)
 """Left, below, right and above each map: its axes, their names, its title."""
 _WIDE = 1.6
-"""Width over height of a map from which on places, regions and rooms lie one below the other."""
+"""Width over height of a map from which on places and rooms lie one below the other."""
 _LAST_PAUSE = 8
 """Frames for which the last one stays."""
 _DPI = 100
@@ -44,7 +44,6 @@ class _Frame(NamedTuple):
     number: int
     grid: OccupancyGrid
     place_of: IntArray
-    region_of: IntArray | None
     rooms: OnlineRooms
 
 
@@ -60,7 +59,7 @@ class _Panel(NamedTuple):
 class ReplayAnimation:
     """Frames of a replay, to be written as a GIF.
 
-    A place, a region or a room has one colour as long as it has its number; when it is born it
+    A place or a room has one colour as long as it has its number; when it is born it
     takes the colour that is the least common beside it. Rooms have their names, doors that are no
     gaps are dots with their numbers; both are left out where there is no space for them. All
     frames have the extents of the last one.
@@ -109,16 +108,13 @@ class ReplayAnimation:
         self._frames: list[_Frame] = []
         self._last: _Frame | None = None
         self._every = 1
-        self._of_places, self._of_regions, self._of_rooms = _Colours(), _Colours(), _Colours()
+        self._of_places, self._of_rooms = _Colours(), _Colours()
 
     def add(self, step: ReplayStep) -> None:
         """Add a step of a replay, in order."""
-        region_of = None if step.regions is None else step.regions.number_of
-        frame = _Frame(step.number, step.places.grid, step.places.number_of, region_of, step.rooms)
+        frame = _Frame(step.number, step.places.grid, step.places.number_of, step.rooms)
         self._last = frame
         self._of_places.learn(frame.place_of)
-        if region_of is not None:
-            self._of_regions.learn(region_of)
         if step.rooms_update is not None or step.update is None:
             self._of_rooms.learn(step.rooms.number_of)
         if step.number % self._every:
@@ -170,9 +166,6 @@ class ReplayAnimation:
         n_places = len(np.unique(frame.place_of[is_free]))
         title = f"map {frame.number + 1}: {n_places:,} free places"
         panels = [_Panel(title, self._of_places, grid, frame.place_of)]
-        if frame.region_of is not None:
-            title = f"{len(np.unique(frame.region_of[is_free])):,} free regions"
-            panels.append(_Panel(title, self._of_regions, grid, frame.region_of))
         n_doors = sum(not door.is_gap for door in rooms.doors.values())
         title = f"{len(rooms.numbers):,} rooms, {n_doors:,} doors"
         return [*panels, _Panel(title, self._of_rooms, rooms.grid, rooms.number_of)]

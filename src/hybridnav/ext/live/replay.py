@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.identities import Flips, Numbered, flips_between
 from hybridnav.ext.live.pyramid import OnlinePyramid, changed_cells
-from hybridnav.ext.live.regions import OnlineRegions
 from hybridnav.ext.live.room_versions import OnlineRooms
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.live.mapping import LaserScan, Mapper
     from hybridnav.ext.live.pyramid import Update
-    from hybridnav.ext.live.regions import RegionsUpdate
     from hybridnav.ext.live.room_versions import RoomsUpdate
     from hybridnav.maps import RoomLabels
     from hybridnav.pyramid import Level
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReplayStep:
-    """A map of a replay, with its places, its rooms and, if asked for, its regions.
+    """A map of a replay, with its places and its rooms.
 
     Examples
     --------
@@ -61,14 +59,6 @@ class ReplayStep:
     """Flips of places; None for the first map."""
     room_flips: Flips | None
     """Flips of rooms; None where they were not brought up to date."""
-    regions: OnlineRegions | None = None
-    """The regions, those of `places`; None if they are not followed."""
-    regions_update: RegionsUpdate | None = None
-    """What became of the regions; None for the first map, and if they are not followed."""
-    regions_seconds: float = 0.0
-    """Time of the update of the regions; that of a build for the first map."""
-    region_flips: Flips | None = None
-    """Flips of regions; None for the first map, and if they are not followed."""
 
 
 def replay(
@@ -77,9 +67,8 @@ def replay(
     merge_distance_m: float = 4.0,
     rooms_every: int = 1,
     rooms: RoomLabels | None = None,
-    most_cells: int | None = None,
 ) -> Iterator[ReplayStep]:
-    """Follow a sequence of maps with places, rooms and doors, and with regions if asked to.
+    """Follow a sequence of maps with places, rooms and doors.
 
     Parameters
     ----------
@@ -91,8 +80,6 @@ def replay(
         Maps after which rooms are brought up to date, at least 1; the last map always counts.
     rooms
         Rooms of the first map, whose names and numbers of doors are followed; None to find them.
-    most_cells
-        Most cells of a region, >= 1, as in `OnlineRegions.of`; None to follow no regions.
 
     Yields
     ------
@@ -112,19 +99,17 @@ def replay(
     >>> door_open = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
     >>> cells[4, 10] = 1.0
     >>> post = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
-    >>> steps = list(replay([door_open, post], most_cells=100))
-    >>> [(step.places.n_places, step.regions.n_regions) for step in steps]
-    [(1, 1), (1, 1)]
+    >>> [step.places.n_places for step in replay([door_open, post])]
+    [1, 1]
     """
     _check_every("rooms_every", rooms_every, "maps")
     step: ReplayStep | None = None
     for number, grid, is_last in _with_last(grids):
         checked_type("a map of the replay", grid, OccupancyGrid)
         if step is None:
-            step = _with_first_regions(_first(grid, merge_distance_m, rooms), most_cells)
+            step = _first(grid, merge_distance_m, rooms)
         else:
-            following = _next(step, grid, with_rooms=is_last or number % rooms_every == 0)
-            step = _with_next_regions(following, step.regions)
+            step = _next(step, grid, with_rooms=is_last or number % rooms_every == 0)
         yield step
     if step is None:
         raise InvalidValueError("there is no map to replay, expected one or more")
@@ -209,30 +194,6 @@ def _first(grid: OccupancyGrid, merge_distance_m: float, labels: RoomLabels | No
     return ReplayStep(0, places, rooms, None, None, built - began, found - built, None, None)
 
 
-def _with_first_regions(step: ReplayStep, most_cells: int | None) -> ReplayStep:
-    if most_cells is None:
-        return step
-    began = time.perf_counter()
-    regions = OnlineRegions.of(step.places, most_cells)
-    return replace(step, regions=regions, regions_seconds=time.perf_counter() - began)
-
-
-def _with_next_regions(step: ReplayStep, before: OnlineRegions | None) -> ReplayStep:
-    """Return a step with the regions after those of the step before."""
-    if before is None:
-        return step
-    began = time.perf_counter()
-    update = before.update(step.places)
-    seconds = time.perf_counter() - began
-    return replace(
-        step,
-        regions=update.version,
-        regions_update=update,
-        regions_seconds=seconds,
-        region_flips=flips_between(_numbered(before), _numbered(update.version)),
-    )
-
-
 def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayStep:
     before, rooms = step.places, step.rooms
     changed = changed_cells(before.grid, grid)
@@ -257,10 +218,10 @@ def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayS
     )
 
 
-def _numbered(version: OnlinePyramid | OnlineRegions | OnlineRooms) -> Numbered:
+def _numbered(version: OnlinePyramid | OnlineRooms) -> Numbered:
     """Return the cells of a version; rooms know no robot."""
-    grid = version.places.grid if isinstance(version, OnlineRegions) else version.grid
     is_rooms = isinstance(version, OnlineRooms)
+    grid = version.grid
     return Numbered(grid, grid.measured if is_rooms else grid.classes, version.number_of)
 
 
@@ -271,7 +232,7 @@ _OF_DOORS = (*_EVENTS, "changed")
 
 
 class Identities:
-    """Events and flips of places, of rooms or of regions, over a replay."""
+    """Events and flips of places or of rooms, over a replay."""
 
     def __init__(self) -> None:
         self.seconds: list[float] = []
@@ -332,7 +293,7 @@ class _Flipped:
 
 
 class ReplayFigures:
-    """What a replay did: times, what became of places, regions, rooms and doors, flips of numbers.
+    """What a replay did: times, what became of places, rooms and doors, flips of numbers.
 
     Examples
     --------
@@ -348,7 +309,7 @@ class ReplayFigures:
     """
 
     def __init__(self) -> None:
-        self._places, self._regions, self._rooms = Identities(), Identities(), Identities()
+        self._places, self._rooms = Identities(), Identities()
         self._last: ReplayStep | None = None
         self._n_doors: Counter[str] = Counter()
         self._lost_names: list[str] = []
@@ -363,8 +324,6 @@ class ReplayFigures:
             for event in _OF_DOORS:
                 self._n_doors[event] += len(getattr(step.rooms_update.doors, event))
             self._lost_names += step.rooms_update.lost_names.values()
-        if step.region_flips is not None:
-            self._regions.add(step.regions_update, step.region_flips, step.regions_seconds)
 
     def figures(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON.
@@ -377,24 +336,20 @@ class ReplayFigures:
             free, and the shares of them that flip by merging and by cutting off; for the places
             that are `untouched`, `apart` and `far` in some update (see `Flips`) how many there are,
             how many of them flip then, the number of flips, and the share that flips in an update;
-            `regions` with the same, if they are followed; `doors` with events, and `lost_names` of
-            rooms that died; counts of the last map; `faults` of its levels, see `faults_of`.
+            `doors` with events, and `lost_names` of rooms that died; counts of the last map;
+            `faults` of its levels, see `faults_of`.
         """
         last = self._last
         if last is None:
             return {}
-        regions = last.regions
-        pyramid = last.places.pyramid if regions is None else regions.pyramid
-        of_regions = {} if regions is None else {"regions": self._regions.figures()}
+        pyramid = last.places.pyramid
         return {
             "maps": last.number + 1,
             "cells": list(last.places.grid.shape),
             "n_places": last.places.n_places,
-            "n_regions": None if regions is None else regions.n_regions,
             "n_rooms": len(last.rooms.numbers),
             "n_doors": sum(not door.is_gap for door in last.rooms.doors.values()),
             "places": self._places.figures(),
-            **of_regions,
             "rooms": self._rooms.figures(),
             "doors": {event: self._n_doors[event] for event in _OF_DOORS},
             "lost_names": list(self._lost_names),

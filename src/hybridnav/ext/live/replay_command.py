@@ -65,7 +65,6 @@ def replay(
     merge_distance_m: options.MergeDistanceOption[float] = 4.0,
     rooms_every: RoomsEveryOption = 10,
     rooms_file: options.RoomsOption = None,
-    regions: options.RegionsOption = None,
     max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     plot: options.AnimationOption = None,
     frames: options.FramesOption = 60,
@@ -99,11 +98,7 @@ def replay(
             grids = log.grids(side_m, every, robot_radius_m, advance)
         rooms, grids = _with_rooms(grids, rooms_file)
         for step in follow(
-            grids,
-            merge_distance_m=merge_distance_m,
-            rooms_every=rooms_every,
-            rooms=rooms,
-            most_cells=regions,
+            grids, merge_distance_m=merge_distance_m, rooms_every=rooms_every, rooms=rooms
         ):
             figures.add(step)
             if animation is not None:
@@ -198,7 +193,7 @@ class _Log:
 def _summary(found: dict[str, Any]) -> str:
     rows, cols = found["cells"]
     doors = found["doors"]
-    counted = [kind for kind in ("places", "regions", "rooms", "doors") if kind in found]
+    counted = ["places", "rooms", "doors"]
     lines = [
         f"maps       {found['maps']:,}, the last of {cols} x {rows} cells",
         "now        " + ", ".join(f"{found[f'n_{kind}']:,} {kind}" for kind in counted),
@@ -217,7 +212,7 @@ def _summary(found: dict[str, Any]) -> str:
 
 
 def _identities(kind: str, found: dict[str, Any]) -> list[str]:
-    """Return lines on the updates of places, regions or rooms."""
+    """Return lines on the updates of places or rooms."""
     if not found["updates"]:
         return [f"{kind:<10} no update"]
     events = ", ".join(f"{found[event]:,} {event}" for event in ("born", "died", "merged", "split"))

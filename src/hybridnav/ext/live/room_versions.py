@@ -196,10 +196,7 @@ class OnlineRooms:
             number_of=frozen(found.number_of),
             names=MappingProxyType({n: name for n, name in self.names.items() if n not in lost}),
             doors=MappingProxyType(new_doors),
-            _next=(
-                self._next[0] + len(events.born),
-                self._next[1] + len(door_events.born),
-            ),
+            _next=(self._next[0] + len(events.born), self._next[1] + len(door_events.born)),
         )
         return RoomsUpdate(version, *events, door_events, lost)
 

@@ -194,11 +194,7 @@ def _part(
 
 
 def _to_find(
-    number_of: IntArray,
-    free: BoolArray,
-    differs: BoolArray,
-    touched: list[int],
-    box: Box,
+    number_of: IntArray, free: BoolArray, differs: BoolArray, touched: list[int], box: Box
 ) -> tuple[Box, BoolArray]:
     """Return the free cells whose room is to be found, in a box that has all of them.
 
@@ -361,10 +357,7 @@ class DoorEvents(NamedTuple):
 
 
 def doors_of(
-    number_of: IntArray,
-    grid: OccupancyGrid,
-    low: tuple[int, int],
-    known: Mapping[int, Point],
+    number_of: IntArray, grid: OccupancyGrid, low: tuple[int, int], known: Mapping[int, Point]
 ) -> list[OnlineDoor]:
     """Return the doors between rooms.
 

@@ -144,10 +144,7 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
         ) from error
     axis = np.zeros_like(free)
     place = np.indices(free.shape)
-    for here, there in (
-        (np.s_[:, :-1], np.s_[:, 1:]),
-        (np.s_[:-1, :], np.s_[1:, :]),
-    ):
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1, :], np.s_[1:, :])):
         first, second = basis[:, *here], basis[:, *there]
         apart = first - second
         # The cell of the two that is nearer to the bisector of both basis points.

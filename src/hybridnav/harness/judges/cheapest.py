@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.judges.kernels.cheapest import cheapest_cost
+from hybridnav.harness.judges.kernels import cheapest_cost
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_cell, checked_points, checked_type
 

@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.judges.kernels import segments as kernels
+from hybridnav.harness.judges import kernels
 from hybridnav.maps import CellClass, Frame
 from hybridnav.maps.checks import checked_points
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.judges import kernels
 from hybridnav.harness.judges.judge import (
     Cell,
     Verdict,
@@ -17,7 +18,6 @@ from hybridnav.harness.judges.judge import (
     more,
     segment_faults,
 )
-from hybridnav.harness.judges.kernels import segments as kernels
 from hybridnav.maps.checks import checked_points
 from hybridnav.maps.geometry import cells_of_line
 

@@ -90,11 +90,7 @@ def line_cost(factors, positions):
     total = 0.0
     for i in range(1, positions.shape[0]):
         total += segment_cost(
-            factors,
-            positions[i - 1, 0],
-            positions[i - 1, 1],
-            positions[i, 0],
-            positions[i, 1],
+            factors, positions[i - 1, 0], positions[i - 1, 1], positions[i, 0], positions[i, 1]
         )
     return total
 

@@ -11,8 +11,7 @@ from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
 from hybridnav.route import RouteFinder
-from hybridnav.topology.rooms.kinds import WIDEST_CORRIDOR_M
-from hybridnav.topology.rooms.listing import FOUND_NAME
+from hybridnav.topology.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,7 @@ from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.planner.methods.discs import Discs
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import driven, shortest_curve
-from hybridnav.refine.ompl import Clearance, Corridors, OmplQuery, Setup, Worker
+from hybridnav.refine.ompl import Corridors, OmplQuery, Setup, Worker
 from hybridnav.search.found import Query
 
 if TYPE_CHECKING:
@@ -330,8 +330,6 @@ class OmplPlanner:
     def _metric(self) -> Metric:
         if self._costs is not None:
             return "any-angle-weighted"
-        if self.ompl.objective == "clearance":
-            return "clearance-weighted"
         if self.ompl.space == "dubins":
             return "dubins"
         return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
@@ -417,22 +415,13 @@ class OmplPlanner:
         return self._path_through(poses[:, :2].copy(), headings, cells, polyline_length(points))
 
     def _weighted_cost(self, path: Path | None) -> float | None:
-        if path is None or (self._clearance is None and self._costs is None):
+        if path is None or self._costs is None:
             return None
         return self._cost_m(path)
 
     def _cost_m(self, path: Path) -> float:
         """Return what a path costs in the metric of the results."""
-        if self._clearance is not None:
-            return self._clearance.cost_of(path.points)
         return path.length_m if self.discs is None else self.discs.cost_m(path)
-
-    @cached_property
-    def _clearance(self) -> Clearance | None:
-        if self.ompl.objective != "clearance":
-            return None
-        allowed = self._settings.allow_unexplored
-        return Clearance(self._grid, self.ompl, allow_unexplored=allowed)
 
     @cached_property
     def _free(self) -> BoolArray:

@@ -19,7 +19,6 @@ from hybridnav.planner.saved.structures import (
     BUILDING,
     GONE,
     GRID,
-    KEY,
     KINDS,
     PRESET,
     PYRAMID,
@@ -259,16 +258,10 @@ class Model:
             given["radius_is_default"] = False
         return Model(replace(self.grid, **given))
 
-    @property
-    def key(self) -> str | None:
-        """Key of a kept model, None for other models."""
-        found = self._of_kind(KEY.kind)
-        return str(found[0].values.get("key")) if found else None
-
     def parts(self) -> list[Part]:
         """Return all parts of the model, as written to a file; every checksum is compared."""
         if self._filed:
-            return [filed.read() for filed in self._filed if filed.kind != KEY.kind]
+            return [filed.read() for filed in self._filed]
         return [parts.grid_part(self.grid)]
 
     @property

@@ -68,8 +68,7 @@ class ArraySpec:
         wanted = [evaluated(size, sizes) for size in self.shape]
         if at.shape != wanted or at.dtype not in self.dtypes.split():
             raise refusal(
-                part,
-                f"{self.name} is {at.dtype} {at.shape}, expected {self.dtypes} {wanted}",
+                part, f"{self.name} is {at.dtype} {at.shape}, expected {self.dtypes} {wanted}"
             )
 
     def check_values(self, part: FiledPart, sizes: Mapping[str, int], array: AnyArray) -> None:
@@ -294,8 +293,6 @@ JUMP_GRAPH = Structure(
 
 PRESET = Structure("preset", 2, (), {})
 
-KEY = Structure("key", 1, (), {})
-"""Key by which a kept model is found."""
 
 BUILDING = Structure(
     "building",
@@ -315,7 +312,6 @@ KINDS = frozenset(
         ROOMS,
         PYRAMID,
         PRESET,
-        KEY,
         MESH,
         CORNER_GRAPH,
         CORNER_EDGES,
@@ -325,5 +321,5 @@ KINDS = frozenset(
 )
 """The kinds of all parts of a model."""
 
-GONE = frozenset({"portals", "portal tables"})
+GONE = frozenset({"key", "portals", "portal tables"})
 """Kinds of parts that models of earlier versions have."""

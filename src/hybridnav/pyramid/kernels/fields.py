@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import find
-from hybridnav.pyramid.darts import base_sigma, next_at_cell
+from hybridnav.pyramid.kernels.darts import base_sigma, next_at_cell
 
 
 @guarded

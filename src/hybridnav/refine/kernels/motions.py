@@ -144,16 +144,7 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     turn = _short_turn(yaw0, yaw1)
     if row == b_row and col == b_col:
         return body_spins(body, row, col, yaw0 - place[6], turn)
-    return body_sweeps(
-        body,
-        row,
-        col,
-        yaw0 - place[6],
-        b_row - row,
-        b_col - col,
-        turn,
-        0.0,
-    )
+    return body_sweeps(body, row, col, yaw0 - place[6], b_row - row, b_col - col, turn, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -259,17 +250,7 @@ def _arc_runs(marks, row, col, heading, turn, radius):
 
 
 @njit(cache=True, nogil=True)
-def body_drives(
-    marks,
-    place,
-    body,
-    x0,
-    y0,
-    yaw0,
-    kinds,
-    lengths,
-    radius,
-):
+def body_drives(marks, place, body, x0, y0, yaw0, kinds, lengths, radius):
     """Return whether a body may drive a curve of tangent arcs and straight lines.
 
     Parameters
@@ -295,12 +276,7 @@ def body_drives(
     for k in range(kinds.size):
         length = lengths[k] * place[7]
         if kinds[k] == 0:
-            d_row, d_col, turn, signed = (
-                length * sin(heading),
-                length * cos(heading),
-                0.0,
-                0.0,
-            )
+            d_row, d_col, turn, signed = (length * sin(heading), length * cos(heading), 0.0, 0.0)
             if not runs(
                 marks, rounded(row), rounded(col), rounded(row + d_row), rounded(col + d_col)
             ):
@@ -313,35 +289,14 @@ def body_drives(
                 marks, row, col, heading, turn, signed
             ):
                 return False
-        if not body_sweeps(
-            body,
-            row,
-            col,
-            heading,
-            d_row,
-            d_col,
-            turn,
-            signed,
-        ):
+        if not body_sweeps(body, row, col, heading, d_row, d_col, turn, signed):
             return False
         row, col, heading = moved(row, col, heading, d_row, d_col, turn, signed, 1.0)
     return True
 
 
 @njit(cache=True, nogil=True)
-def body_steers(
-    marks,
-    place,
-    body,
-    x0,
-    y0,
-    yaw0,
-    x1,
-    y1,
-    yaw1,
-    radius,
-    reverses,
-):
+def body_steers(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, radius, reverses):
     """Return whether a body may drive the shortest curve of a turning radius between two poses.
 
     Parameters
@@ -357,14 +312,4 @@ def body_steers(
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths)
     if n == 0:
         return False
-    return body_drives(
-        marks,
-        place,
-        body,
-        x0,
-        y0,
-        yaw0,
-        kinds[:n],
-        lengths[:n],
-        radius,
-    )
+    return body_drives(marks, place, body, x0, y0, yaw0, kinds[:n], lengths[:n], radius)

@@ -6,7 +6,7 @@ from .client import (
     Worker as Worker,
     require_ompl as require_ompl,
 )
-from .problem import Clearance as Clearance, Corridors as Corridors
+from .problem import Corridors as Corridors
 from .settings import OmplSettings as OmplSettings
 
 __all__: list[str]

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ompl import base, util
 
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import atan2, cos, sin
-from hybridnav.refine.ompl.attempts import Attempts, Simplifier
+from hybridnav.refine.ompl.attempts import Attempts, Simplifier, objective_of
 from hybridnav.refine.ompl.problem import Base, Box, SearchArea, bounds_of, search_area_of
 from hybridnav.refine.ompl.solve import IMPROVING, Problem, StateSpace, solve
 
@@ -148,7 +147,7 @@ def _leg(
     turns_and_drives = attempts.settings.space == "differential"
     if turns_and_drives and len(direct := space.driven(straight)):
         return direct
-    objective = attempts.objective.of(space)
+    objective = objective_of(space)
     most = _TRIES * len(cells) if flat or turns_and_drives else None
     found = solve(
         Problem(space, *endpoints, objective),
@@ -158,9 +157,7 @@ def _leg(
     )
     if not found.is_exact or not flat:
         return found.points if found.is_exact else None
-    points = Simplifier(space, attempts.objective).shorter(found.points)
-    if attempts.settings.objective != "length":
-        return points
+    points = Simplifier(space).shorter(found.points)
     limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
     return points if space.length(points) <= limit_m else None
 
@@ -186,7 +183,7 @@ def _improve(
 ) -> None:
     """Plan windows of the path again, each in the ellipse that can shorten it."""
     budget = attempts.budget
-    cost_of = attempts.objective.cost
+    cost_of = whole.length
     cost, fruitless, window = cost_of(points), 0, _LEAST_WINDOWS
     while fruitless < _ROUNDS_WITHOUT_GAIN and budget.left() > 0 and len(points) > 2:  # noqa: PLR2004
         before = cost
@@ -212,12 +209,12 @@ def _window(
     first, last = _between(points, along)
     if last - first < 2:  # noqa: PLR2004 - one motion
         return points
-    cost_of, inner = attempts.objective.cost, points[first : last + 1]
+    cost_of, inner = whole.length, points[first : last + 1]
     cost, least = cost_of(inner), whole.length(inner[[0, -1]])
     if cost <= least * (1 + _LEAST_GAIN):
         return points
     space = attempts.space(corridor, *_ellipse(corridor, inner, cost))
-    objective = attempts.objective.of(space)
+    objective = objective_of(space)
     problem = Problem(space, inner[0], inner[-1], objective, least * (1 + _LEAST_GAIN))
     found = solve(problem, attempts.settings, attempts.budget.stopper(_WINDOW))
     if not found.is_exact or cost_of(found.points) >= cost:
@@ -356,20 +353,18 @@ def _attempt(attempts: Attempts, corridor: SearchArea, *, part: float) -> None:
         first_part = part * _CHAIN if settings.has_heading else part
         if attempt(attempts, corridor, whole, part=first_part) or not settings.has_heading:
             return
-    _at_once(attempts, corridor, whole, part=part)
+    _at_once(attempts, whole, part=part)
 
 
-def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float) -> None:
+def _at_once(attempts: Attempts, whole: StateSpace, *, part: float) -> None:
     """Solve the whole corridor as one problem."""
     settings = attempts.settings
-    if settings.confine == "prm":
-        draw_from(corridor, whole)
     improves = settings.planner in IMPROVING
     problem = Problem(
         whole,
         attempts.query.start,
         attempts.query.goal,
-        attempts.objective.of(whole),
+        objective_of(whole),
         _ENOUGH * attempts.bound_m if improves else math.inf,
     )
     share = part * (_SEARCHED if improves and settings.simplify else 1.0)
@@ -377,48 +372,10 @@ def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, par
         problem,
         settings,
         attempts.budget.stopper(share),
-        on_path=lambda points: attempts.better(points, attempts.objective.cost(points)),
+        on_path=lambda points: attempts.better(points, whole.length(points)),
         search=attempts.search,
     )
     if found.is_exact:
         attempts.finish(whole, found.points)
     else:
         attempts.partial(found.points)
-
-
-# States drawn from the cells of a corridor, for planners with a valid-state sampler.
-
-
-class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the bindings have no types
-    """Points in cells, each cell as likely as any other, with any heading."""
-
-    def __init__(self, information: Any, corridor: SearchArea, space: StateSpace) -> None:
-        super().__init__(information)
-        self._cells = corridor.cells
-        self._frame = corridor.grid.frame
-        self._space = space
-        self._random = util.RNG()
-
-    def sample(self, state: Any) -> bool:
-        """Fill a state and return whether it is valid."""
-        uniform = self._random.uniformReal
-        row, col = self._cells[self._random.uniformInt(0, len(self._cells) - 1)].tolist()
-        x, y = self._frame.points_of_grid((row + uniform(0, 1), col + uniform(0, 1))).tolist()
-        self._space.fill(state, (x, y, uniform(-math.pi, math.pi)))
-        return bool(self._space.state_valid(state))
-
-    def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802, ARG002
-        """Fill a state anywhere: only PRM's expansion asks for near ones, and it is not used."""
-        return self.sample(state)
-
-
-def draw_from(corridor: SearchArea, space: StateSpace) -> None:
-    """Make a space draw its valid states from the cells of a corridor."""
-
-    def allocate(information: Any) -> _CellSampler:
-        sampler = _CellSampler(information, corridor, space)
-        space.keep(sampler)
-        return sampler
-
-    space.information.setValidStateSamplerAllocator(allocate)
-    space.information.setup()

@@ -12,15 +12,13 @@ import numpy as np
 from ompl import base, geometric
 
 from hybridnav.refine.ompl.client import OmplQuery, Reply, Search
-from hybridnav.refine.ompl.settings import ROADMAPS
 from hybridnav.refine.ompl.solve import StateSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.refine.ompl import OmplSettings
-    from hybridnav.refine.ompl.problem import Base, Clearance, SearchArea
+    from hybridnav.refine.ompl.problem import Base, SearchArea
 
 
 _KEPT = 0.03
@@ -40,12 +38,7 @@ class Attempts:
         Called with each better path.
     """
 
-    def __init__(
-        self,
-        base: Base,
-        query: OmplQuery,
-        send: Callable[[Reply], None],
-    ) -> None:
+    def __init__(self, base: Base, query: OmplQuery, send: Callable[[Reply], None]) -> None:
         began = time.monotonic()
         setup = base.setup
         self.setup, self.query, self.settings = setup, query, setup.settings
@@ -65,7 +58,6 @@ class Attempts:
         """Begin with a corridor, and return the state space of all of it."""
         whole = self._whole = self.space(corridor, *corridor.bounds)
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
-        self.objective = Objective(whole, self.settings, self._base.clearance)
         return whole
 
     def leave(self, name: str) -> bool:
@@ -75,11 +67,7 @@ class Attempts:
         return outcome != "solved" and self.budget.left() > 0
 
     def last_reply(self) -> Reply:
-        """Smooth the path if the settings ask for that and time is left, and return the answer."""
-        if self.settings.smooth and len(self._best) > 2 and self.budget.left() > 0:  # noqa: PLR2004
-            points = Simplifier(self._whole, self.objective).smoother(self._best)
-            self._steps.append(f"smoothed: {'no' if points is self._best else 'yes'}")
-            self.better(points, self.objective.cost(points))
+        """Return the answer."""
         return self._reply(is_last=True)
 
     def better(self, points: FloatArray, cost: float) -> None:
@@ -106,10 +94,10 @@ class Attempts:
 
     def finish(self, whole: StateSpace, points: FloatArray) -> FloatArray:
         """Note a path from start to goal, simplify it, and return the result."""
-        self.better(points, self.objective.cost(points))
+        self.better(points, whole.length(points))
         if not self.settings.simplify:
             return points
-        return simplify(whole, points, self.budget, self.objective, self.better)
+        return simplify(whole, points, self.budget, self.better)
 
     def _note(self, x: float, y: float) -> None:
         assert self.search is not None  # noqa: S101 - only called where it is
@@ -142,7 +130,7 @@ class Attempts:
         )
 
 
-# Shortening and smoothing by OMPL's PathSimplifier.
+# Shortening by OMPL's PathSimplifier.
 
 _SEGMENT_STATES = 16
 """States of the segments that are simplified one by one: PathSimplifier tries pairs of states
@@ -154,16 +142,12 @@ _SNAP = 1e-3
 _LEAST_GAIN = 5e-4
 """Share that a round must gain to count as fruitful."""
 _FRUITLESS = 3
-_SPLINES, _LEAST_MOVE = 3, 1e-4
-"""Rounds of subdivision, each of which doubles the states, and the least share of the length by
-which a state must move."""
 
 
 def simplify(
     space: StateSpace,
     points: FloatArray,
     budget: Budget,
-    objective: Objective,
     on_better: Callable[[FloatArray, float], None],
 ) -> FloatArray:
     """Shorten a path by rounds of PathSimplifier, until they gain nothing or the time is up.
@@ -176,17 +160,15 @@ def simplify(
         float64 (n, 3), a valid path.
     budget
         The budget of the query.
-    objective
-        Cost of a path.
     on_better
         Called with each better path and its cost.
     """
-    simplifier = Simplifier(space, objective)
-    cost, fruitless, shift = objective.cost(points), 0, 0
+    simplifier = Simplifier(space)
+    cost, fruitless, shift = space.length(points), 0, 0
     while len(points) > 2 and fruitless < _FRUITLESS and budget.left() > 0:  # noqa: PLR2004
         before = cost
         points = _round(simplifier, points, budget, shift)
-        cost = objective.cost(points)
+        cost = space.length(points)
         fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
         shift = 0 if shift else _SEGMENT_STATES // 2
         on_better(points, cost)
@@ -216,14 +198,11 @@ class Simplifier:
     ----------
     space
         State space with the checks.
-    objective
-        Cost of a path.
     """
 
-    def __init__(self, space: StateSpace, objective: Objective) -> None:
+    def __init__(self, space: StateSpace) -> None:
         self._space = space
-        self._objective = objective
-        self._own = objective.of(space)
+        self._own = objective_of(space)
         self._simplifier = geometric.PathSimplifier(space.information, None, self._own)
 
     def shorter(self, points: FloatArray) -> FloatArray:
@@ -232,16 +211,6 @@ class Simplifier:
         steps = _STEPS * len(points)
         self._simplifier.reduceVertices(path, steps, steps, 1.0)
         self._simplifier.partialShortcutPath(path, steps, steps, 0.33, _SNAP)
-        return self._checked(path, points)
-
-    def smoother(self, points: FloatArray) -> FloatArray:
-        """Round the bends of a path of straight motions by B-splines, where there is room.
-
-        Return the path itself if that is in vain. States at the corner of an obstacle stay.
-        """
-        path = self._path_of(points)
-        least_m = _LEAST_MOVE * self._space.length(points)
-        self._simplifier.smoothBSpline(path, _SPLINES, least_m)
         return self._checked(path, points)
 
     def _path_of(self, points: FloatArray) -> Any:
@@ -254,52 +223,21 @@ class Simplifier:
 
     def _checked(self, path: Any, points: FloatArray) -> FloatArray:
         found = self._space.driven(self._space.points(path.getStates()))
-        cost_of = self._objective.cost
+        cost_of = self._space.length
         return found if cost_of(found) < cost_of(points) and self._space.is_valid(found) else points
 
 
-# Costs of paths: length, or length weighted by nearness to obstacles.
+# The length as an objective of OMPL.
 
 
-class Objective:
-    """The objective of a query, for OMPL and for this package.
+def objective_of(space: StateSpace) -> Any:
+    """Return OMPL's object for the length of paths in a state space.
 
-    Parameters
-    ----------
-    whole
-        State space of the whole corridor.
-    settings
-        State space and planner.
-    clearance
-        Weight of the length; None for the length itself.
+    Turns on the spot cost nothing, but with PRM, which waits forever for objectives in Python.
     """
-
-    def __init__(
-        self, whole: StateSpace, settings: OmplSettings, clearance: Clearance | None
-    ) -> None:
-        self._whole = whole
-        self._clearance = clearance
-        # PRM waits forever for objectives in Python: it minimises length and turns.
-        turns = settings.space in {"se2", "differential"}
-        self._is_own = turns and settings.planner not in ROADMAPS
-
-    def of(self, space: StateSpace) -> Any:
-        """Return the OMPL object of the objective for one state space of the query."""
-        if self._clearance is not None:
-            return _Line(space, self._clearance.cost)
-        if self._is_own:
-            return _Line(space, _length)
-        return base.PathLengthOptimizationObjective(space.information)
-
-    def cost(self, points: FloatArray) -> float:
-        """Return the cost of a path of states."""
-        if self._clearance is None:
-            return self._whole.length(points)
-        return self._clearance.cost_of(points)
-
-
-def _length(x0: float, y0: float, x1: float, y1: float) -> float:
-    return math.hypot(x1 - x0, y1 - y0)
+    if space.spins and not space.is_roadmap:
+        return _Line(space)
+    return base.PathLengthOptimizationObjective(space.information)
 
 
 class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings have no types
@@ -308,23 +246,14 @@ class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings h
     OMPL's own path length counts half a metre for each radian of an SE2 path.
     """
 
-    def __init__(
-        self, space: StateSpace, cost: Callable[[float, float, float, float], float]
-    ) -> None:
+    def __init__(self, space: StateSpace) -> None:
         super().__init__(space.information)
-        self._cost = cost
-        self._flat = space.dimension == 2  # noqa: PLR2004
-
-    def _endpoints(self, first: Any, second: Any) -> tuple[float, float, float, float]:
-        if self._flat:
-            return first[0], first[1], second[0], second[1]
-        return first.getX(), first.getY(), second.getX(), second.getY()
 
     def motionCost(self, first: Any, second: Any) -> Any:  # noqa: N802 - OMPL's names
-        return base.Cost(self._cost(*self._endpoints(first, second)))
+        return base.Cost(math.hypot(second.getX() - first.getX(), second.getY() - first.getY()))
 
     def motionCostHeuristic(self, first: Any, second: Any) -> Any:  # noqa: N802
-        return base.Cost(_length(*self._endpoints(first, second)))
+        return self.motionCost(first, second)
 
     def stateCost(self, state: Any) -> Any:  # noqa: ARG002, N802
         return base.Cost(0.0)

@@ -89,7 +89,7 @@ class Reply:
     """float64 (n, 3), states of the path in order; an approximate path does not end at the goal.
     Shape (0, 3) if there is no path."""
     cost: float
-    """Cost of the path by the objective, in metres if that is the length."""
+    """Length of the path in metres."""
     length_m: float = 0.0
     """Length of the path of the robot's base."""
     bound_m: float = 0.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,14 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.refine.motions import MotionCheck
-from hybridnav.refine.ompl.kernels.clearance import weighted_length
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.refine.ompl import OmplSettings
     from hybridnav.refine.ompl.client import OmplQuery, Setup
 
 
@@ -96,15 +92,8 @@ class Base:
         field_of = setup.field_of
         self.boxes = np.empty((0, 4), np.int64) if field_of is None else boxes_of(field_of)
         self.check = MotionCheck(
-            setup.grid,
-            footprint=setup.settings.body,
-            allow_unexplored=setup.allow_unexplored,
+            setup.grid, footprint=setup.settings.body, allow_unexplored=setup.allow_unexplored
         )
-        self.clearance: Clearance | None = None
-        if setup.settings.objective == "clearance":
-            self.clearance = Clearance(
-                setup.grid, setup.settings, allow_unexplored=setup.allow_unexplored
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +111,6 @@ class SearchArea:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest x and y, float64 (2,) each, metres, map frame."""
         return bounds_of(self.grid, self.box)
-
-    @cached_property
-    def cells(self) -> LongArray:
-        """int64 (n, 2), the cells of the corridor that may be entered."""
-        top, bottom, left, right = self.box
-        free = self.grid.enterable(allow_unexplored=self.allow_unexplored)[top:bottom, left:right]
-        if self.inside is not None:
-            free &= self.inside[top:bottom, left:right]
-        cells: LongArray = np.argwhere(free) + np.array([top, left])
-        return cells
 
 
 def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
@@ -160,45 +139,3 @@ def search_area_of(base: Base, query: OmplQuery, fields: BoolArray | None) -> Se
         inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
     check = base.check.confined(inside=inside, closed=query.closed, solid=query.solid)
     return SearchArea(grid, inside, box, check, setup.allow_unexplored)
-
-
-# Length weighted by nearness to obstacles.
-
-
-class Clearance:
-    """Length weighted by nearness to obstacles, on one map.
-
-    A metre costs 1 + `clearance_weight` in a cell beside a cell that may not be entered, linearly
-    less with the distance of the centres, and 1 from `clearance_m` on. The table takes four bytes a
-    cell.
-
-    Parameters
-    ----------
-    grid
-        The map.
-    settings
-        Settings with distance and weight.
-    allow_unexplored
-        Whether unexplored cells may be entered.
-    """
-
-    def __init__(
-        self, grid: OccupancyGrid, settings: OmplSettings, *, allow_unexplored: bool = False
-    ) -> None:
-        from scipy import ndimage  # noqa: PLC0415 - half a second that other objectives do not need
-
-        free = grid.enterable(allow_unexplored=allow_unexplored)
-        away_m = ndimage.distance_transform_edt(free) * grid.resolution_m
-        nearness = np.clip(1 - away_m / settings.clearance_m, 0, 1)
-        self._factors = (1 + settings.clearance_weight * nearness).astype(np.float32)
-        self._frame = grid.frame.for_kernels
-
-    def cost(self, x0: float, y0: float, x1: float, y1: float) -> float:
-        """Return the cost of a straight line, metres, map frame."""
-        cost: float = weighted_length(self._factors, self._frame, x0, y0, x1, y1)
-        return cost
-
-    def cost_of(self, points: FloatArray) -> float:
-        """Return the cost of a path, points (n, 2) or states (n, 3)."""
-        steps = itertools.pairwise(points[:, :2].tolist())
-        return math.fsum(self.cost(*first, *second) for first, second in steps)

@@ -68,8 +68,6 @@ def _warm_up(base: Base) -> None:
     check.state_valid(x, y)
     check.motion_valid(x, y, x, y)
     check.path_valid(np.array([[x, y]]))
-    if base.clearance is not None:
-        base.clearance.cost(x, y, x, y)
     make(
         base.setup.settings,
         StateSpace(base.setup.settings, check, np.zeros(2), np.ones(2)).information,

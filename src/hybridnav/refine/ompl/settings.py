@@ -90,7 +90,7 @@ DIRECTED = frozenset({"BITstar", "RRT", "RRTConnect"})
 """Planners that check each motion in its own direction in every state space; the others assume that
 a motion valid one way is valid the other."""
 Space = Literal["r2", "se2", "differential", "dubins", "reeds-shepp"]
-Confinement = Literal["chain", "mask", "prm"]
+Confinement = Literal["chain", "mask"]
 
 
 def _no_boolean(value: Any) -> Any:
@@ -175,20 +175,11 @@ class OmplSettings(BaseModel):
     which stay as a limit: what is reached before it repeats for equal seeds."""
     seed: Annotated[_Int, Field(ge=1, lt=2**31)] = 1
     """Seed of OMPL's random numbers."""
-    objective: Literal["length", "clearance"] = "length"
-    """Quantity to minimise: the length, or the length weighted by nearness to obstacles."""
-    clearance_m: Annotated[_Float, Field(gt=0, le=1e4)] = 0.5
-    """With `clearance`: distance up to which obstacles add to the cost."""
-    clearance_weight: Annotated[_Float, Field(ge=0, le=1e3)] = 2.0
-    """With `clearance`: a metre beside an obstacle costs 1 + this, `clearance_m` away 1."""
     confine: Confinement = "chain"
     """Confinement to the corridor. `chain`: a chain of small problems, field by field. `mask`: one
-    problem that refuses states and motions outside. `prm`: PRM and PRMstar draw their states from
-    the corridor's cells."""
+    problem that refuses states and motions outside."""
     simplify: bool = True
     """Whether paths are shortened by OMPL's PathSimplifier."""
-    smooth: bool = False
-    """Whether it rounds their bends by B-splines at the end, where there is room; not on curves."""
 
     @model_validator(mode="after")
     def _planner_is_known(self) -> Self:
@@ -214,8 +205,6 @@ class OmplSettings(BaseModel):
                     },
                 )
             _check_parameter(name, value)
-        if self.confine == "prm" and self.planner not in ROADMAPS:
-            raise PydanticCustomError("prm", "confine: prm goes with planner PRM or PRMstar")
         return self
 
     @model_validator(mode="after")
@@ -229,19 +218,11 @@ class OmplSettings(BaseModel):
             raise PydanticCustomError(
                 "turning_radius", "turning_radius_m goes with space: dubins or reeds-shepp"
             )
-        if self.objective == "clearance" and (curved or self.planner in ROADMAPS):
-            raise PydanticCustomError(
-                "objective",
-                "objective: clearance goes with space: r2, se2 or differential, and not with "
-                "PRM or PRMstar",
-            )
         if self.space == "dubins" and self.planner in ROADMAPS:
             # Their roadmap is undirected: a motion checked one way would be driven the other.
             raise PydanticCustomError(
                 "roadmap", "PRM and PRMstar refuse space: dubins, whose curves run one way"
             )
-        if self.smooth and self.space not in {"r2", "se2"}:
-            raise PydanticCustomError("smooth", "smooth: true goes with space: r2 or se2")
         if self.footprint is not None:
             if self.space == "r2":
                 raise PydanticCustomError(
@@ -284,7 +265,7 @@ class OmplSettings(BaseModel):
     @property
     def follows_discs(self) -> bool:
         """Whether the robot can follow a path of a disc, with turns on the spot."""
-        return self.space in {"se2", "differential"} and self.objective == "length"
+        return self.space in {"se2", "differential"}
 
     @property
     def body(self) -> Footprint | None:

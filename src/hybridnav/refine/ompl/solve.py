@@ -64,6 +64,8 @@ class StateSpace:
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
         self.is_straight = settings.space in {"r2", "se2", "differential"}
+        self.spins = settings.space in {"se2", "differential"}
+        self.is_roadmap = settings.planner in ROADMAPS
         self._spells = settings.space == "differential"
         self._reverses = settings.reverses
         self.dimension = _STATES[settings.space]
@@ -77,11 +79,6 @@ class StateSpace:
         self.information.setMotionValidator(self._motions)
         self.information.setStateValidityCheckingResolution(FINE)
         self.information.setup()
-        self._kept: list[Any] = []
-
-    def keep(self, thing: Any) -> None:
-        """Keep an object alive as long as the space: OMPL holds no references to Python objects."""
-        self._kept.append(thing)
 
     def state(self, values: FloatArray) -> Any:
         """Return a state of OMPL from x, y and, if there is one, a heading."""

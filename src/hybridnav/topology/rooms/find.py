@@ -4,31 +4,36 @@ map, or anew in a part of it beside rooms that stay.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, get_args
+import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
-from hybridnav.maps.names import Segmentation
+from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.maps.room_labels import MAX_ROOMS
+from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology.rooms.cutting import Ground, fine_segments
-from hybridnav.topology.rooms.growing import Likely, Rule, Small, contract
 from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
-from hybridnav.topology.rooms.merging import Forest, JudgedSegments, Segments, grown, least_cells
-from hybridnav.topology.rooms.segments import LEAST_SEGMENT_M2, walled_segments, watershed_segments
+from hybridnav.topology.rooms.merging import (
+    Forest,
+    Growth,
+    JudgedSegments,
+    Likely,
+    Rule,
+    Small,
+    grown,
+    least_cells,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
 Cell = tuple[int, int]
 
-_UNEXPLORED_RIM = 0.8
-"""Share of the cells round free space that must be unexplored for them to count as walls."""
 _LEAST_INSIDE = 0.1
 """Area cut off inside free space that reaches all sides of the map, as a share of it, from which
 on that is the outside."""
@@ -36,37 +41,26 @@ _SIDES = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
 """Indices of the first and last row and column."""
 _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
-_SPLINTER_M2 = 0.5
-"""Smaller segments are merged first: they would be convex with anything."""
 SPECK_M2 = 0.25
 """Segments below it go to a neighbour before boundaries are judged."""
 LEAST_LIKELY = 0.5
 """Segments of one room: the least probability at which they merge."""
-_SOLIDITY = 0.8
-_OPEN = 0.65
-_STRAIGHT = 0.35
-"""Solidity of two parts of one corridor."""
 WALL_REACH_M = 0.25
 """How far rooms reach into walls, and into the unexplored cells of their own side: outlines that
 people edit then run inside walls, not along the free cells' steps."""
 
 
-def find_rooms(
-    grid: OccupancyGrid, *, method: Segmentation = "judged", least_area_m2: float = 1.0
-) -> RoomLabels:
+def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels:
     """Find the rooms of a map.
+
+    Free space is cut finely, along the lines of walls in every local direction and at narrow
+    passages; segments then merge where a small forest, learnt from people's rooms, judges by the
+    evidence on a boundary that both lie in one room.
 
     Parameters
     ----------
     grid
         The map. Its cells count as they were measured: the robot's radius changes no room.
-    method
-        How free space is cut and merged again. `"judged"`: finely, along the lines of walls in
-        every local direction and at narrow passages; segments then merge where a small forest,
-        learnt from people's rooms, judges by the evidence on a boundary that both lie in one room.
-        The other methods merge segments where their union is nearly convex and hardly walled; they
-        cut `"walls"` along the lines of walls that continue behind an opening, and at pinched
-        passages; `"watershed"` along the watersheds of the distance transform.
     least_area_m2
         In square metres of free cells, positive, at most 1e9. Smaller segments go to the neighbour
         with the longest open border; without one they are no room. Free space outside the building
@@ -80,20 +74,15 @@ def find_rooms(
     Raises
     ------
     InvalidValueError
-        When the method is not known, the area out of range, or there are too many rooms.
+        When the area is out of range, or there are too many rooms.
 
     Examples
     --------
     >>> hn.find_rooms(hn.example_map("figure1")).names
     ('room-1',)
     """
-    if method not in get_args(Segmentation):
-        raise InvalidValueError(
-            f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
-        )
     check_least_area(least_area_m2)
-    found = _judged if method == "judged" else _convex
-    labels = found(grid, method, least_area_m2)
+    labels = judged_rooms(grid, Forest.shipped(), least_area_m2)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
         raise InvalidValueError(
@@ -102,6 +91,28 @@ def find_rooms(
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
     return RoomLabels(names, reaching(labels, grid))
+
+
+def contract(segments: JudgedSegments, rules: Sequence[Rule]) -> DualGraphPyramid:
+    """Contract segments until every boundary between them resists.
+
+    Parameters
+    ----------
+    segments, rules
+        As of `Growth`; the segments merge as the fields do.
+
+    Returns
+    -------
+    DualGraphPyramid
+        Its places are the segments as they were, the fields of its apex those that are left.
+    """
+    free = segments.label_of >= 0
+    grid = OccupancyGrid(
+        np.where(free, 0.0, 1.0).astype(np.float32), Frame(1.0), robot_radius_m=0.0
+    )
+    return DualGraphPyramid.build(
+        grid, merge_distance_m=math.inf, resistance=Growth(segments, rules)
+    )
 
 
 def check_least_area(least_area_m2: float) -> None:
@@ -164,29 +175,6 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     return _in_reading_order(np.where(free, segments.label_of, np.int32(NO_ROOM)), least)
 
 
-def _judged(grid: OccupancyGrid, _method: Segmentation, least_area_m2: float) -> IntArray:
-    return judged_rooms(grid, Forest.shipped(), least_area_m2)
-
-
-def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> IntArray:
-    """Merge segments where their union is nearly convex."""
-    outside = outside_of(grid)
-    grid = _walled(grid)
-    cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
-    segments = Segments(cut, grid.resolution_m)
-    segments.merge_small(min(least_area_m2, _SPLINTER_M2))
-    segments.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT)
-    segments.merge_small(least_area_m2)
-    return _in_reading_order(segments.label_of, least_cells(least_area_m2, grid.cell_area_m2))
-
-
-def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
-    """Return the segments into which free space is cut."""
-    if method == "walls":
-        return walled_segments(grid, least_m2=min(least_m2, LEAST_SEGMENT_M2))
-    return watershed_segments(grid)
-
-
 def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
 
@@ -226,23 +214,6 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     around &= inside >= _LEAST_INSIDE * areas
     found: BoolArray = around[part_of]
     return found
-
-
-def _walled(grid: OccupancyGrid) -> OccupancyGrid:
-    """Return the map with the rim of its unexplored cells as walls if most of its free space ends
-    there.
-
-    A scan whose thresholds call most walls unexplored has no other ones. Where obstacles bound free
-    space, unexplored pockets are shadows of furniture, and no walls.
-    """
-    free = grid.measured == CellClass.FREE
-    beside = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
-    rim = beside & (grid.measured == CellClass.UNEXPLORED)
-    if np.count_nonzero(rim) <= _UNEXPLORED_RIM * np.count_nonzero(beside):
-        return grid
-    probability = grid.probability.copy()
-    probability[rim] = 1.0
-    return replace(grid, probability=probability)
 
 
 def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
@@ -337,7 +308,7 @@ def renewed_rooms(
 ) -> IntArray:
     """Find the rooms of some free cells, with the rooms beside them as they are.
 
-    The method is that of `find_rooms`, `judged`. Each room that stays is one segment from the
+    The method is that of `find_rooms`. Each room that stays is one segment from the
     start. Others may merge with it, so that it grows; two of them never merge.
 
     Parameters

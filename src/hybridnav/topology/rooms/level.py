@@ -20,8 +20,7 @@ from hybridnav.topology.rooms.doors import (
     farthest_ends,
     measured_clearance_m,
 )
-from hybridnav.topology.rooms.kinds import RoomKind, kinds_of
-from hybridnav.topology.rooms.listing import Listing
+from hybridnav.topology.rooms.listing import Listing, RoomKind, kinds_of
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray

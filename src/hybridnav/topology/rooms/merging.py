@@ -1,181 +1,31 @@
-"""Segments of free space, and which of them are one room: those that are convex together, those
-that are too small, and those between which a forest sees no boundary.
-"""
+"""Segments of free space, and the forest that sees which of them are one room."""
 
 from __future__ import annotations
 
-import heapq
 import math
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from itertools import count
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import ConvexHull, QhullError
 
-from hybridnav.maps.islands import unique_rows
+from hybridnav.pyramid.darts import WORST_RANK, Darts
 from hybridnav.topology.rooms.kernels import merging as _merging_kernels
 from hybridnav.topology.rooms.kernels import segmentation as _evidence_kernels
 from hybridnav.topology.rooms.kernels.merging import SegmentState
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.topology.rooms.cutting import Ground
 
-_REACH_M = 0.25
-"""How far segments reach into what is not free: walls between two segments are about half as
-thick."""
-_RUNS_ON = 0.9
-"""Share of their breadth that the border of two parts of one corridor has at least."""
+    Judge = Callable[[LongArray, FloatArray], FloatArray]
+
 _ROUNDING = 1e-9
-
-
-class Segments:
-    """Segments of a label image, with their neighbours: how long each common border is, and how
-    much of it is open.
-
-    The size of a segment is its area of free cells. Its shape alone (solidity, breadth, the length
-    of borders) includes half of the walls between segments.
-
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
-    resolution_m
-        Side of a cell in metres.
-    """
-
-    def __init__(self, label_of: IntArray, resolution_m: float) -> None:
-        found, dense = np.unique(label_of, return_inverse=True)
-        first = int(np.searchsorted(found, 0))
-        self._label_of = dense.reshape(label_of.shape).astype(np.int32) - first
-        self._label_of[self._label_of < 0] = -1
-        self._n = len(found) - first
-        self._cell_m2 = resolution_m * resolution_m
-        self._reach = _REACH_M / resolution_m
-        reaching = grown(self._label_of, self._reach)
-        self._free = np.bincount(self._label_of[self._label_of >= 0], minlength=self._n)
-        self._areas = np.bincount(reaching[reaching >= 0], minlength=self._n).astype(np.float64)
-        self._parent = list(range(self._n))
-        self._version = [0] * self._n
-        self._hulls = _hulls(reaching, self._n)
-        self._breadths = [self._breadth(segment) for segment in range(self._n)]
-        self._borders: list[dict[int, tuple[int, int]]] = [{} for _ in range(self._n)]
-        opened = _common_sides(self._label_of)
-        for (u, v), length in _common_sides(reaching).items():
-            self._borders[u][v] = self._borders[v][u] = (opened.get((u, v), 0), length)
-
-    @property
-    def label_of(self) -> IntArray:
-        """int32 (rows, cols), the segments as they are now, numbered from 0."""
-        final = np.array([self._find(segment) for segment in range(self._n)] + [-1])
-        _, dense = np.unique(final, return_inverse=True)
-        labels: IntArray = (dense.ravel()[self._label_of] - 1).astype(np.int32)
-        return labels
-
-    def merge_convex(
-        self, *, least_solidity: float, least_open: float, least_straight: float
-    ) -> None:
-        """Merge neighbours whose border is mostly open and whose union is nearly convex.
-
-        Pairs with the greatest solidity (area by area of the convex hull) first.
-
-        Parameters
-        ----------
-        least_solidity
-            In (0, 1].
-        least_open
-            Share of the common border, walls and all, that must be open, in (0, 1].
-        least_straight
-            Solidity that is enough where the border is about as long as both segments are broad:
-            two parts of one corridor, whose niches no convex hull forgives.
-        """
-        heap: list[tuple[float, int, int, int, int]] = []
-
-        def offer(u: int, v: int) -> None:
-            opened, length = self._borders[u][v]
-            if opened < max(1.0, least_open * length):
-                return
-            runs_on = opened >= _RUNS_ON * max(self._breadths[u], self._breadths[v])
-            solidity = self._solidity(u, v)
-            if solidity >= (least_straight if runs_on else least_solidity):
-                heapq.heappush(heap, (-solidity, u, v, self._version[u], self._version[v]))
-
-        for u in range(self._n):
-            for v in self._borders[u]:
-                if u < v:
-                    offer(u, v)
-        while heap:
-            _, u, v, version_u, version_v = heapq.heappop(heap)
-            if (self._version[u], self._version[v]) != (version_u, version_v):
-                continue
-            self._merge(u, v)
-            for other in self._borders[u]:
-                offer(min(u, other), max(u, other))
-
-    def merge_small(self, least_m2: float) -> None:
-        """Merge segments of a smaller free area into the neighbour with the longest open border,
-        the smallest first; segments without a neighbour stay."""
-        least = least_cells(least_m2, self._cell_m2)
-        heap = [
-            (int(self._free[segment]), segment)
-            for segment in range(self._n)
-            if self._is_root(segment)
-        ]
-        heapq.heapify(heap)
-        while heap:
-            cells, segment = heapq.heappop(heap)
-            if not self._is_root(segment) or cells != self._free[segment]:
-                continue
-            if cells >= least:
-                break
-            borders = self._borders[segment]
-            opened = max(borders, key=lambda other: (borders[other][0], -other), default=-1)
-            if opened < 0 or borders[opened][0] == 0:
-                continue
-            self._merge(opened, segment)
-            heapq.heappush(heap, (int(self._free[opened]), opened))
-
-    def _solidity(self, u: int, v: int) -> float:
-        """Return the area of two segments divided by that of the convex hull of both."""
-        _, hull_area = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
-        return float((self._areas[u] + self._areas[v]) / hull_area)
-
-    def _merge(self, u: int, v: int) -> None:
-        """Merge v into u."""
-        self._parent[v] = u
-        self._version[u] += 1
-        self._version[v] = -1
-        self._areas[u] += self._areas[v]
-        self._free[u] += self._free[v]
-        self._hulls[u], _ = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
-        self._breadths[u] = self._breadth(u)
-        del self._borders[u][v]
-        for other, (opened, length) in self._borders[v].items():
-            if other == u:
-                continue
-            del self._borders[other][v]
-            with_u = self._borders[u].get(other, (0, 0))
-            border = (with_u[0] + opened, with_u[1] + length)
-            self._borders[u][other] = self._borders[other][u] = border
-        self._borders[v] = {}
-
-    def _breadth(self, segment: int) -> float:
-        """Return the mean breadth of a segment: its area divided by its length, in cells, without
-        its reach into the walls on both sides."""
-        corners = self._hulls[segment]
-        length = np.hypot(*(corners[:, None] - corners[None]).T).max()
-        return float(self._areas[segment] / length) - 2 * self._reach
-
-    def _is_root(self, segment: int) -> bool:
-        return self._parent[segment] == segment
-
-    def _find(self, segment: int) -> int:
-        while self._parent[segment] != segment:
-            segment = self._parent[segment]
-        return segment
 
 
 def least_cells(least_m2: float, cell_m2: float) -> int:
@@ -192,41 +42,6 @@ def grown(label_of: IntArray, reach_cells: float) -> IntArray:
     distance, nearest = ndimage.distance_transform_edt(label_of < 0, return_indices=True)
     spread: IntArray = np.where(distance <= reach_cells, label_of[tuple(nearest)], -1)
     return spread.astype(np.int32)
-
-
-def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
-    """Return the sides between cells of two segments, counted by pair, the lower segment first."""
-    pairs = []
-    for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
-        between = (tail >= 0) & (head >= 0) & (tail != head)
-        pairs.append(np.sort(np.stack([tail[between], head[between]], axis=1), axis=1))
-    found = unique_rows(np.concatenate(pairs))
-    counted = zip(found.rows.tolist(), found.n_times.tolist(), strict=True)
-    return {(u, v): n for (u, v), n in counted}
-
-
-def _hulls(label_of: IntArray, n_segments: int) -> list[FloatArray]:
-    """Return the corners of the convex hull of each segment, (row, col) in cells."""
-    hulls = []
-    for segment, window in enumerate(ndimage.find_objects(label_of + 1, n_segments)):
-        inside = label_of[window] == segment
-        rows = np.flatnonzero(inside.any(axis=1))
-        left = inside[rows].argmax(axis=1)
-        right = inside.shape[1] - inside[rows, ::-1].argmax(axis=1)
-        corners = [np.stack([rows + up, cols], axis=1) for up in (0, 1) for cols in (left, right)]
-        corner = np.array([window[0].start, window[1].start])
-        hulls.append(_hull(np.concatenate(corners) + corner.astype(np.float64))[0])
-    return hulls
-
-
-def _hull(points: FloatArray) -> tuple[FloatArray, float]:
-    """Return corners and area of the convex hull of points that span an area."""
-    try:
-        hull = ConvexHull(points)
-    except QhullError:  # pragma: no cover - cells always span an area, however Qhull rounds
-        spans = points.max(axis=0) - points.min(axis=0)
-        return points, float(spans[0] * spans[1])
-    return points[hull.vertices], float(hull.volume)
 
 
 EVIDENCE = (
@@ -414,3 +229,221 @@ def _halves(endpoints: LongArray, n: int) -> tuple[LongArray, LongArray]:
     begins = np.flatnonzero(np.diff(of, prepend=-1))
     first[of[begins]] = order[begins]
     return first, following
+
+
+# Rooms that grow out of segments: levels of a pyramid in which boundaries resist.
+
+
+_PATIENCE = 48
+"""Levels at which an arc waits for better ones at its endpoints; a pyramid has 126 at most."""
+
+
+class Rule(Protocol):
+    """What decides which pairs of segments may merge."""
+
+    def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
+        """Return the rating of each pair, float64 (n_pairs,), above 0 where it may merge.
+
+        Parameters
+        ----------
+        segments
+            The segments as they are now.
+        grown
+            int64 (n,), segments that have grown since the last call.
+        """
+
+
+class Likely:
+    """The rule that two segments merge where a judge finds it likely that both are one room.
+
+    Parameters
+    ----------
+    judge
+        Returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
+        (n, len(EVIDENCE)).
+    least
+        Probability from which on a pair may merge, in (0, 1].
+    """
+
+    def __init__(self, judge: Judge, least: float) -> None:
+        self._judge, self._least = judge, least
+        self._likely = np.empty(0)
+
+    def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
+        """Return the probability of each pair, 0 below the least; see `Rule`."""
+        state = segments.state
+        if len(self._likely):
+            beside = [_merging_kernels.pairs_of(state, int(segment)) for segment in grown]
+            pairs = np.unique(np.concatenate([np.empty(0, np.int64), *beside]))
+        else:
+            self._likely = np.zeros(len(state.endpoints))
+            pairs = np.flatnonzero(state.endpoints[:, 0] >= 0)
+        pairs = pairs[state.open_sides[pairs] > 0]
+        if len(pairs):
+            self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
+        ratings: FloatArray = np.where(self._likely >= self._least, self._likely, 0.0)
+        return ratings
+
+
+class Small:
+    """The rule that a small segment merges with the neighbour of the longest open border.
+
+    Parameters
+    ----------
+    least_cells
+        Free cells from which on a segment is not small. Those without a neighbour stay.
+    """
+
+    def __init__(self, least_cells: float) -> None:
+        self._least = least_cells
+
+    def ratings(self, segments: JudgedSegments, _grown: LongArray) -> FloatArray:
+        """Return a rating that is the higher, the smaller the segment; see `Rule`."""
+        state = segments.state
+        pairs = np.flatnonzero((state.endpoints[:, 0] >= 0) & (state.open_sides > 0)).repeat(2)
+        ends = state.endpoints[pairs[::2]].ravel()
+        small = state.free[ends] < self._least
+        pairs, ends = pairs[small], ends[small]
+        order = np.lexsort((pairs, -state.open_sides[pairs], ends))
+        _, first = np.unique(ends[order], return_index=True)
+        widest = order[first]
+        ratings = np.zeros(len(state.endpoints))
+        np.maximum.at(ratings, pairs[widest], 1.0 - state.free[ends[widest]] / self._least)
+        return ratings
+
+
+class Growth:
+    """The resistance of boundaries between segments by rules, one after the other; see `Resists`.
+
+    Parameters
+    ----------
+    segments
+        The segments; they merge as the fields do.
+    rules
+        When no arc may be contracted by one of them, the next one decides.
+    """
+
+    def __init__(self, segments: JudgedSegments, rules: Sequence[Rule]) -> None:
+        self._segments, self._rules = segments, rules
+        self._label_of = segments.label_of
+        self.kept_apart: IntArray = _colours(segments)[self._label_of]
+        self.shape = self._label_of.shape
+
+    def steering(self, field_of: IntArray, n_vertices: int) -> GrowingSegments:
+        """Return the steering from a level on whose fields are the segments."""
+        inside = field_of >= 0
+        segment_of = np.full(n_vertices, -1, dtype=np.int64)
+        segment_of[field_of[inside]] = self._label_of.ravel()[inside]
+        return GrowingSegments(self._segments, self._rules, segment_of)
+
+
+class GrowingSegments:
+    """A steering by the boundaries of segments; see `Steering`.
+
+    An arc waits while a better one meets one of its endpoints, so that segments merge nearly in the
+    order of one contraction at a time, and boundaries of a merged segment are rated anew before the
+    next level.
+
+    Parameters
+    ----------
+    segments, rules
+        As of `Growth`.
+    segment_of
+        int64 (n_vertices,), the segment of each vertex of the level to start from, -1 for none.
+    """
+
+    def __init__(
+        self, segments: JudgedSegments, rules: Sequence[Rule], segment_of: LongArray
+    ) -> None:
+        self._segments, self._segment_of = segments, segment_of
+        self._rules = list(rules)
+        self._grown = np.empty(0, dtype=np.int64)
+        self._levels = 0
+        self._of_arc = np.empty(0)
+
+    def candidates(
+        self, field_of: Callable[[], IntArray], darts: Darts, vertices: object
+    ) -> tuple[LongArray, LongArray]:
+        """Return the arcs that may be contracted, and that no better one keeps waiting."""
+        u, v = self._segment_of[darts.origin.reshape(-1, 2).T]
+        loops = darts.origin[::2] == darts.origin[1::2]
+        ratings = self._rated(u, v)
+        ratings[(u == v) & (u >= 0) & ~loops] = 1.0  # parts of one segment that have met
+        may = ratings > 0
+        if not may.any() and len(self._rules) > 1:
+            self._rules.pop(0)
+            return self.candidates(field_of, darts, vertices)
+        self._of_arc = ratings
+        self._levels += 1
+        if self._waits:
+            best = np.zeros(self._segments.n_segments)
+            np.maximum.at(best, u[may], ratings[may])
+            np.maximum.at(best, v[may], ratings[may])
+            may[may] = ratings[may] >= np.maximum(best[u[may]], best[v[may]])
+        arcs = np.flatnonzero(may)
+        return arcs, (WORST_RANK * (1.0 - ratings[arcs])).astype(np.int64)
+
+    def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
+        """Undo all joins of a star but the best: the others are rated again without it."""
+        if not self._waits:
+            return
+        leaves = np.flatnonzero(kernel_dart >= 0)
+        leaves = leaves[np.argsort(-self._of_arc[kernel_dart[leaves] >> 1], kind="stable")]
+        _, first = np.unique(parent[leaves], return_index=True)
+        undone = np.delete(leaves, first)
+        parent[undone], kernel_dart[undone] = undone, -1
+
+    def merge(self, merged_into: IntArray, n_vertices: int) -> None:
+        """Merge the segments as their vertices do."""
+        before, segments = self._segment_of, self._segments
+        segment_of = np.full(n_vertices, -1, dtype=np.int64)
+        segment_of[merged_into] = before
+        stars = np.bincount(merged_into)[merged_into] > 1
+        joins = np.stack([segment_of[merged_into[stars]], before[stars]], axis=1)
+        grown: list[int] = []
+        while len(joins):
+            apart = []
+            for one, other in joins.tolist():
+                u, v = (int(segments.owner_of[segment]) for segment in (one, other))
+                if u == v:
+                    continue
+                pair = segments.pair_of(u, v)
+                if pair < 0:  # two leaves of a star: once its centre has joined, they touch
+                    apart.append((one, other))
+                else:
+                    grown.append(segments.merge(pair))
+            joins = np.array(apart)
+        self._grown = np.unique(segments.owner_of[grown])
+        self._segment_of = segments.owner_of[segment_of]
+
+    @property
+    def _waits(self) -> bool:
+        return self._levels <= _PATIENCE
+
+    def _rated(self, u: LongArray, v: LongArray) -> FloatArray:
+        """Return the rating of the arcs between segments, 0 for the others."""
+        of_pair = self._rules[0].ratings(self._segments, self._grown)
+        endpoints, n = self._segments.state.endpoints, self._segments.n_segments
+        alive = np.flatnonzero(endpoints[:, 0] >= 0)
+        low, high = np.sort(endpoints[alive], axis=1).T
+        keys = low * n + high
+        order = np.argsort(keys, kind="stable")
+        between = (u != v) & (u >= 0) & (v >= 0)
+        wanted = (np.minimum(u, v) * n + np.maximum(u, v))[between]
+        ratings = np.zeros(len(u))
+        ratings[between] = of_pair[alive[order[np.searchsorted(keys, wanted, sorter=order)]]]
+        return ratings
+
+
+def _colours(segments: JudgedSegments) -> IntArray:
+    """Return a number for each segment that none beside it has: a pyramid has few kinds of cells.
+
+    The last one, for no segment, is -1.
+    """
+    colour_of = np.full(segments.n_segments + 1, -1, dtype=np.int32)
+    for segment in np.flatnonzero(segments.state.versions >= 0).tolist():
+        pairs = _merging_kernels.pairs_of(segments.state, segment)
+        beside = segments.state.endpoints[pairs].sum(axis=1) - segment
+        taken = set(colour_of[beside].tolist())
+        colour_of[segment] = next(colour for colour in count() if colour not in taken)
+    return colour_of

@@ -19,7 +19,7 @@ from benchmarks.subjects.explore import missed_cells, narrow_world, widest_point
 from hybridnav.ext.live.explore import By, Exploration, Goals, Step, explore, laser_all_round
 from hybridnav.ext.live.explore.goals import doubtful_spots, narrow_spots
 from hybridnav.ext.live.explore.robot import Robot
-from hybridnav.ext.live.mapping import SimulatedLaser, SimulatedSonars
+from hybridnav.ext.live.mapping import SimulatedLaser
 from tests.strategies import examples
 
 START = (1.0, 1.0)
@@ -96,14 +96,6 @@ def test_thresholds_of_the_plan_are_none_of_the_robots_map() -> None:
     done = explore(plan, START, most_goals=4)
     assert done.share_known > 0.2
     assert (done.grid.measured == hn.CellClass.OCCUPIED).any()
-
-
-def test_a_ring_of_sonars_explores_a_hall() -> None:
-    hall = np.zeros((60, 60), dtype=np.float32)
-    hall[[0, -1]] = hall[:, [0, -1]] = 1.0
-    grid = hn.OccupancyGrid(hall, hn.Frame(0.1), robot_radius_m=0.2)
-    heard = explore(grid, sensor=SimulatedSonars(max_range_m=3.0), most_goals=30)
-    assert heard.share_known > 0.8
 
 
 def test_what_no_scan_shows_is_given_up_and_exploration_ends() -> None:

@@ -16,9 +16,6 @@ from hybridnav.ext.live.mapping import (
     LaserScan,
     Mapper,
     ScanSequence,
-    SonarModel,
-    SonarScan,
-    sonar_ring,
 )
 from tests.oracle.beams import kinds_of_cells
 from tests.strategies import examples
@@ -147,9 +144,7 @@ def test_a_turned_lattice_is_that_of_turned_scans(
     corner, (cosine, sine) = (0.7, -3.1), (math.cos(yaw_rad), math.sin(yaw_rad))
     level = Mapper(resolution_m=0.25, laser=model)
     turned = Mapper(resolution_m=0.25, laser=model, corner_m=corner, yaw_rad=yaw_rad)
-    sonars = SonarScan(np.full(3, 1.3), (0.313, 0.717, 0.51), sonar_ring(3))
-    all_scans: list[Any] = [*(odd(scan) for scan in given_scans), sonars]
-    for scan in all_scans:
+    for scan in (odd(scan) for scan in given_scans):
         x, y, heading = scan.pose
         at = corner[0] + cosine * x - sine * y, corner[1] + sine * x + cosine * y
         area = turned.add(replace(scan, pose=(*at, heading + yaw_rad)))
@@ -227,13 +222,13 @@ def test_a_wrong_first_pose_does_not_cost_the_map() -> None:
     assert np.array_equal(found.probability, expected.probability, equal_nan=True)
 
 
-@given(st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS, st.integers(0, 3))
+@given(st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS)
 @settings(max_examples=examples(60))
 def test_a_scan_changes_cells_of_its_area_alone(
-    given_scans: list[LaserScan], model: LaserModel, n_sonars: int
+    given_scans: list[LaserScan], model: LaserModel
 ) -> None:
     """The area lies on sides of cells, and shrinks to what the cells of the next grid need."""
-    corner_m, mounts = (0.1, -0.2), sonar_ring(n_sonars + 1)
+    corner_m = (0.1, -0.2)
     mapper = Mapper(resolution_m=0.25, laser=model, corner_m=corner_m)
     frame = hn.Frame(0.25, (corner_m[0] - 50.0, corner_m[1] - 50.0))
 
@@ -245,9 +240,7 @@ def test_a_scan_changes_cells_of_its_area_alone(
             whole[row : row + grid.shape[0], col : col + grid.shape[1]] = grid.probability
         return whole
 
-    readings = np.abs(given_scans[0].ranges_m[:1]).repeat(n_sonars + 1)
-    all_scans: list[Any] = [*given_scans, SonarScan(readings, (1.0, 2.0, 0.5), mounts)]
-    for scan in all_scans:
+    for scan in given_scans:
         before, area = evidence(), mapper.add(scan)
         after = evidence()
         assert area is not None
@@ -256,7 +249,7 @@ def test_a_scan_changes_cells_of_its_area_alone(
         cells = np.argwhere(changed)
         assert (cells >= low).all()
         assert (cells + 1 <= high).all()
-        if len(cells) and isinstance(scan, LaserScan):
+        if len(cells):
             assert (low == np.floor(low)).all()
             assert (high - low <= 2 * np.array(model.max_range_m / 0.25 + 2)).all()
 
@@ -276,72 +269,6 @@ def test_cells_far_from_the_origin_stay_on_the_lattice(far_m: float) -> None:
     grid = mapper.to_grid(robot_radius_m=0)
     assert grid.frame.origin_m == pytest.approx((far_m - 1.0, -far_m))
     assert grid.measured[0, -1] == hn.CellClass.OCCUPIED
-
-
-def cone_probability(model: SonarModel, reading: float, distance: float, off: float) -> float:
-    """The probability of the class's description."""
-    across = 1 - (off / model.half_angle_rad) ** 2
-    echo = reading < model.max_range_m
-    reading = min(reading, model.max_range_m)
-    far, near = reading + model.tolerance_m * echo, reading - model.tolerance_m * echo
-    if across < 0 or not model.min_range_m <= distance <= far:
-        return 0.5
-    if distance < near:
-        along = 1 - ((distance - model.min_range_m) / (near - model.min_range_m)) ** 2
-        return 0.5 - (0.5 - model.when_passed) * along * across
-    if not echo:
-        return 0.5
-    along = 1 - ((distance - reading) / model.tolerance_m) ** 2
-    return 0.5 + (model.when_hit - 0.5) * along * across
-
-
-@given(
-    st.floats(-1.5, 1.5),
-    st.floats(-1.5, 1.5),
-    st.floats(-4, 4),
-    st.lists(st.one_of(st.floats(1.0, 4.0), st.just(math.inf)), min_size=4, max_size=4),
-)
-@settings(max_examples=examples(40))
-def test_cones_add_the_log_odds_of_their_description(
-    x: float, y: float, heading: float, readings: list[float]
-) -> None:
-    model, mounts = SonarModel(max_range_m=3.0, tolerance_m=0.3), sonar_ring(4, radius_m=0.2)
-    mapper = Mapper(resolution_m=0.25, sonar=model)
-    mapper.add(SonarScan(np.array(readings), (x, y, heading), mounts))
-    grid = mapper.to_grid(robot_radius_m=0)
-    for row in range(grid.shape[0]):
-        for col in range(grid.shape[1]):
-            centre = grid.frame.points_of([row, col])
-            odds = 0.0
-            for (ahead, aside, turn), reading in zip(mounts, readings, strict=True):
-                cosine, sine = math.cos(heading), math.sin(heading)
-                apex = np.array(
-                    [x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside]
-                )
-                bearing = math.atan2(*(centre - apex)[::-1]) - heading - turn
-                off = (bearing + math.pi) % math.tau - math.pi
-                p = cone_probability(model, reading, math.dist(centre, apex), off)
-                odds += math.log(p / (1 - p))
-            found = grid.probability[row, col]
-            expected = 1 / (1 + math.exp(-odds))
-            assert (0.5 if math.isnan(found) else found) == pytest.approx(expected, abs=1e-4)
-
-
-def test_a_ring_of_sonars_sees_the_walls_of_a_corridor() -> None:
-    """Driving along it, with the readings that walls at 1 m to both hands return."""
-    mapper, mounts = Mapper(resolution_m=0.1), sonar_ring()
-    for x in np.arange(0.0, 4.0, 0.1):
-        aside = np.abs(np.sin(mounts[:, 2]))
-        readings = np.where(aside > 0.9, (1.0 - 0.23 * aside) / np.maximum(aside, 0.1), np.nan)
-        assert mapper.add(SonarScan(readings, (float(x), 0.0, 0.0), mounts))
-    grid = mapper.to_grid(robot_radius_m=0)
-
-    def kind(x: float, y: float) -> int:
-        return int(grid.measured[tuple(grid.frame.cells_of([x, y]))])
-
-    assert {kind(x, 1.0) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.OCCUPIED)}
-    assert {kind(x, -1.0) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.OCCUPIED)}
-    assert {kind(x, 0.6) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.FREE)}
 
 
 BAD_SCANS: dict[str, Any] = {
@@ -367,13 +294,6 @@ def test_a_scan_refuses_values_that_are_none(change: dict[str, Any]) -> None:
     with pytest.raises(hn.errors.InvalidValueError) as refused:
         LaserScan(**{**fine, **change})
     assert "\n" not in str(refused.value)
-
-
-def test_sonars_need_one_finite_mount_each() -> None:
-    wrong: list[Any] = [np.zeros((2, 3)), np.full((3, 3), np.nan), np.full((3, 3), 1e300), "ring"]
-    for mounts in wrong:
-        with pytest.raises(hn.errors.InvalidValueError, match="mounts"):
-            SonarScan(np.ones(3), (0.0, 0.0, 0.0), mounts)
 
 
 @pytest.mark.parametrize(
@@ -424,26 +344,10 @@ def test_without_a_limit_all_scans_count_alike() -> None:
             Mapper(least_probability=least)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"when_hit": 1.0},
-        {"half_angle_rad": 2.0},
-        {"tolerance_m": 0.0},
-        {"max_range_m": 0.1},
-        {"half_angle_rad": "wide"},
-    ],
-)
-def test_a_sonar_refuses_settings_out_of_range(values: dict[str, float]) -> None:
-    with pytest.raises(hn.errors.InvalidValueError):
-        SonarModel(**values)
-
-
 def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> None:
     mapper = Mapper(resolution_m=0.1, max_cells=1_000_000)
     none, far = np.full(3, np.nan), (5000.0, 0.0, 0.0)
     assert mapper.add(LaserScan(none, pose=far, start_rad=0.0, step_rad=0.1))
-    assert mapper.add(SonarScan(none, far, np.zeros((3, 3))))
     assert not mapper.has_cells
     near = LaserScan(np.full(3, 2.0), pose=(0.0, 0.0, 0.0), start_rad=0.0, step_rad=0.1)
     assert mapper.add(near)
@@ -464,7 +368,6 @@ def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> 
         {"yaw_rad": "left"},
         {"laser": LaserModel(depth_m=1e9)},
         {"laser": "SICK"},
-        {"sonar": LaserModel()},
     ],
 )
 def test_a_mapper_refuses_settings_out_of_range(values: dict[str, Any]) -> None:

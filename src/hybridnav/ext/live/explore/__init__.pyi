@@ -6,6 +6,6 @@ from .exploring import (
     explore as explore,
 )
 from .goals import Goals as Goals
-from .robot import Sensor as Sensor, laser_all_round as laser_all_round
+from .robot import laser_all_round as laser_all_round
 
 __all__: list[str]

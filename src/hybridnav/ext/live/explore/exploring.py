@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.live.explore.goals import Goals
-    from hybridnav.ext.live.explore.robot import Sensor
+    from hybridnav.ext.live.mapping import SimulatedLaser
     from hybridnav.maps import OccupancyGrid
     from hybridnav.topology import TopologicalMap
 
@@ -96,7 +96,7 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     world: OccupancyGrid,
     start: tuple[float, float] | None = None,
     *,
-    sensor: Sensor | None = None,
+    sensor: SimulatedLaser | None = None,
     seed: int = 0,
     by: By = "path",
     most_goals: int = MOST_GOALS,

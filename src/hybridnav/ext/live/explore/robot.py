@@ -22,13 +22,7 @@ from hybridnav.ext.live.explore.goals import (
     walled,
     widest_point,
 )
-from hybridnav.ext.live.mapping import (
-    LaserModel,
-    Mapper,
-    SimulatedLaser,
-    SimulatedSonars,
-    SonarModel,
-)
+from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
 from hybridnav.ext.live.mapping.sensors import in_sight
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner
@@ -41,12 +35,8 @@ if TYPE_CHECKING:
     from hybridnav.ext.live.mapping.mapper import Area
     from hybridnav.maps import OccupancyGrid
 
-Sensor = SimulatedLaser | SimulatedSonars
-"""What a simulated robot measures with."""
 
 _SCAN_EVERY_M = 0.5
-_TURNS = 8
-"""Scans of a ring of sonars at a point, the robot turning from one sonar to the next."""
 _NEAR_M = 0.5
 """Metres that a robot may stand beside the free cells it takes itself to be in."""
 _SCANS_AGAIN = 4
@@ -93,19 +83,18 @@ class Robot:
     """A robot in a floor plan, and what it knows."""
 
     def __init__(
-        self, world: OccupancyGrid, start: tuple[float, float] | None, sensor: Sensor, seed: int
+        self,
+        world: OccupancyGrid,
+        start: tuple[float, float] | None,
+        sensor: SimulatedLaser,
+        seed: int,
     ) -> None:
         self._world = walled(world)
         self._sensor, self._seed = sensor, seed
-        self._turns = [0.0]
-        if isinstance(sensor, SimulatedSonars):  # one echo says little of a cell
-            self._turns = (np.arange(_TURNS) * math.tau / len(sensor.mounts) / _TURNS).tolist()
         self._noise = np.random.default_rng(seed)
-        far_m = sensor.max_range_m
         self._mapper = Mapper(
             resolution_m=world.resolution_m,
             laser=_laser_model(sensor, world.resolution_m),
-            sonar=SonarModel(max_range_m=far_m),
             corner_m=world.frame.origin_m,
             yaw_rad=world.frame.yaw_rad,
         )
@@ -133,12 +122,9 @@ class Robot:
 
     def _scan(self) -> None:
         began = time.perf_counter()
-        x_m, y_m, heading_rad = self.pose
-        for turn_rad in self._turns:
-            pose = x_m, y_m, heading_rad + turn_rad
-            area = self._mapper.add(self._sensor.scan(self._world, pose, seed=self._noise))
-            if area is not None:
-                self._changed.append(area)
+        area = self._mapper.add(self._sensor.scan(self._world, self.pose, seed=self._noise))
+        if area is not None:
+            self._changed.append(area)
         self.points.append(self.pose[:2])
         self.seconds["mapping"] += time.perf_counter() - began
 
@@ -363,7 +349,7 @@ class Robot:
         return len(self._given_up)
 
 
-def _laser_model(sensor: Sensor, resolution_m: float) -> LaserModel:
+def _laser_model(sensor: SimulatedLaser, resolution_m: float) -> LaserModel:
     """Return the inverse model of a laser whose noise and poses are known.
 
     Nearly all beams occupy a cell behind the surface that they meet, and free none. A quarter of a

@@ -286,9 +286,7 @@ class _BoundedFile:
 @cache
 def bound_rosbags() -> None:
     """Replace the decompressors of rosbags, once."""
-    from lz4.frame import (  # type: ignore[import-untyped]  # noqa: PLC0415 - an extra
-        LZ4FrameDecompressor,
-    )
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]  # noqa: PLC0415 - an extra
     from rosbags.rosbag1 import reader as reader_1  # noqa: PLC0415
     from rosbags.rosbag2 import reader as reader_2  # noqa: PLC0415
     from rosbags.rosbag2 import storage_mcap  # noqa: PLC0415

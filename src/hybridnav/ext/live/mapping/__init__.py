@@ -1,4 +1,4 @@
-"""Occupancy grids from scans of lasers and sonars, with poses given.
+"""Occupancy grids from scans of lasers, with poses given.
 
 Names load on first use: scans and models need no numba.
 """

@@ -9,21 +9,9 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.mapping.kernels import (
-    add_cone,
-    add_hits,
-    add_passes,
-    beam_ends,
-    probabilities,
-)
-from hybridnav.ext.live.mapping.scans import (
-    LaserScan,
-    SonarScan,
-    checked_array,
-    checked_count,
-    checked_number,
-)
-from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
+from hybridnav.ext.live.mapping.kernels import add_hits, add_passes, beam_ends, probabilities
+from hybridnav.ext.live.mapping.scans import LaserScan, checked_array, checked_count, checked_number
+from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, log_odds_of
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 
@@ -55,8 +43,8 @@ class Mapper:
     ----------
     resolution_m
         Side of a cell in metres.
-    laser, sonar
-        Inverse models of the sensors; their defaults if None.
+    laser
+        Inverse model of the sensor; its default if None.
     corner_m
         A corner of the lattice of cells, `(x, y)` in metres, map frame.
     yaw_rad
@@ -90,7 +78,6 @@ class Mapper:
         *,
         resolution_m: float = 0.05,
         laser: LaserModel | None = None,
-        sonar: SonarModel | None = None,
         corner_m: tuple[float, float] = (0.0, 0.0),
         yaw_rad: float = 0.0,
         least_probability: float = 0.02,
@@ -108,9 +95,7 @@ class Mapper:
             checked_number("yaw_rad", yaw_rad),
         )
         self._laser = LaserModel() if laser is None else laser
-        self._sonar = SonarModel() if sonar is None else sonar
         checked_type("laser", self._laser, LaserModel)
-        checked_type("sonar", self._sonar, SonarModel)
         least = checked_number("least_probability", least_probability)
         if not 0 <= least < 0.5:  # noqa: PLR2004 - the prior
             raise InvalidValueError(
@@ -119,10 +104,7 @@ class Mapper:
             )
         self._limit = -log_odds_of(max(least, _NO_LIMIT))
         self._max_cells = checked_count("max_cells", max_cells, MAX_CELLS)
-        far_m = max(
-            self._laser.max_range_m + self._laser.depth_m,
-            self._sonar.max_range_m + self._sonar.tolerance_m,
-        )
+        far_m = self._laser.max_range_m + self._laser.depth_m
         if far_m / self.resolution_m > MOST_RANGE_CELLS:
             raise InvalidValueError(
                 f"a range of {far_m:g} m is {far_m / self.resolution_m:.0f} cells of "
@@ -178,13 +160,13 @@ class Mapper:
         cosine, sine = cos(yaw_rad), sin(yaw_rad)
         return cosine * x + sine * y, cosine * y - sine * x, heading_rad
 
-    def add(self, scan: LaserScan | SonarScan) -> Area | None:
+    def add(self, scan: LaserScan) -> Area | None:
         """Add a scan.
 
         Parameters
         ----------
         scan
-            Readings of a laser or of sonars, with their pose. Readings that are none are left out.
+            Readings of a laser, with its pose. Readings that are none are left out.
 
         Returns
         -------
@@ -199,16 +181,16 @@ class Mapper:
         InvalidValueError
             When it is no scan.
         """
-        if not isinstance(scan, LaserScan | SonarScan):
+        if not isinstance(scan, LaserScan):
             raise InvalidValueError(
                 f"a map grows by scans, got {scan!r:.80} of type {type(scan).__name__}: make a "
-                "LaserScan or a SonarScan of the readings and the pose"
+                "LaserScan of the readings and the pose"
             )
-        area = self._add_laser(scan) if isinstance(scan, LaserScan) else self._add_sonars(scan)
+        area = self._add(scan)
         self._n_scans += area is not None
         return area
 
-    def _add_laser(self, scan: LaserScan) -> Area | None:
+    def _add(self, scan: LaserScan) -> Area | None:
         model = self._laser
         high_m = min(model.max_range_m, scan.max_range_m)
         hits, ends, kinds, box = beam_ends(
@@ -239,47 +221,6 @@ class Mapper:
                 (hits, ends, kinds),
                 self._n_scans + 1,
                 changes,
-            )
-        return area
-
-    def _add_sonars(self, scan: SonarScan) -> Area | None:
-        model, side_m = self._sonar, self.resolution_m
-        x, y, heading_rad = self._on_lattice(scan.pose)
-        cosine, sine = cos(heading_rad), sin(heading_rad)
-        apexes = [
-            (
-                (y + sine * ahead + cosine * aside) / side_m,
-                (x + cosine * ahead - sine * aside) / side_m,
-                heading_rad + turn,
-            )
-            for ahead, aside, turn in scan.mounts.tolist()
-        ]
-        readings = [
-            (apex, range_m)
-            for apex, range_m in zip(apexes, scan.ranges_m.tolist(), strict=True)
-            if range_m > model.min_range_m
-        ]
-        if not readings:
-            return (*scan.pose[:2], *scan.pose[:2])
-        reach = np.minimum([range_m for _, range_m in readings], model.max_range_m)[:, np.newaxis]
-        centres, far = np.array([apex[:2] for apex, _ in readings]), reach + model.tolerance_m
-        low = np.floor((centres - far / side_m).min(axis=0)).astype(np.int64).tolist()
-        high = np.floor((centres + far / side_m).max(axis=0)).astype(np.int64).tolist()
-        area = self._grown((low[0], high[0], low[1], high[1]))
-        if area is None:
-            return None
-        changes = model.when_hit, model.when_passed, self._limit
-        lengths = model.tolerance_m / side_m, model.min_range_m / side_m
-        for apex, range_m in readings:
-            add_cone(
-                self._evidence,
-                self._seen_at,
-                self._corner,
-                apex,
-                (min(range_m, model.max_range_m) / side_m, range_m < model.max_range_m),
-                (model.half_angle_rad, *lengths),
-                changes,
-                self._n_scans + 1,
             )
         return area
 

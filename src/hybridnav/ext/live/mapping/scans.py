@@ -1,4 +1,4 @@
-"""Scans of a laser or of a ring of sonars, with poses, and which follow from those before."""
+"""Scans of a laser, with poses, and which follow from those before."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import frozen
-from hybridnav._base.trig import sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.frame import FARTHEST_M
 
@@ -76,99 +75,10 @@ class LaserScan:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class SonarScan:
-    """Readings of the sonars of a robot that were taken at one pose.
-
-    Parameters
-    ----------
-    ranges_m
-        Distance that each sonar measured, float64 (n,), n >= 1; NaN and values below 0 are no
-        readings, infinity stands for no echo. Copied.
-    pose
-        `(x, y, heading)` of the robot in the map frame, in metres and radians.
-    mounts
-        `(x, y, heading)` of each sonar on the robot, float64 (n, 3), metres and radians; see
-        `sonar_ring`. Copied.
-    time_s
-        When the scan was taken; NaN if unknown.
-
-    Raises
-    ------
-    InvalidValueError
-        When the pose or a mount is not finite, or there is not one mount for each range.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.live.mapping import SonarScan, sonar_ring
-    >>> scan = SonarScan(np.full(16, 2.0), pose=(0.0, 0.0, 0.0), mounts=sonar_ring())
-    >>> len(scan.ranges_m)
-    16
-    """
-
-    ranges_m: FloatArray = field(repr=False)
-    pose: tuple[float, float, float]
-    mounts: FloatArray = field(repr=False)
-    time_s: float = math.nan
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges_m", checked_ranges(self.ranges_m))
-        object.__setattr__(self, "pose", checked_pose(self.pose))
-        object.__setattr__(self, "time_s", checked_number("time_s", self.time_s))
-        mounts = checked_array("mounts", self.mounts)
-        if mounts.shape != (len(self.ranges_m), 3) or not (np.abs(mounts) <= FARTHEST_M).all():
-            raise InvalidValueError(
-                f"mounts have the shape {mounts.shape}, expected finite (x, y, heading), one for "
-                f"each of {len(self.ranges_m)} ranges: make them with sonar_ring"
-            )
-        object.__setattr__(self, "mounts", mounts)
-
-
-def sonar_ring(n_sonars: int = 16, *, radius_m: float = 0.23) -> FloatArray:
-    """Return the mounts of sonars that stand evenly on a ring and look outwards.
-
-    Parameters
-    ----------
-    n_sonars
-        Number of sonars; the first looks ahead, the others follow counter-clockwise. The Nomad 200
-        has 16.
-    radius_m
-        Radius of the ring in metres; the default is that of the Nomad 200.
-
-    Returns
-    -------
-    FloatArray
-        `(x, y, heading)` of each sonar, float64 (n_sonars, 3), metres and radians.
-
-    Raises
-    ------
-    InvalidValueError
-        When the number or the radius is out of range.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.live.mapping import sonar_ring
-    >>> sonar_ring(4, radius_m=1.0).round(2) + 0.0
-    array([[ 1.  ,  0.  ,  0.  ],
-           [ 0.  ,  1.  ,  1.57],
-           [-1.  ,  0.  ,  3.14],
-           [ 0.  , -1.  ,  4.71]])
-    """
-    count = checked_count("n_sonars", n_sonars, MOST_READINGS)
-    radius = checked_number("radius_m", radius_m)
-    if not (math.isfinite(radius) and radius >= 0):
-        raise InvalidValueError(
-            f"radius_m is {radius_m}, expected a finite length >= 0: give metres"
-        )
-    heading = np.arange(count) * (math.tau / count)
-    sines, cosines = sines_and_cosines(heading)
-    return np.stack([radius * cosines, radius * sines, heading], axis=1)
-
-
 # Checks of scans and of the settings of sensors.
 
 MOST_READINGS = 1_000_000
-"""Readings of a scan, and sonars of a ring."""
+"""Readings of a scan."""
 
 
 def checked_count(name: str, value: Any, most: int) -> int:

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import cos, log, sin, sines_and_cosines
+from hybridnav._base.trig import log, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import ray_lengths
-from hybridnav.ext.live.mapping.scans import (
-    MOST_READINGS,
-    LaserScan,
-    SonarScan,
-    checked_array,
-    checked_count,
-    checked_number,
-    sonar_ring,
-)
+from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_count, checked_number
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 
@@ -126,74 +118,6 @@ class LaserModel:
                 f"min_range_m is {self.min_range_m}, clear_range_m {self.clear_range_m} and "
                 f"max_range_m {self.max_range_m}, expected the least below and the clearing range "
                 "not above the greatest: give ranges in that order"
-            )
-
-
-@dataclass(frozen=True)
-class SonarModel:
-    """Inverse model of a sonar's cone, with the profiles of Moravec and Elfes (1985).
-
-    For a reading R, a cell whose centre lies at distance r and at the angle a off the axis has
-
-    * `r < R - e`: the probability 0.5 - (0.5 - when_passed) E, with
-      E = (1 - ((r - min_range) / (R - e - min_range))^2) (1 - (a / half_angle)^2);
-    * `R - e <= r <= R + e`: 0.5 + (when_hit - 0.5) O, with
-      O = (1 - ((r - R) / e)^2) (1 - (a / half_angle)^2);
-
-    and other cells stay as they are. Each sonar's reading counts by itself, by Bayes' rule (Elfes
-    1989): so the free cone of a neighbour clears a part of the arc on which an echo may lie.
-
-    Parameters
-    ----------
-    when_hit, when_passed
-        The greatest and the least probability that one reading yields, on the axis.
-    half_angle_rad
-        Half of the cone's opening; the default is that of Polaroid's sonars, 12.5 degrees.
-    tolerance_m
-        e, by which echoes are uncertain.
-    max_range_m
-        Readings of that length or more have no echo: the cone up to that length is free. The
-        default is that of the Nomad 200, 255 inches.
-    min_range_m
-        What the sonar cannot measure: cells nearer than that stay, and readings of that length or
-        less are none.
-
-    Raises
-    ------
-    InvalidValueError
-        When a probability, a length or the angle is out of range.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.live.mapping import SonarModel
-    >>> SonarModel(max_range_m=3.0).max_range_m
-    3.0
-    """
-
-    when_hit: float = 0.7
-    when_passed: float = 0.3
-    half_angle_rad: float = math.radians(12.5)
-    tolerance_m: float = 0.1
-    max_range_m: float = 6.477
-    min_range_m: float = 0.15
-
-    def __post_init__(self) -> None:
-        _check_probabilities(self.when_hit, self.when_passed)
-        _check_lengths(
-            tolerance_m=self.tolerance_m,
-            max_range_m=self.max_range_m,
-            min_range_m=self.min_range_m,
-        )
-        if not 0 < checked_number("half_angle_rad", self.half_angle_rad) < math.pi / 2:
-            raise InvalidValueError(
-                f"half_angle_rad is {self.half_angle_rad}, expected an angle within 0 and pi / 2: "
-                "give half of the cone's opening in radians"
-            )
-        if not (self.tolerance_m > 0 and self.min_range_m < self.max_range_m):
-            raise InvalidValueError(
-                f"tolerance_m is {self.tolerance_m}, min_range_m {self.min_range_m} and "
-                f"max_range_m {self.max_range_m}, expected a tolerance > 0 and the "
-                "least range below the greatest: give lengths in metres"
             )
 
 
@@ -345,103 +269,3 @@ class SimulatedLaser:
         return LaserScan(
             ranges, shape.pose, self.start_rad, self.step_rad, self.max_range_m, time_s
         )
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedSonars:
-    """Sonars that measure the distance to the nearest occupied cell in their cones.
-
-    The cone is searched by rays that are at most a cell apart at the greatest range. Every surface
-    returns an echo, at whatever angle it is met: the mirroring of smooth walls is not simulated.
-
-    Parameters
-    ----------
-    mounts
-        `(x, y, heading)` of each sonar on the robot, float64 (n, 3), metres and radians; by default
-        the ring of the Nomad 200.
-    half_angle_rad
-        Half of a cone's opening.
-    max_range_m
-        Greatest range; beyond there is no echo.
-    noise_m
-        Standard deviation of readings, normally distributed.
-
-    Raises
-    ------
-    InvalidValueError
-        When a value is out of range.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.live.mapping import SimulatedSonars, sonar_ring
-    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.0, 1.0]]), robot_radius_m=0)
-    >>> sonars = SimulatedSonars(sonar_ring(4, radius_m=0.0))
-    >>> sonars.scan(grid, (0.5, 0.5, 0.0)).ranges_m.round(2)
-    array([2.5, inf, inf, inf])
-    """
-
-    mounts: FloatArray = field(default_factory=sonar_ring, repr=False)
-    half_angle_rad: float = math.radians(12.5)
-    max_range_m: float = 6.477
-    noise_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check(self.max_range_m, self.noise_m)
-        if not 0 <= checked_number("half_angle_rad", self.half_angle_rad) < math.pi / 2:
-            raise InvalidValueError(
-                f"half_angle_rad is {self.half_angle_rad}, expected an angle from 0 to pi / 2: "
-                "give half of the cone's opening in radians"
-            )
-
-    def scan(
-        self,
-        grid: OccupancyGrid,
-        pose: tuple[float, float, float],
-        *,
-        seed: int | np.random.Generator = 0,
-        time_s: float = math.nan,
-    ) -> SonarScan:
-        """Return what the sonars would measure.
-
-        Parameters
-        ----------
-        grid
-            The world.
-        pose
-            `(x, y, heading)` of the robot, metres and radians, map frame.
-        seed
-            Of the noise; a generator, for noise that differs from scan to scan.
-        time_s
-            When the scan is taken.
-
-        Returns
-        -------
-        SonarScan
-            The readings; infinite without an echo.
-
-        Raises
-        ------
-        InvalidValueError
-            When the pose or a mount is not finite, or the range more than 2^14 cells.
-        """
-        _check_world(grid, self.max_range_m)
-        mounts = np.atleast_1d(checked_array("mounts", self.mounts))
-        shape = SonarScan(np.full(len(mounts), math.inf), pose, mounts)
-        x_m, y_m, heading_rad = shape.pose
-        cosine, sine = cos(heading_rad), sin(heading_rad)
-        # Beside the ray on the axis.
-        n_aside = math.ceil(self.half_angle_rad * self.max_range_m / grid.resolution_m)
-        fan = np.linspace(-self.half_angle_rad, self.half_angle_rad, 2 * n_aside + 1)
-        ranges = np.array(
-            [
-                _ranges(
-                    grid,
-                    (x_m + cosine * ahead - sine * aside, y_m + sine * ahead + cosine * aside),
-                    heading_rad + turn + fan,
-                    self.max_range_m,
-                ).min()
-                for ahead, aside, turn in shape.mounts.tolist()
-            ]
-        )
-        ranges = _noisy(ranges, self.noise_m, seed)
-        return SonarScan(ranges, shape.pose, shape.mounts, time_s)

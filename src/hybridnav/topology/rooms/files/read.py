@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import printable
-from hybridnav._base.yaml_file import read_marked, read_yaml
+from hybridnav._base.yaml_file import read_marked
 from hybridnav.errors import (
     InvalidValueError,
     MapNotFoundError,
@@ -129,21 +129,6 @@ def labels_of(read: Read, grid: OccupancyGrid) -> IntArray:
         by_hand = {o.room for o in read.outlines if o.fingerprint not in missed.runs_of}
         label_of = without_slivers(label_of, grid, by_hand | set(read.seeds))
     return label_of
-
-
-def files_of(path: Path) -> list[Path]:
-    """Return a file of rooms and the image that it names, if it names one.
-
-    Raises
-    ------
-    RoomsError
-        When the file cannot be read.
-    """
-    values = read_yaml(
-        path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
-    )
-    data = values.get("data")
-    return [path, path.parent / data] if isinstance(data, str) else [path]
 
 
 def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGrid) -> Read:

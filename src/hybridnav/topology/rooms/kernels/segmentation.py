@@ -1,5 +1,5 @@
-"""Kernels of the room segmentation: floods, gaps in walls, growth of labels, and the evidence on a
-boundary between two segments with the forest that judges it.
+"""Kernels of the room segmentation: floods, cuts along walls, growth of labels, and the evidence on
+a boundary between two segments with the forest that judges it.
 """
 
 import math
@@ -49,57 +49,6 @@ def flood_basins(clearance, order, cols, ratio, broad):
     for k in range(order.size):
         basin[order[k]] = find(root, np.int64(basin[order[k]]))
     return basin
-
-
-@njit(cache=True, nogil=True)
-def gaps_in_rows(wall, free, longest, short, window, side, both, share):
-    """Return the cells of the gaps between walls that continue each other along a row.
-
-    A gap counts when enough of its cells are free and there is enough wall on both sides.
-
-    Parameters
-    ----------
-    wall, free
-        bool (rows, cols).
-    longest
-        Cells of the longest gap.
-    short
-        Cells of a gap that needs only `both`, not `side`.
-    window
-        Cells looked at on either side of the gap.
-    side, both
-        Wall cells needed on each side, and on both together.
-    share
-        Least share of free cells in the gap.
-
-    Returns
-    -------
-    ndarray
-        bool (rows, cols).
-    """
-    rows, cols = wall.shape
-    found = np.zeros((rows, cols), np.bool_)
-    walls = np.zeros(cols + 1, np.int64)
-    for row in range(rows):
-        for col in range(cols):
-            walls[col + 1] = walls[col] + wall[row, col]
-        last = -1
-        for col in range(cols):
-            if not wall[row, col]:
-                continue
-            gap = col - last - 1
-            if last >= 0 and 0 < gap <= longest:
-                before = walls[last + 1] - walls[max(0, last + 1 - window)]
-                behind = walls[min(cols, col + window)] - walls[col]
-                held = gap <= short or min(before, behind) >= side
-                if held and before + behind >= both:
-                    n_free = 0
-                    for i in range(last + 1, col):
-                        n_free += free[row, i]
-                    if n_free >= share * gap:
-                        found[row, last + 1 : col] = True
-            last = col
-    return found
 
 
 @njit(cache=True, nogil=True)
@@ -166,8 +115,8 @@ def cut_along(wall, free, slope, within, lengths, share, cut):
     within
         bool (rows, cols), cells of which at least half of a gap consists.
     lengths
-        As of `gaps_in_rows`, in cells: the longest gap, a door, the window, the least wall on
-        either side and on both.
+        In cells: the longest gap; a door, which needs no least wall on either side; the window
+        looked at beside a gap; the least wall in it on either side, and on both together.
     share
         Least share of free cells in the gap.
     cut

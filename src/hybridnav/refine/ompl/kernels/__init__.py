@@ -1,1 +1,0 @@
-"""Kernels: compiled loops over plain arrays."""
