@@ -205,12 +205,16 @@ CASES = {
                 wall=Wall("right", 3, is_opposite=True, via=Wall("left", 2, 1)),
             ),
         ),
-        "keep to the wall on the left, past the opening, and behind it to the second door, and with "
-        "your back to it go straight across to the opposite wall, turn right along it and go through "
-        "the third door (door 7) into l3_404",
-        "an der linken Wand entlang, an der Öffnung vorbei und dahinter bis zur zweiten Tür, dann mit "
-        "ihr im Rücken geradeaus zur Wand gegenüber, dort nach rechts an ihr entlang und durch die "
-        "dritte Tür (Tür 7) in „l3_404“ gehen",
+        (
+            "keep to the wall on the left, past the opening, and behind it to the second door, and "
+            "with your back to it go straight across to the opposite wall, turn right along it and "
+            "go through the third door (door 7) into l3_404"
+        ),
+        (
+            "an der linken Wand entlang, an der Öffnung vorbei und dahinter bis zur zweiten Tür, "
+            "dann mit ihr im Rücken geradeaus zur Wand gegenüber, dort nach rechts an ihr entlang "
+            "und durch die dritte Tür (Tür 7) in „l3_404“ gehen"
+        ),
     ),
     "from the nearest door": (
         instruction(
@@ -219,10 +223,14 @@ CASES = {
             KITCHEN,
             doorway=Doorway(*(LAB, 7, 0.9), ordinal=1, wall=Wall("left", 1, via=Wall(None, 1))),
         ),
-        "go to the nearest door, and with your back to it keep to the wall on the left and go through "
-        "the first door (door 7) into l3_404",
-        "zur nächstgelegenen Tür gehen, dann mit ihr im Rücken an der linken Wand entlang und durch "
-        "die erste Tür (Tür 7) in „l3_404“ gehen",
+        (
+            "go to the nearest door, and with your back to it keep to the wall on the left and go "
+            "through the first door (door 7) into l3_404"
+        ),
+        (
+            "zur nächstgelegenen Tür gehen, dann mit ihr im Rücken an der linken Wand entlang und "
+            "durch die erste Tür (Tür 7) in „l3_404“ gehen"
+        ),
     ),
     "deep in the room": (
         instruction("arrive", 3.0, LAB, waypoint="l3_404"),

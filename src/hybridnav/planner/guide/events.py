@@ -265,7 +265,7 @@ def with_glances(  # noqa: C901 - a door is seen, led to by a wall, or walked to
             if glance is not None and wall is not None:
                 wall = None if wall.via or wall.past else wall
                 glance = glance if wall is None else None
-        elif following > at and glance is None and door is not None and not kept:
+        elif door is not None and glance is None and not kept and not math.isnan(facing_rad):
             most_m = _LEAST_WALL_M + _DETOUR * event.at_m
             room = event.stretch.space.name
             wall = landmarks.from_a_door(line.at(0.0), event.stretch.doors[0], room, most_m)

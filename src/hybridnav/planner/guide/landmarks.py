@@ -106,7 +106,7 @@ class Landmarks(DoorsInSight):
 
         The parameters are those of `along_a_wall`, but for the point where the person looks round.
         """
-        if room is None:
+        if room is None or self._is_corridor(room):
             return None
         near = sorted(
             (math.dist(point, one.position), one.number)
