@@ -9,6 +9,7 @@ are looked at first, hands are taken broadly, and nobody knows how long his step
 from __future__ import annotations
 
 import heapq
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -24,12 +25,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray
+    from hybridnav.topology.rooms import Door, Rooms
 
 # Reading: from a sentence to what it asks for.
 
 _NUMBERS = {
     "en": ("first", "second", "third", "fourth", "fifth"),
     "de": ("erste", "zweit", "dritt", "vierte", "fünfte"),
+}
+_NEAREST = {
+    "en": ("nearest", "second", "third", "fourth", "fifth"),
+    "de": ("nächst", "zweitnächste", "drittnächste", "vierte", "fünfte"),
 }
 _COMPASS = {
     "en": (
@@ -45,7 +51,8 @@ _KINDS = {
     "en": {"corridor": "corridor", "hall": "hall", "room": "room", "passage": "passage"},
     "de": {"Flur": "corridor", "Halle": "hall", "Raum": "room", "Durchgang": "passage"},
 }
-_LEFT = {"left": 1.0, "links": 1.0, "right": -1.0, "rechts": -1.0}
+_LEFT = {"left": 1.0, "links": 1.0, "linken": 1.0, "right": -1.0, "rechts": -1.0, "rechten": -1.0}
+_COUNTS = {"the": 1, "der": 1, "two": 2, "zwei": 2, "three": 3, "drei": 3}
 _ROUND = math.pi
 _TURNS = {
     "en": (
@@ -88,6 +95,11 @@ _TEXTS = {
         r"(?P<tail> on the .*| ahead.*| behind.*)?$",
         "opening": "opening",
         "door": "door",
+        "wall": r"wall on the (left|right)",
+        "across": r"go straight across to the opposite wall, turn (left|right) along it",
+        "via": r"^(.*) to the (\w+(?: nearest)?) door, and with your back to it ",
+        "far": r"for about (\d+) m",
+        "past": r"past (the|two|three) openings?, and behind",
         "last": r"\blast\b",
         "end": r"to (?:its|the) (?:end|corner)|at (?:its|the) end",
     },
@@ -100,6 +112,11 @@ _TEXTS = {
         r"(?P<tail> links.*| rechts.*| voraus.*| im Rücken| zu)?$",
         "opening": "Öffnung",
         "door": "Tür",
+        "wall": r"an der (linken|rechten) Wand",
+        "across": r"geradeaus zur Wand gegenüber, dort nach (links|rechts) an ihr entlang",
+        "via": r"^(.*?)(?: ?bis)? ?zur (\w+)n Tür(?: gehen)?, dann mit ihr im Rücken ",
+        "far": r", etwa (\d+) m weit,",
+        "past": r"an (der|zwei|drei) Öffnung(?:en)? vorbei",
         "last": r"\bletzte\b",
         "end": r"bis (?:zum|ans|zu seinem) Ende|am Ende",
     },
@@ -127,6 +144,16 @@ class Step:
     into_kind: str | None = None
     out_rad: float | None = None
     """The turn behind the door."""
+    wall: float | None = None
+    """Where the wall lies that one follows: 1 at the left hand, -1 at the right."""
+    across: float | None = None
+    """To which hand one turns at the wall opposite, likewise."""
+    far_m: float | None = None
+    """How far one follows it, in metres."""
+    past: int = 0
+    """How many openings one passes at it."""
+    via: Step | None = None
+    """The walk to another door that one turns one's back to."""
     compass_rad: float | None = None
     text: str = ""
 
@@ -146,6 +173,18 @@ def read(sentence: str, language: str) -> Step:
                 return Step("start", compass_rad=number * math.pi / 4, text=sentence)
         mark = re.search(texts["mark"], sentence)
         return Step("start", **found | _door(mark, language)) if mark else Step("start", **found)
+    via = re.search(texts["via"], sentence)
+    if via is not None:
+        cross = re.search(texts["cross"], sentence[via.end() :])
+        assert cross is not None, sentence  # noqa: S101
+        ordinal = next(
+            n
+            for n, words in enumerate(zip(_NUMBERS[language], _NEAREST[language], strict=False), 1)
+            if via[2].startswith(words)
+        )
+        before = _at_the_wall(via[1], language) | {"ordinal": ordinal, "is_opening": False}
+        found |= _door(cross, language) | {"via": Step("cross", **before)}
+        return Step("cross", **found)
     cross = re.search(texts["cross"], sentence)
     if cross is not None:
         return Step("cross", **found | _door(cross, language))
@@ -157,6 +196,8 @@ def _door(cross: re.Match[str], language: str) -> dict[str, Any]:
     """Return what a sentence says of a door: before it, of it, behind it."""
     texts, head, tail = _TEXTS[language], cross["head"], cross["tail"] or ""
     into, kind = _space(cross["into"], language)
+    at_the_wall = _at_the_wall(head, language)
+    head = re.sub(rf"{texts['wall']}|{texts['across']}|{texts['past']}", "", head)
     turn_rad = _angle(_TURNS[language], head)
     for pattern, _ in _TURNS[language]:
         head = re.sub(pattern, "", head)
@@ -174,9 +215,23 @@ def _door(cross: re.Match[str], language: str) -> dict[str, Any]:
         "side_rad": side_rad,
         "is_opening": is_opening,
         "ordinal": ordinal,
+        **at_the_wall,
         "into": into,
         "into_kind": kind,
         "out_rad": None if is_mark else _angle(_TURNS[language], tail),
+    }
+
+
+def _at_the_wall(text: str, language: str) -> dict[str, Any]:
+    """Return what words say of a wall that one follows."""
+    texts = _TEXTS[language]
+    names = ("wall", "across", "past", "far")
+    wall, across, past, far = (re.search(texts[name], text) for name in names)
+    return {
+        "far_m": None if far is None else float(far[1]),
+        "wall": None if wall is None else _LEFT[wall[1]],
+        "across": None if across is None else _LEFT[across[1]],
+        "past": 0 if past is None else _COUNTS[past[1]],
     }
 
 
@@ -204,6 +259,8 @@ def _angle(patterns: Sequence[tuple[str, int]], text: str) -> float | None:
 
 # Looking: what a person sees of a map.
 
+_GAP_M = 2.0
+"""How far apart the outlines of rooms may be where people see one door."""
 _LEAST_M = 0.4
 """Width from which a person takes a gap for a door."""
 _STEP_M = 0.25
@@ -245,16 +302,18 @@ class Place:
         self.is_body: BoolArray = self.grid.classes == hn.CellClass.FREE
         self.label_of: IntArray = rooms.labels.label_of
         self.doors_of: dict[int, list[Seen]] = {}
+        self.cells_of: dict[int, list[tuple[int, int]]] = {}
         labels = {name: number for number, name in enumerate(rooms.names)} | {None: -1}
         listed = {door.number for door in rooms.listed_doors}
         for door in rooms.doors:
             if door.number not in listed and not (door.passable and None in door.rooms):
                 continue
-            if door.passage_m < _LEAST_M:
+            if door.passage_m < _LEAST_M or (door.width_m < _LEAST_M and not door.passable):
                 continue
             cells = np.column_stack(np.divmod(rooms.cells_beside(door.number), self.grid.shape[1]))
             points = self.grid.frame.points_of(cells)
             owner = self.label_of[tuple(cells.T)]
+            self.cells_of[door.number] = [(row, col) for row, col in cells.tolist()]
             ends = [labels[name] for name in door.rooms]
             if ends[0] == ends[1] or any((owner == end).sum() == 0 for end in ends):
                 continue
@@ -265,24 +324,50 @@ class Place:
             if not across.any():
                 across = means[1] - means[0]
             for (own, other), (dx, dy) in zip((ends, ends[::-1]), (across, -across), strict=True):
-                is_gap, beyond = other < 0, other
-                if is_gap:
-                    beyond = self._behind_a_gap(np.array(door.position), math.atan2(dy, dx))
-                if own < 0 or (beyond in (own, -1) and door.number not in listed):
-                    continue
-                self.doors_of.setdefault(own, []).append(
-                    Seen(
-                        door.number,
-                        np.array(door.position),
-                        points[:: max(1, len(points) // 6)],
-                        math.atan2(dy, dx),
-                        None if is_gap else door.is_opening,
-                        beyond,
+                out_rad = math.atan2(dy, dx)
+                behind: list[tuple[int, bool | None]] = [(other, door.is_opening)]
+                if own >= 0 > other:
+                    behind = list(self._behind_a_gap(rooms, door, out_rad))
+                for beyond, is_opening in behind if own >= 0 else ():
+                    if beyond in (own, -1) and door.number not in listed:
+                        continue
+                    self.doors_of.setdefault(own, []).append(
+                        Seen(
+                            door.number,
+                            np.array(door.position),
+                            points[:: max(1, len(points) // 6)],
+                            out_rad,
+                            is_opening,
+                            beyond,
+                        )
                     )
-                )
 
-    def _behind_a_gap(self, point: FloatArray, out_rad: float) -> int:
-        """Return the room behind a gap between two outlines, -1 for none."""
+    def _behind_a_gap(
+        self, rooms: Rooms, door: Door, out_rad: float
+    ) -> Iterator[tuple[int, bool | None]]:
+        """Yield the rooms behind a gap between two outlines, and whether an opening leads there.
+
+        People see no outlines: they see the door of each room there, or the opening; None where the
+        outlines differ. A room of none is -1.
+        """
+        far = [
+            other
+            for other in rooms.doors
+            if None in other.rooms and not set(other.rooms) & set(door.rooms) - {None}
+            if other.passage_m >= _LEAST_M and (other.width_m >= _LEAST_M or other.passable)
+            if math.dist(other.position, door.position) < _GAP_M
+        ]
+        labels = {name: number for number, name in enumerate(rooms.names)}
+        for other in far:
+            name = other.rooms[0] or other.rooms[1]
+            is_opening = door.is_opening if door.is_opening == other.is_opening else None
+            if name is not None:
+                yield labels[name], is_opening
+        if not far:
+            yield self._straight_behind(np.array(door.position), out_rad), None
+
+    def _straight_behind(self, point: FloatArray, out_rad: float) -> int:
+        """Return the room straight behind a gap between two outlines, -1 for none."""
         way = np.array([math.cos(out_rad), math.sin(out_rad)])
         for away_m in np.arange(0.1, 1.6, 0.1):
             row, col = self.cell(point + away_m * way)
@@ -359,6 +444,14 @@ class Place:
                 if further_m < found.get(cell, math.inf):
                     found[cell] = further_m
                     heapq.heappush(queue, (further_m, cell))
+        return found
+
+    @cached_property
+    def is_thing(self) -> BoolArray:
+        """What stands free and is small, so that people walk round it: bool (rows, cols)."""
+        number, _ = ndimage.label(~self.is_free, structure=np.ones((3, 3)))
+        areas_m2 = np.bincount(number.ravel()) * self.grid.cell_area_m2
+        found: BoolArray = (areas_m2 < 1.0)[number] & ~self.is_free
         return found
 
     @cached_property
@@ -471,7 +564,13 @@ class Walker:
     # Doors.
 
     def _cross(self, step: Step) -> None:
-        if step.is_opening is None:
+        if step.via is not None:
+            self._turn_back_to(self._before(step.via))
+        if step.wall is not None:
+            door = self._along_a_wall(step, step.wall)
+        elif step.across is not None:
+            door = self._along_a_wall(step, -step.across, is_across=True)
+        elif step.is_opening is None:
             door = self._next_border(step)
         elif math.isnan(self.heading_rad) or (step.metres is None and not step.is_to_end):
             door = self._at_a_glance(step)
@@ -530,6 +629,114 @@ class Walker:
         return name is not None and any(
             place.sign(label) == name for label in range(len(place.names))
         )
+
+    def _along_a_wall(  # noqa: C901, PLR0912, PLR0915 - one walk, all that may end it
+        self, step: Step, hand: float, *, is_across: bool = False
+    ) -> Seen:
+        """Walk with a hand on the wall, from the door behind or straight on to the wall opposite,
+        and return the door that is meant.
+
+        A wall that an opening interrupts leads out of the space, unless the words have it passed,
+        or one looks for a name at a door.
+        """
+        doors, passed, past, trail = self._doors_beside(), 0, 0, [self.point]
+        is_read = self._is_readable(step.into)
+        cell = begin = self.place.cell(self.point)
+        ways = ((0, 1), (1, 0), (0, -1), (-1, 0))
+        if is_across:
+            came_by, away = None, np.array([math.cos(self.heading_rad), math.sin(self.heading_rad)])
+            for away_m in np.arange(0.0, _SIGHT_M, self.place.grid.resolution_m / 4):
+                there = self.place.cell(self.point + away_m * away)
+                if self._is_inside(there):
+                    cell = there
+                elif not self.place.is_thing[there]:
+                    break
+        else:
+            behind = [cell for cell, each in doors.items() if each[0].number == self.came_by]
+            cell = min(behind or doors, key=lambda one: math.dist(one, begin))
+            came_by = doors[cell][0].number
+        outs = [n for n, way in enumerate(ways) if not self._is_inside(_next(cell, way))]
+        if not outs:
+            raise Lost("no wall: " + step.text)
+        look = outs[0]
+        if is_across:
+            toward = self.heading_rad - self.place.grid.frame.yaw_rad
+            look = max(outs, key=lambda n: math.cos(n * math.pi / 2 - toward))
+        way, last = (look + int(hand > 0) * 2 + 1) % 4, came_by
+        most = round(300 / self.place.grid.resolution_m)
+        for _ in range(most):
+            side = (way + int(hand)) % 4  # the hand on the wall
+            trail.append(self.place.grid.frame.points_of(np.array([cell]))[0])
+            beside, ahead = _next(cell, ways[side]), _next(cell, ways[way])
+            if self._is_inside(beside):
+                cell, way = beside, side
+                continue
+            here = doors.get(cell, []) if self._is_free(beside) else []
+            if here and here[0].number not in (last, came_by):
+                last = here[0].number
+                is_alike = any({step.is_opening, one.is_opening} != {True, False} for one in here)
+                passed += is_alike
+                is_there = past == step.past and passed == step.ordinal
+                if step.far_m is not None:
+                    near_m, far_m = self._window(step.far_m)
+                    is_there = near_m <= self._walked_m(trail) <= far_m
+                for door in here:
+                    is_meant = is_there and is_alike and self._is_meant(door, step)
+                    if is_meant and (step.into is None or self._can_reach(door)):
+                        return door
+                if not is_alike and here[0].is_opening:
+                    passed, past = 0, past + 1
+                is_unclear = any(one.is_opening is None for one in here)
+                if (past > step.past or is_unclear) and not is_read:
+                    break
+            if self._is_inside(ahead):
+                cell = ahead
+            else:
+                way = (way - int(hand)) % 4
+        raise Lost("no such door in the wall: " + step.text)
+
+    def _before(self, step: Step) -> Seen:
+        """Return the door that one goes to, but not through."""
+        if step.wall is None and step.across is None:
+            return self._at_a_glance(step)
+        if step.across is None:
+            return self._along_a_wall(step, step.wall or 1.0)
+        return self._along_a_wall(step, -step.across, is_across=True)
+
+    @staticmethod
+    def _walked_m(trail: Sequence[FloatArray]) -> float:
+        """Return how far one has walked who cuts the corners of what is less than a stride."""
+        kept = [trail[0]]
+        for point in (*trail[1:], trail[-1]):
+            if math.dist(point, kept[-1]) >= 2 * _STEP_M:
+                kept.append(point)
+        return sum(math.dist(one, other) for one, other in itertools.pairwise(kept))
+
+    def _turn_back_to(self, door: Seen) -> None:
+        """Go to a door and look from it into the room."""
+        self.came_by, self.heading_rad = door.number, self.place.squared(door.out_rad + math.pi)
+        away = np.array([math.cos(door.out_rad), math.sin(door.out_rad)])
+        self.point = door.point - _AWAY_M * away
+        self._settle()
+
+    def _is_inside(self, cell: tuple[int, int]) -> bool:
+        return self._is_free(cell) and int(self.place.label_of[cell]) == self.label
+
+    def _is_free(self, cell: tuple[int, int]) -> bool:
+        shape = self.place.grid.shape
+        is_on_map = 0 <= cell[0] < shape[0] and 0 <= cell[1] < shape[1]
+        return is_on_map and bool(self.place.is_free[cell])
+
+    def _doors_beside(self) -> dict[tuple[int, int], list[Seen]]:
+        """Return the doors of the room by the cells of it beside them."""
+        of, labels = self.place.cells_of, self.place.label_of
+        doors = self.place.doors_of.get(self.label, ())
+        found: dict[tuple[int, int], list[Seen]] = {}
+        for door in doors:
+            for cell in of[door.number]:
+                if labels[cell] == self.label:
+                    found.setdefault(cell, []).append(door)
+        return found
 
     def _next_border(self, step: Step) -> Seen:
         """Return what lies ahead where the words name no door."""
@@ -701,6 +908,10 @@ class Walker:
     def _bearing(self, point: FloatArray) -> float:
         dx, dy = point - self.point
         return math.atan2(dy, dx)
+
+
+def _next(cell: tuple[int, int], way: tuple[int, int]) -> tuple[int, int]:
+    return cell[0] + way[0], cell[1] + way[1]
 
 
 def wrapped(angle_rad: float) -> float:

@@ -61,12 +61,12 @@ def corrupted(words: Sequence[str], how: str) -> list[str]:
     others = {"left": "right", "right": "left"}
     if how == "numbers":
         others = {"first": "third", "second": "first", "third": "fifth", "nearest": "third nearest"}
-    pattern = re.compile(rf"\b({'|'.join(others)})\b|after (\d+) m")
+    pattern = re.compile(rf"\b({'|'.join(others)})\b|(after|for about) (\d+) m")
 
     def other(found: re.Match[str]) -> str:
         if found[1]:
             return others[found[1]]
-        return found[0] if how == "hands" else f"after {2 * int(found[2]) + 8} m"
+        return found[0] if how == "hands" else f"{found[2]} {2 * int(found[3]) + 8} m"
 
     return [pattern.sub(other, line) for line in words]
 

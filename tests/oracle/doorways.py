@@ -209,7 +209,8 @@ def _is_by_sight(told: tuple[Instruction, ...], at_door: Instruction | None) -> 
     that is told, and no turn."""
     crossed = [one for one in told if one.doorway is not None]
     around = crossed[crossed.index(at_door) :][:2] if at_door in crossed else []
-    return any(one.doorway is not None and one.doorway.is_seen for one in around)
+    doorways = [one.doorway for one in around if one.doorway is not None]
+    return any(one.is_seen or one.wall is not None for one in doorways)
 
 
 def _is_straight_opening(walk: Walk, passage: Passage) -> bool:

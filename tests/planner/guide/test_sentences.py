@@ -18,6 +18,7 @@ from hybridnav.planner.guide import (
     Landmark,
     Space,
     Turn,
+    Wall,
     check_language,
     languages,
     sentences,
@@ -83,7 +84,7 @@ CASES = {
     "the nearest door": (
         instruction("cross", doorway=Doorway(LAB, 7, 0.9, ordinal=1, is_seen=True, is_first=True)),
         "leave the corridor by the nearest door (door 7) into l3_404",
-        "den Flur durch die nächste Tür (Tür 7) verlassen und in „l3_404“ gehen",
+        "den Flur durch die nächstgelegene Tür (Tür 7) verlassen und in „l3_404“ gehen",
     ),
     "leave": (
         instruction(
@@ -187,6 +188,49 @@ CASES = {
         instruction("arrive", 3.0, Space(None, "storey"), waypoint="(1, 2)"),
         "after 3 m you are at (1, 2) on this floor",
         "nach 3 m am Ziel: (1, 2) auf dieser Etage",
+    ),
+    "along a wall": (
+        instruction("cross", 9.0, KITCHEN, doorway=Doorway(LAB, 7, 0.9, wall=Wall("left", None))),
+        "keep to the wall on the left for about 0 m and go through door 7 into l3_404",
+        "an der linken Wand entlang, etwa 0 m weit, und durch Tür 7 in „l3_404“ gehen",
+    ),
+    "past openings to a door, and across": (
+        instruction(
+            "cross",
+            9.0,
+            KITCHEN,
+            doorway=Doorway(
+                *(LAB, 7, 0.9),
+                ordinal=3,
+                wall=Wall("right", 3, is_opposite=True, via=Wall("left", 2, 1)),
+            ),
+        ),
+        (
+            "keep to the wall on the left, past the opening, and behind it to the second door, and "
+            "with your back to it go straight across to the opposite wall, turn right along it and "
+            "go through the third door (door 7) into l3_404"
+        ),
+        (
+            "an der linken Wand entlang, an der Öffnung vorbei und dahinter bis zur zweiten Tür, "
+            "dann mit ihr im Rücken geradeaus zur Wand gegenüber, dort nach rechts an ihr entlang "
+            "und durch die dritte Tür (Tür 7) in „l3_404“ gehen"
+        ),
+    ),
+    "from the nearest door": (
+        instruction(
+            "cross",
+            9.0,
+            KITCHEN,
+            doorway=Doorway(*(LAB, 7, 0.9), ordinal=1, wall=Wall("left", 1, via=Wall(None, 1))),
+        ),
+        (
+            "go to the nearest door, and with your back to it keep to the wall on the left and go "
+            "through the first door (door 7) into l3_404"
+        ),
+        (
+            "zur nächstgelegenen Tür gehen, dann mit ihr im Rücken an der linken Wand entlang und "
+            "durch die erste Tür (Tür 7) in „l3_404“ gehen"
+        ),
     ),
     "deep in the room": (
         instruction("arrive", 3.0, LAB, waypoint="l3_404"),

@@ -5,6 +5,7 @@ from .instruction import (
     Landmark as Landmark,
     Space as Space,
     Turn as Turn,
+    Wall as Wall,
 )
 from .language import Language as Language
 from .write import check_language as check_language, languages as languages, sentences as sentences

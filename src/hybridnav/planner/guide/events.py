@@ -16,7 +16,7 @@ from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from hybridnav.planner.guide import Space
+    from hybridnav.planner.guide import Space, Wall
     from hybridnav.planner.guide.bends import Bend, Leg, Line
     from hybridnav.planner.guide.glances import Glance
     from hybridnav.planner.guide.instruction import Kind
@@ -35,6 +35,8 @@ _BEYOND_M = 0.75
 """Distance from a door from which a bend lies clearly before or behind it."""
 _INSIDE_M = 0.6
 """Distance from a door at which a person stands behind it who looks round."""
+_LEAST_WALL_M, _DETOUR = 15.0, 3.0
+"""Length of wall that a person follows at most: 15 m and three times the path."""
 _NEARER_RAD = math.radians(10.0)
 _LEAST_HALF_RAD = math.radians(20.0)
 """Turn from which the path into a door, or out of it, is half of a turn there."""
@@ -73,6 +75,8 @@ class Event:
     glance: Glance | None = None
     """How a person finds its door who looks round where the event before ends; None for one who
     has to go there first."""
+    wall: Wall | None = None
+    """The wall to which one keeps from the door before on; None where one does not."""
     is_before_glance: bool = False
     """Whether the door behind it is found so: nobody turns between the two."""
 
@@ -216,7 +220,7 @@ def _with_bends(
     return replace(event, turn=turn, behind=after), rest
 
 
-def with_glances(
+def with_glances(  # noqa: C901 - a door is seen, led to by a wall, or walked to
     line: Line, events: Sequence[Event], landmarks: Landmarks, facing_rad: float
 ) -> list[Event]:
     """Return events without the turns on the way to a door that a person sees from afar.
@@ -239,7 +243,7 @@ def with_glances(
         following = at
         while events[following].kind == "turn":
             following += 1
-        event, glance = events[following], None
+        event, glance, wall = events[following], None, None
         door = event.door
         if pose is not None and door is not None:
             room = event.stretch.space.name
@@ -250,8 +254,25 @@ def with_glances(
             elif glance is None and before is not None and before.behind is not None:
                 pose = (pose[0], before.behind.after_rad)
                 glance = landmarks.at_a_glance(door, room, pose, came_by)
-        if glance is not None:
-            kept.append(replace(event, turn=None, glance=glance))
+        is_counted = glance is not None and glance.ordinal is not None
+        if (
+            door is not None
+            and kept
+            and kept[-1].kind == "cross"
+            and (glance is None or is_counted)
+        ):
+            wall = _wall_between(kept[-1], event, landmarks)
+            if glance is not None and wall is not None:
+                wall = None if wall.via or wall.past else wall
+                glance = glance if wall is None else None
+        elif door is not None and glance is None and not kept and not math.isnan(facing_rad):
+            most_m = _LEAST_WALL_M + _DETOUR * event.at_m
+            room = event.stretch.space.name
+            wall = landmarks.from_a_door(line.at(0.0), event.stretch.doors[0], room, most_m)
+        if wall is not None and kept:
+            kept[-1] = replace(kept[-1], behind=None, is_before_glance=True)
+        if glance is not None or wall is not None:
+            kept.append(replace(event, turn=None, glance=glance, wall=wall))
             at = following + 1
         else:
             kept.append(events[at])
@@ -260,6 +281,16 @@ def with_glances(
         if kept[-1].door is not None:
             came_by = kept[-1].door.number
     return kept
+
+
+def _wall_between(before: Event, event: Event, landmarks: Landmarks) -> Wall | None:
+    """Return the wall that leads from one door to the next."""
+    if not before.stretch.doors:
+        return None
+    most_m = _LEAST_WALL_M + _DETOUR * (event.at_m - before.at_m)
+    room, came_by = event.stretch.space.name, before.stretch.doors[-1].number
+    beyond = None if event.following is None else event.following.space.name
+    return landmarks.along_a_wall(came_by, event.stretch.doors[0], room, most_m, beyond)
 
 
 def _pose_after(

@@ -16,14 +16,14 @@ from hybridnav.topology.rooms.listing import FOUND_NAME
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._base.typing import FloatArray
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.planner.guide.bends import Line
     from hybridnav.planner.guide.instruction import Hand, Side
     from hybridnav.topology.rooms import Door, Rooms
 
 _LATERAL_M = 3.5
 """Distance from the path at which a door counts as passed, at most."""
-_NARROWEST_M = 0.4
+NARROWEST_M = 0.4
 """Width below which a person sees no door."""
 _MARGIN_M = 0.75
 """Ends of a stretch at which no door counts: it lies at the corner, not on the way."""
@@ -32,7 +32,7 @@ _FARTHEST_M = 20.0
 """Distance at which a person recognises a door from the start, at most."""
 _LEAST_SIDEWAYS, _CLEARLY_SIDEWAYS = 0.5, 0.75
 """Sine of the least angle between a path and the way out by a door beside it."""
-_FEW, _MANY = 3, 5
+FEW, MANY = 3, 5
 """Doors that a person counts with ease, and at most."""
 _GUESSED, _GUESS_M = 0.7, 1.5
 """Who guesses a distance looks from 0.7 of it on, less 1.5 m: no other door lies behind that."""
@@ -46,13 +46,15 @@ _SIDES: dict[Side, float] = {
 """Where a door in sight may lie, by its angle to the direction in which a person looks."""
 _SECTOR_RAD, _RIVAL_RAD = math.radians(22.5), math.radians(60.0)
 """Angle to the middle of its side up to which a door surely lies there, and perhaps."""
+_SURE_RAD = math.radians(12.0)
+"""Angle up to which the side of the only door of a room is told: nobody needs it."""
 _BESIDE_M = 2.0
 """Distance of a door from which a person sees it however it lies."""
 _COUNTED_M = 10.0
 """Distance up to which a person counts doors without walking along them."""
 _GRAZING_RAD = math.radians(65.0)
 """Angle to the way through a door from which nobody sees that it is one."""
-_NEARER_M = 0.7
+NEARER_M = 0.7
 """Least difference of two distances that a person sees."""
 
 
@@ -95,7 +97,8 @@ class DoorsInSight:
         """The doors that a person notices, by the room on each side."""
         found: dict[str | None, list[Door]] = {}
         for door in self._rooms.listed_doors:
-            if door.passage_m >= _NARROWEST_M:
+            is_wide = door.width_m >= NARROWEST_M or door.passable
+            if is_wide and door.passage_m >= NARROWEST_M:
                 for room in set(door.rooms):
                     found.setdefault(room, []).append(door)
         return found
@@ -191,13 +194,13 @@ class DoorsInSight:
             unsure = unsure or not (is_near and is_clear)
             before.append(at_m - begin_m)
         is_alone = all(each < _GUESSED * length_m - _GUESS_M for each in before)
-        if not unsure and len(before) < _FEW:
+        if not unsure and len(before) < FEW:
             return len(before) + 1
         if is_alone and length_m > _GUESS_M:
             return None
-        if is_last and len(before) >= _FEW:
+        if is_last and len(before) >= FEW:
             return -1
-        return len(before) + 1 if len(before) < _MANY else None
+        return len(before) + 1 if len(before) < MANY else None
 
     @staticmethod
     def _is_ahead(
@@ -239,25 +242,26 @@ class DoorsInSight:
         others = [
             one for one in self._alike(door, room) if one.number not in (door.number, came_by)
         ]
+        told = self._told(door, room)
+        rivals = [one for one in others if told is None or self._told(one, room) == told]
+        only = None if rivals or self._is_corridor(room) else Glance(None, None)
         if away_m > _FARTHEST_M or not self._is_seen(list(point), door):
-            told = self._told(door, room)
-            rivals = [one for one in others if told is None or self._told(one, room) == told]
-            is_room = self._rooms_of_no_kind(room)
-            return Glance(None, None) if is_room and not rivals else None
+            return only
         across, up = door.position[0] - point[0], door.position[1] - point[1]
         way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
         aslant_rad = abs(math.remainder(atan2(up, across) - way, math.tau))
         if aslant_rad > _GRAZING_RAD and away_m > _BESIDE_M:
-            return None
+            return only
         off_rad = turn_to(facing_rad, point, door.position)
         side = next((one for one, to in _SIDES.items() if abs(off_rad - to) <= _SECTOR_RAD), None)
         if side is None and not math.isnan(facing_rad):
-            return None
-        named = self._told(door, room)
+            return only
+        if only is not None and side is not None and abs(off_rad - _SIDES[side]) > _SURE_RAD:
+            return only
         for is_read in (False, True):
             nearer, is_one, is_sure = 0, True, True
             for other in others:
-                if is_read and self._told(other, room) != named:
+                if is_read and self._told(other, room) != told:
                     continue
                 off = 0.0
                 if side is not None:
@@ -267,15 +271,15 @@ class DoorsInSight:
                     continue
                 is_one = False
                 farther_m = math.dist(point, other.position) - away_m
-                is_sure = is_sure and (farther_m > _NEARER_M or off <= _SECTOR_RAD)
-                is_sure = is_sure and abs(farther_m) > _NEARER_M
+                is_sure = is_sure and (farther_m > NEARER_M or off <= _SECTOR_RAD)
+                is_sure = is_sure and abs(farther_m) > NEARER_M
                 nearer += farther_m < 0
             most_m = _FARTHEST_M if is_one and not is_read else _COUNTED_M
-            if is_sure and nearer < _FEW and away_m <= most_m:
+            if is_sure and nearer < FEW and away_m <= most_m:
                 return Glance(side, None if is_one else nearer + 1)
-            if named is None:
+            if told is None:
                 break
-        return None
+        return only
 
     def bearing_rad(self, point: tuple[float, float], number: int) -> float:
         """Return the direction from a point to a door, radians."""
@@ -290,9 +294,10 @@ class DoorsInSight:
         kind = self._rooms.kinds[self._rooms.labels.index(beyond)]
         return None if kind is None else kind.name
 
-    def _rooms_of_no_kind(self, room: str | None) -> bool:
-        """Return whether a person finds all doors of a room by walking round in it."""
-        return room is not None and self._rooms.kinds[self._rooms.labels.index(room)] is None
+    def _is_corridor(self, room: str | None) -> bool:
+        """Return whether a space is so long that nobody finds all its doors by looking round."""
+        kind = None if room is None else self._rooms.kinds[self._rooms.labels.index(room)]
+        return room is None or (kind is not None and kind.name == "corridor")
 
     @staticmethod
     def _beyond(door: Door, room: str | None) -> str | None:
@@ -337,11 +342,18 @@ class DoorsInSight:
 
     def _is_free(self, point: list[float], end: list[float]) -> bool:
         """Return whether no occupied cell lies between two points."""
-        grid = self._rooms.grid
-        count = 2 + math.ceil(2 * math.dist(point, end) / grid.resolution_m)
-        points = np.linspace(point, end, count)[1:-1]
-        cells = grid.frame.cells_of(points)
-        return not (grid.measured[tuple(cells.T)] == CellClass.OCCUPIED).any()
+        frame = self._rooms.grid.frame
+        count = 1 + math.ceil(2 * math.dist(point, end) / frame.resolution_m)
+        shares = np.arange(1, count) / count
+        (row, col), (to_row, to_col) = frame.position_of(*point), frame.position_of(*end)
+        rows = (row + (to_row - row) * shares).astype(np.intp)
+        cols = (col + (to_col - col) * shares).astype(np.intp)
+        return not self._is_hidden[rows, cols].any()
+
+    @cached_property
+    def _is_hidden(self) -> BoolArray:
+        hidden: BoolArray = self._rooms.grid.measured != CellClass.FREE
+        return hidden
 
 
 def is_named(room: str | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 Kind = Literal["start", "turn", "cross", "ride", "arrive"]
@@ -113,6 +113,33 @@ class Landmark:
 
 
 @dataclass(frozen=True)
+class Wall:
+    """How a person finds a door by a wall of the room.
+
+    Examples
+    --------
+    >>> from hybridnav.planner.guide import Wall
+    >>> Wall("left", 2).is_opposite
+    False
+    """
+
+    hand: Hand | None
+    """The hand at which it lies; of the wall opposite that to which one turns along it; None for
+    one who looks round for the nearest door."""
+    ordinal: int | None
+    """Which of the doors in it, or of the openings, behind those that are passed, from 1 to 5; None
+    where the name at the door tells it."""
+    past: int = 0
+    """How many openings one passes before the door, 3 at most."""
+    is_opposite: bool = False
+    """Whether it is the wall opposite the door at one's back."""
+    length_m: float = field(default=0.0, compare=False)
+    """How far one walks, in metres."""
+    via: Wall | None = None
+    """The wall by which one goes to another door first, and turns one's back to it."""
+
+
+@dataclass(frozen=True)
 class Doorway:
     """The passage from one space into another.
 
@@ -140,6 +167,8 @@ class Doorway:
     ordinal: int | None = None
     """Which of the doors there it is, or of the openings: 1 to 5 for the first to the fifth, -1 for
     the last one; None where it is the only one, or its distance shows it."""
+    wall: Wall | None = None
+    """The wall that leads to it from the door before; None where the words follow none."""
     is_seen: bool = False
     """Whether a person sees it from where the instruction before ends, and walks there."""
     behind: Turn | None = None
@@ -242,6 +271,7 @@ def _doorway(doorway: Doorway) -> dict[str, Any]:
         "is_first": doorway.is_first,
         "beside": doorway.beside,
         "ordinal": doorway.ordinal,
+        "wall": None if doorway.wall is None else asdict(doorway.wall),
         "is_seen": doorway.is_seen,
         "behind_rad": _angle(doorway.behind),
         "onward": doorway.onward,

@@ -78,12 +78,14 @@ def instructions_of(
     events = events_of(line, stretches, landmarks)
     facing_rad = math.nan if heading_rad is None else line.first_heading()
     events = with_glances(line, events, landmarks, facing_rad)
-    start = _start(line, events[0], landmarks, heading_rad)
+    start = _start(line, events, landmarks, heading_rad)
     if start.landmark is not None or start.heading_rad is not None:
         onward_rad = line.first_heading() if start.heading_rad is None else start.heading_rad
         if start.landmark is not None and start.landmark.side == "ahead":
             onward_rad = landmarks.bearing_rad(line.at(0.0), start.landmark.door)
         events = with_glances(line, events, landmarks, onward_rad)
+        if events[0].wall is not None:
+            start = replace(start, landmark=None, heading_rad=None)
     yield start
     if heading_rad is None and start.landmark is None and start.heading_rad is None:
         events[0] = replace(events[0], is_oriented=False)
@@ -98,9 +100,10 @@ def instructions_of(
 
 
 def _start(
-    line: Line, first: Event, landmarks: Landmarks, heading_rad: float | None
+    line: Line, events: Sequence[Event], landmarks: Landmarks, heading_rad: float | None
 ) -> Instruction:
     """Return the start, with what shows the direction to a person who knows none."""
+    first = events[0]
     space, onward_rad = first.stretch.space, line.first_heading()
     if first.kind != "turn":
         onward_rad = line.heading(0.0, min(first.at_m, _NEARBY_M))
@@ -113,8 +116,18 @@ def _start(
     seen = landmarks.at_start(line, space.name, {door.number for door in first.stretch.doors})
     if seen is not None:
         return replace(start, landmark=seen)
+    out = next(event for event in events if event.kind != "turn")
+    if out.door is not None:
+        towards_rad = _eighth(landmarks.bearing_rad(line.at(0.0), out.door.number))
+        if landmarks.at_a_glance(out.door, space.name, (line.at(0.0), towards_rad), 0) is not None:
+            return replace(start, heading_rad=towards_rad)
+    return replace(start, heading_rad=_eighth(onward_rad))
+
+
+def _eighth(angle_rad: float) -> float:
+    """Return the nearest point of the compass, radians."""
     eighth = math.pi / 4
-    return replace(start, heading_rad=round(onward_rad / eighth) * eighth)
+    return round(angle_rad / eighth) * eighth
 
 
 def _told(
@@ -188,7 +201,8 @@ def _doorway(
         passage_m=door.passage_m,
         is_opening=door.is_opening,
     )
-    if event.glance is None:
+    found = event.glance or event.wall
+    if found is None:
         doorway = _on_the_way(line, event, landmarks, doorway, known)
     else:
         way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
@@ -196,9 +210,10 @@ def _doorway(
         onward = _hand(turned(way, goes_rad), until_m - event.at_m)
         doorway = replace(
             doorway,
-            beside=event.glance.side,
-            ordinal=event.glance.ordinal,
-            is_seen=True,
+            beside=None if event.glance is None else event.glance.side,
+            ordinal=found.ordinal,
+            wall=event.wall,
+            is_seen=event.glance is not None,
             onward=onward if doorway.behind is None else None,
         )
     return replace(doorway, onward=None) if event.is_before_glance else doorway

@@ -9,16 +9,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.poses import wrapped
-from hybridnav._base.trig import directions
-from hybridnav.planner.guide import Landmark, Space
-from hybridnav.planner.guide.glances import DoorsInSight, is_named, turn_to
+from hybridnav._base.trig import cos, directions, sin
+from hybridnav.maps import CellClass
+from hybridnav.planner.guide import Landmark, Space, Wall
+from hybridnav.planner.guide.glances import (
+    FEW,
+    MANY,
+    NARROWEST_M,
+    NEARER_M,
+    DoorsInSight,
+    is_named,
+    turn_to,
+)
+from hybridnav.planner.guide.walls import RoomWalls
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterator
 
     from hybridnav.planner.guide.bends import Line
-    from hybridnav.planner.guide.instruction import Side
-    from hybridnav.topology.rooms import Door
+    from hybridnav.planner.guide.instruction import Hand, Side
+    from hybridnav.topology.rooms import Door, Rooms
 
 _FARTHEST_M = 20.0
 """Distance at which a person recognises a door from the start, at most."""
@@ -26,6 +36,19 @@ _NEARBY_M = 5.0
 """Distance of a door that shows a person where a path ends, at most."""
 _NEAREST_M = 0.7
 """Distance from a door below which nobody can tell where it lies."""
+_HANDS: tuple[Hand, ...] = ("left", "right")
+_ASKEW_RAD = tuple(math.radians(degrees) for degrees in (0, 6, -6, 12, -12))
+"""How far off the right angle with a door a person may come to the wall opposite."""
+_ACROSS_M, _BESIDE_HIT_M = 10.0, 0.5
+"""How far the wall opposite may be, and how near a door may be where one comes to it."""
+_FARTHEST_WALL_M = 100.0
+"""Length of wall that nobody follows farther."""
+_STRIDE_M = 1.0
+"""Length of wall that a person walks past straight on."""
+_GAP_M = 1.2
+"""Distance of two boundaries that are one door, across a gap between two outlines."""
+_MOST_PAST, _PASSED_M = 3, 5.0
+"""Openings that a person passes at a wall, at most, and the length of wall that each is worth."""
 _AHEAD_RAD = math.radians(15.0)
 """Angle to the path up to which a landmark lies ahead, or behind."""
 _TOWARDS_RAD = math.radians(20.0)
@@ -42,6 +65,183 @@ class Landmarks(DoorsInSight):
     rooms
         The rooms.
     """
+
+    def __init__(self, rooms: Rooms) -> None:
+        super().__init__(rooms)
+        self._walls: dict[str, RoomWalls] = {}
+        self._led_from: dict[tuple[int, str], list[tuple[float, int, Wall]]] = {}
+
+    def along_a_wall(
+        self, came_by: int, door: Door, room: str | None, most_m: float, beyond: str | None
+    ) -> Wall | None:
+        """Return the wall of a room that leads a person from one door to another.
+
+        Parameters
+        ----------
+        came_by
+            Number of the door behind the person.
+        door
+            The other door.
+        room
+            The room, None outside rooms.
+        most_m
+            Length of wall that nobody follows farther, metres.
+        beyond
+            The room behind the door, or behind a gap that follows it.
+
+        Returns
+        -------
+        Wall or None
+            The shortest: that of the door, or the one opposite, at either hand. None where all are
+            too long, or have too many doors.
+        """
+        if room is None or came_by == door.number:
+            return None
+        return self._by_walls(came_by, door, room, most_m, beyond)
+
+    def from_a_door(
+        self, point: tuple[float, float], door: Door, room: str | None, most_m: float
+    ) -> Wall | None:
+        """Return how a wall leads a person to a door who goes to one of the nearest first.
+
+        The parameters are those of `along_a_wall`, but for the point where the person looks round.
+        """
+        if room is None or self._is_corridor(room):
+            return None
+        near = sorted(
+            (math.dist(point, one.position), one.number)
+            for one in self._doors_of.get(room, ())
+            if not one.is_opening and self._is_seen_in_part(list(point), one)
+        )
+        found = []
+        for at, (away_m, number) in enumerate(near[:FEW]):
+            after_m = near[at + 1][0] if at + 1 < len(near) else math.inf
+            if after_m - away_m < NEARER_M:
+                break
+            wall = self._by_walls(number, door, room, most_m - away_m)
+            if wall is not None and wall.via is None:
+                found.append(replace(wall, via=Wall(None, at + 1)))
+        return found[0] if found else None
+
+    def _by_walls(
+        self, came_by: int, door: Door, room: str, most_m: float, beyond: str | None = None
+    ) -> Wall | None:
+        is_read = is_named(beyond) and beyond is not None
+        found = [
+            (length_m, wall)
+            for length_m, number, wall in self._led(came_by, room)
+            if number == door.number and length_m <= most_m
+            if wall.ordinal is not None or is_read
+        ]
+        if not found:
+            found = [
+                (to_m + on_m, replace(onward, via=wall))
+                for to_m, via, wall in self._led(came_by, room)
+                if via != door.number and to_m < most_m and wall.ordinal is not None
+                if not self._rooms.door(via).is_opening
+                for on_m, number, onward in self._led(via, room)
+                if number == door.number and to_m + on_m <= most_m
+                if onward.ordinal is not None or is_read
+            ]
+        return min(found, key=lambda one: one[0])[1] if found else None
+
+    def _led(self, came_by: int, room: str) -> list[tuple[float, int, Wall]]:
+        """Return to which doors walls lead a person from a door of a room, and how far they are.
+
+        Each with its number: that of an opening which is passed counts 5 m more.
+        """
+        key = came_by, room
+        if key not in self._led_from:
+            begin = self._walls_of(room).of_exit(came_by)
+            led = [] if begin is None else list(self._in_wall(begin, room, came_by))
+            across = [list(self._in_wall(*hit)) for hit in self._opposite(came_by, room)]
+            if len(across) == len(_ASKEW_RAD):
+                askew = [{(one[1], one[2].hand): one[2] for one in each} for each in across]
+                for length_m, number, wall in across[0]:
+                    walls = [each.get((number, wall.hand)) for each in askew]
+                    if walls == [wall] * len(walls):
+                        led.append((length_m, number, wall))
+                    elif None not in walls:
+                        led.append((length_m, number, replace(wall, ordinal=None, past=0)))
+            self._led_from[key] = led
+        return self._led_from[key]
+
+    def _in_wall(
+        self,
+        begin: tuple[int, int],
+        room: str,
+        came_by: int,
+        across_m: float = 0.0,
+        is_clear_there: bool = True,  # noqa: FBT001, FBT002 - as _opposite yields it
+    ) -> Iterator[tuple[float, int, Wall]]:
+        """Yield the doors and openings in a wall up to one that is unclear, with both hands."""
+        side_m, is_opposite = self._rooms.grid.resolution_m, across_m > 0.0
+        noticed = {one.number for one in self._doors_of.get(room, ())}
+        for hand in _HANDS:
+            turn = _HANDS[hand == "left"] if is_opposite else hand
+            openings = doors_behind = 0
+            is_clear = is_clear_there
+            for number, away in self._walls_of(room).met(begin, hand):
+                door, length_m = self._rooms.door(number), across_m + side_m * away
+                if number == came_by and not is_opposite:
+                    continue
+                is_clear = is_clear and not (is_opposite and side_m * away < _BESIDE_HIT_M)
+                is_clear = is_clear and number in noticed and self._is_clear(door)
+                if door.is_opening:
+                    openings, doors_behind = openings + 1, 0
+                    wall = Wall(turn, openings, is_opposite=is_opposite)
+                else:
+                    doors_behind += 1
+                    wall = Wall(turn, doors_behind, openings, is_opposite)
+                if wall.past > _MOST_PAST or length_m > _FARTHEST_WALL_M:
+                    break
+                if not is_clear or (wall.ordinal or 0) > MANY:
+                    wall = replace(wall, ordinal=None, past=0)
+                wall = replace(wall, length_m=length_m)
+                yield length_m + _PASSED_M * wall.past, number, wall
+
+    def _opposite(
+        self, came_by: int, room: str
+    ) -> Iterator[tuple[tuple[int, int], str, int, float, bool]]:
+        """Yield where the wall is opposite a door, straight on and a little askew, with the room,
+        the door, how far it is, and whether no door is there."""
+        door, walls, frame = self._rooms.door(came_by), self._walls_of(room), self._rooms.grid.frame
+        way = self.way_out_rad(door, is_forward=door.rooms[1] == room) - frame.yaw_rad
+        for askew_rad in () if math.isnan(way) else _ASKEW_RAD:
+            step = sin(way + askew_rad), cos(way + askew_rad)
+            hit = walls.ahead(frame.position_of(*door.position), step)
+            if hit is not None and hit[1] * frame.resolution_m <= _ACROSS_M:
+                yield hit[0], room, came_by, hit[1] * frame.resolution_m, hit[2]
+
+    def _is_clear(self, door: Door) -> bool:
+        """Return whether a person sees a door or an opening where a boundary lies: not where a gap
+        between two outlines has one at one side and the other at the other."""
+        if None not in door.rooms:
+            return True
+        near = [
+            (math.dist(one.position, door.position), one.number, one.is_opening)
+            for one in self._doors_of.get(None, ())
+            if one.number != door.number and not set(one.rooms) & set(door.rooms) - {None}
+        ]
+        return bool(near) and min(near)[0] < _GAP_M and min(near)[2] == door.is_opening
+
+    def _walls_of(self, room: str) -> RoomWalls:
+        """Return the walls of a room, with a person's doors and openings, and what else leads out
+        of all rooms."""
+        if room not in self._walls:
+            rooms, seen = self._rooms, {one.number for one in self._doors_of.get(room, ())}
+            exits = {
+                door.number: rooms.moves_through(door.number)
+                for door in rooms.doors
+                if room in door.rooms and door.passage_m >= NARROWEST_M
+                if door.number in seen or (door.passable and None in door.rooms)
+            }
+            label_of = np.where(
+                rooms.grid.measured == CellClass.FREE, rooms.labels.label_of, np.int32(-1)
+            )
+            step = max(1, round(_STRIDE_M / rooms.grid.resolution_m))
+            self._walls[room] = RoomWalls(label_of, rooms.labels.index(room), exits, step)
+        return self._walls[room]
 
     def at_start(self, line: Line, room: str | None, exits: Collection[int]) -> Landmark | None:
         """Return the door that shows a person at the begin of a path in which direction to go.

@@ -37,6 +37,10 @@ class HandWords:
     """The place of a door behind, at this hand."""
     onward: str
     """Behind a door to this hand: ` to the left`."""
+    along: str
+    """Along the wall at this hand: `keep to the wall on the left`."""
+    across: str
+    """To the wall opposite, and along it to this hand."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +121,17 @@ class Language:
     """Through a door; `{lead}`, `{door}`, `{into}`, `{out}`."""
     go_turning: str
     """The same with `{turn}` before it."""
+    go_along: str
+    """Through a door in a wall that one follows; besides `{along}`."""
+    past: tuple[str, ...]
+    """What ends `{along}`: none, one, two or three openings that one passes."""
+    along_for: str
+    """What follows `{along}` where nobody counts; `{metres}`."""
+    via: str
+    """What begins `{along}` where one goes to another door first; `{along}`, `{past}`,
+    `{ordinal}`."""
+    via_nearest: str
+    """The same at the start; `{nearest}`."""
     leave: str
     """Out of the first space; besides `{itself}`."""
     leave_turning: str
@@ -190,6 +205,8 @@ ENGLISH = Language(
         ahead="ahead on the left",
         behind="behind you on the left",
         onward=", then left",
+        along="keep to the wall on the left",
+        across="go straight across to the opposite wall, turn left along it",
     ),
     right=HandWords(
         turn="turn right",
@@ -200,6 +217,8 @@ ENGLISH = Language(
         ahead="ahead on the right",
         behind="behind you on the right",
         onward=", then right",
+        along="keep to the wall on the right",
+        across="go straight across to the opposite wall, turn right along it",
     ),
     ahead="straight ahead",
     turn_round="turn round",
@@ -220,6 +239,16 @@ ENGLISH = Language(
     turn="{inside} {lead}{turn}",
     go="{lead}go through {door} {into}{out}",
     go_turning="{lead}{turn} through {door} {into}{out}",
+    go_along="{along} go through {door} {into}{out}",
+    past=(
+        " and",
+        ", past the opening, and behind it",
+        ", past two openings, and behind them",
+        ", past three openings, and behind them",
+    ),
+    along_for=" for about {metres} m",
+    via="{along}{past} to the {ordinal} door, and with your back to it ",
+    via_nearest="go to the {nearest} door, and with your back to it ",
     leave="{lead}leave {itself} by {door} {into}{out}",
     leave_turning="{lead}{turn} and leave {itself} by {door} {into}{out}",
     go_on="{lead}go on {into}{out}",
@@ -263,7 +292,7 @@ GERMAN = Language(
     name="Deutsch",
     decimal=",",
     ordinals=("erste", "zweite", "dritte", "vierte", "fünfte", "letzte"),
-    nearest=("nächste", "zweitnächste", "drittnächste"),
+    nearest=("nächstgelegene", "zweitnächste", "drittnächste"),
     named=_NAMED,
     common=_NAMED,
     corridor=SpaceWords(inside="im Flur", into="in den Flur", itself="den Flur"),
@@ -280,6 +309,8 @@ GERMAN = Language(
         ahead="links voraus",
         behind="links hinten",
         onward=", dann nach links",
+        along="an der linken Wand entlang",
+        across="geradeaus zur Wand gegenüber, dort nach links an ihr entlang",
     ),
     right=HandWords(
         turn="rechts abbiegen",
@@ -290,6 +321,8 @@ GERMAN = Language(
         ahead="rechts voraus",
         behind="rechts hinten",
         onward=", dann nach rechts",
+        along="an der rechten Wand entlang",
+        across="geradeaus zur Wand gegenüber, dort nach rechts an ihr entlang",
     ),
     ahead="geradeaus",
     turn_round="umkehren",
@@ -310,6 +343,16 @@ GERMAN = Language(
     turn="{inside} {lead}{turn}",
     go="{lead}durch {door} {into} gehen{out}",
     go_turning="{lead}{turn} und durch {door} {into} gehen{out}",
+    go_along="{along} durch {door} {into} gehen{out}",
+    past=(
+        " und",
+        ", an der Öffnung vorbei und dahinter",
+        ", an zwei Öffnungen vorbei und dahinter",
+        ", an drei Öffnungen vorbei und dahinter",
+    ),
+    along_for=", etwa {metres} m weit,",
+    via="{along}{past} bis zur {ordinal}n Tür, dann mit ihr im Rücken ",
+    via_nearest="zur {nearest}n Tür gehen, dann mit ihr im Rücken ",
     leave="{lead}{itself} durch {door} verlassen und {into} gehen{out}",
     leave_turning="{lead}{turn}, {itself} durch {door} verlassen und {into} gehen{out}",
     go_on="{lead}weiter {into} gehen{out}",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Side,
         Space,
         Turn,
+        Wall,
     )
     from hybridnav.planner.guide.language import HandWords, Language, NameWords, SpaceWords
 
@@ -225,14 +226,37 @@ class _Writer:
             template = words.leave if turn is None else words.leave_turning
         else:
             template = words.go if turn is None else words.go_turning
+        along = ""
+        if doorway.wall is not None:
+            template, along = words.go_along, self._along(doorway.wall)
         return template.format(
             lead=lead,
+            along=along,
             turn="" if turn is None else self._turn(turn),
             door=self._door(doorway, is_turned=turn is not None),
             into=self._space(doorway.into).into,
             itself=self._space(instruction.space).itself,
             out=self._out(doorway),
         )
+
+    def _along(self, wall: Wall) -> str:
+        """Return the words for a walk along a wall, up to the door."""
+        words, via = self.words, ""
+        if wall.via is not None and wall.via.hand is None:
+            via = words.via_nearest.format(nearest=words.nearest[(wall.via.ordinal or 1) - 1])
+        elif wall.via is not None:
+            past = words.past[wall.via.past] if wall.via.past else ""
+            via = words.via.format(
+                along=self._side_of(wall.via),
+                past=past,
+                ordinal=words.ordinals[(wall.via.ordinal or 1) - 1],
+            )
+        metres = "" if wall.ordinal else words.along_for.format(metres=round(wall.length_m))
+        return via + self._side_of(wall) + metres + words.past[wall.past]
+
+    def _side_of(self, wall: Wall) -> str:
+        hand = self._hand(wall.hand or "left")
+        return hand.across if wall.is_opposite else hand.along
 
     def _ride(self, change: FloorChange, turn: Turn | None, lead: str) -> str:
         words, is_lift = self.words, change.kind == "lift"
