@@ -8,7 +8,7 @@ import re
 import time
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -195,7 +195,7 @@ class Journal:
         MapError
             When the journal cannot be read or written.
         """
-        since = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
+        since = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M:%S")
         made = OutOfOrder(what, since, why)
         with self._alone() as items:
             others = [item for item in items if item.what != what]

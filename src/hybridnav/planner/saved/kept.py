@@ -93,8 +93,7 @@ def key_of(
         for path in files:
             if not path.is_file():
                 return None
-            with path.open("rb") as file:
-                digest.update(hashlib.file_digest(file, "sha256").digest())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
     except OSError:
         return None
     return digest.hexdigest()
