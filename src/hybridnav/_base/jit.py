@@ -23,6 +23,7 @@ from numba.core.caching import (
     UserWideCacheLocator,
 )
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime.nrt import rtsys
 from numba.extending import register_jitable
 
 from hybridnav._base.trig import IN_KERNELS
@@ -111,9 +112,12 @@ class _Entries(CompileResultCacheImpl):
 
     def reduce(self, cres: Any) -> Any:
         """Return what is written of a compiled kernel."""
-        (name, kind, (code, _)), *others = super().reduce(cres)  # type: ignore[no-untyped-call]
-        others[5] = ""
-        return ((name, kind, (code, llvm.parse_assembly("").as_bitcode())), *others)
+        (name, kind, (code, _)), about, *others = super().reduce(cres)  # type: ignore[no-untyped-call]
+        # numba asks that code which functions there are.
+        names = about.llvm_func_name, about.llvm_cpython_wrapper_name
+        stub = "".join(f'define void @"{one}"() {{ ret void }}\n' for one in names)
+        others[4] = ""
+        return ((name, kind, (code, llvm.parse_assembly(stub).as_bitcode())), about, *others)
 
 
 class _Cache(FunctionCache):
@@ -129,6 +133,11 @@ class _Cache(FunctionCache):
     def cache_path(self) -> Any:
         """Folder of what is compiled here, None where none can be written."""
         return None if isinstance(self._impl.locator, _Nowhere) else self._cache_path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load code, without the declarations that only a compiler needs: a sixth of a start."""
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         kept = None
