@@ -17,6 +17,7 @@ from hybridnav._base import jit
 def main(listed: Path, folder: Path) -> None:
     """Compile the kernels of a list into a folder, in the places where a wheel has them."""
     jit.SHIPPED = folder
+    jit.LEVELS.clear()  # what another level has does not count
     level = os.environ["NUMBA_CPU_NAME"]
     for module, name, signatures in pickle.loads(listed.read_bytes()):  # noqa: S301 - our own
         kernel = getattr(import_module(module), name)

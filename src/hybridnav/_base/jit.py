@@ -42,7 +42,10 @@ for _function in IN_KERNELS:
 
 SHIPPED = Path(__file__).parents[1] / "compiled"
 """Folder of compiled kernels that a wheel brings, in one folder for each version of numba."""
-LEVELS = {"x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), "x86-64": ()}
+LEVELS: dict[str, tuple[str, ...]] = {
+    "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
+    "x86-64": (),
+}
 """Processors that a wheel brings kernels for, as LLVM names them, and their features, best first.
 
 A kernel for all processors scans rows of cells at half the speed of one for AVX2, which nearly
