@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import sys
 import time
 import warnings
 from functools import cache, cached_property
@@ -140,7 +141,10 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load code, without the declarations that only a compiler needs: a sixth of a start."""
         rtsys.initialize(target_context)
-        return self._load_overload(sig, target_context)
+        kept = self._load_overload(sig, target_context)
+        if kept is None:
+            _load_arrays()
+        return kept
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         kept = None
@@ -170,6 +174,23 @@ class _Cache(FunctionCache):
     def _save_overload(self, sig: Any, data: Any) -> None:
         if self.cache_path is not None:
             super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+
+@cache
+def _load_arrays() -> None:
+    """Load numba's functions of arrays without the linear algebra of scipy, for which they look.
+
+    That takes longer than the rest of a first kernel, and none of ours multiplies matrices. Whoever
+    does in this process still can: numba looks again when it compiles such a product.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas in sys.modules:
+        return
+    sys.modules[blas] = None  # type: ignore[assignment]
+    try:
+        pass
+    finally:
+        del sys.modules[blas]
 
 
 def is_for_another_numba() -> bool:
