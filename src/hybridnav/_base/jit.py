@@ -49,8 +49,8 @@ LEVELS: dict[str, tuple[str, ...]] = {
 }
 """Processors that a wheel brings kernels for, as LLVM names them, and their features, best first.
 
-A kernel for all processors scans rows of cells at half the speed of one for AVX2, which nearly
-reaches one for this processor alone."""
+A pyramid of the office grew as fast with code for AVX2 as with code for the processor that it was
+measured on, and took 1.2 times as long with that for all processors."""
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
@@ -106,7 +106,7 @@ class _Entries(CompileResultCacheImpl):
     """What is kept of a compiled kernel: the machine code.
 
     numba adds the code that compiled callers link to, which are the twins' alone, and a listing:
-    three quarters of the bytes, and a third of the time of loading.
+    three quarters of the bytes.
     """
 
     _locator_classes: ClassVar = [  # type: ignore[misc]
