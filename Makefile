@@ -4,18 +4,21 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
 READY := $(VENV)/.ready
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
 NOJIT_TESTS := tests/pyramid/test_invariants.py tests/search/test_search.py
 
 # quarter or whole; the folder of the maps.
 STUDY ?= quarter
+PYTHONS ?= $(or $(wildcard $(HOME)/.pyenv/versions/3.1[0-9]*/bin/python),$(PYTHON))
 HYBRIDNAV_DATA ?= $(wildcard ../shared/data)
 
-.PHONY: route test test-full lint docs site study unit nojit full setup maps lock clean
+.PHONY: route test test-full lint docs site study unit nojit full setup wheels test-corners maps lock clean
 
-route: setup
+route: $(INSTALLED)
 	mkdir -p out
 	$(BIN)/hybridnav plan maps/office/office.yaml --start 1.0,13.2 --goal 40.6,19.4 --compare --plot out/route.png
 	@echo "picture: out/route.png"
@@ -64,15 +67,30 @@ full: setup
 
 setup: $(READY)
 
-$(READY): requirements.lock pyproject.toml
-	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'hybridnav needs Python 3.11 or newer')"
-	@echo "setting up $(VENV): about three minutes the first time"
+# What the package needs, without bytecode: Python writes that of the modules that a command loads.
+# The kernels of the route are compiled by its first plan, those of all presets by `setup`.
+$(INSTALLED): requirements.lock pyproject.toml
+	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'a clone needs Python 3.11 or newer')"
+	@echo "setting up $(VENV): about a minute the first time"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(INSTALL) --constraint requirements.lock hatchling editables
+	$(INSTALL) --constraint requirements.lock --no-build-isolation --editable .
+	touch $(INSTALLED)
+
+$(READY): $(INSTALLED)
+	@echo "setting up the tests: about two minutes the first time"
+	$(INSTALL) -r requirements.lock
 	@echo "compiling kernels: about a minute"
 	$(BIN)/python -m hybridnav.cli.warm
 	touch $(READY)
+
+# Wheels that bring compiled kernels, one for each Python of PYTHONS, in out/wheels; from a clean tree.
+wheels: setup
+	$(BIN)/python -m benchmarks wheels --python $(PYTHONS)
+
+# The oldest and the newest Python and numpy: tests of what plans, in environments of their own.
+test-corners: setup
+	$(BIN)/python -m benchmarks corners --python $(PYTHONS)
 
 maps: setup
 	$(BIN)/python -m benchmarks worlds maps

@@ -8,11 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from numba.core import event
 
-from hybridnav._base.jit import njit
+from hybridnav._base.jit import LEVELS, _levels, njit
+
+SOURCE = Path(__file__).parents[2] / "src"
 
 pytestmark = pytest.mark.skipif(
     os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled"
@@ -102,3 +105,52 @@ def test_kept_code_that_names_a_module_that_is_gone_is_compiled_anew(tmp_path: P
             check=False,
         )
         assert (done.returncode, done.stdout) == (0, "4.0\n"), done.stderr
+
+
+_SHIPS = """
+import logging, os, sys
+from pathlib import Path
+import numpy as np
+from hybridnav._base import jit
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message).14s")
+jit.SHIPPED = Path(sys.argv[1])
+from hybridnav._base.kernels import arrays
+if sys.argv[2:]:
+    jit.LEVELS.clear()
+    cache = arrays.push._cache
+    cache._cache_file = cache._shipped(os.environ["NUMBA_CPU_NAME"])
+    Path(cache._cache_file._cache_path).mkdir(parents=True)
+keys = np.full((4, 2), 7)
+arrays.push(keys, 0, 3, 5)
+print(keys[0].tolist(), jit.is_for_another_numba(), arrays.push.is_warm())
+"""
+
+
+def test_code_that_a_wheel_brings_is_taken_and_only_by_its_numba(tmp_path: Path) -> None:
+    def run(*words: str, **settings: str) -> str:
+        settings["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
+        done = subprocess.run(
+            [sys.executable, "-c", _SHIPS, str(tmp_path / "compiled"), *words],
+            env={"PATH": os.environ["PATH"], "PYTHONPATH": str(SOURCE)} | settings,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+    compiled, told = "compiled push \n", "[3, 5] False True\n"
+    levels = [level for level in LEVELS if level in _levels()]
+    for level in levels:
+        filled = run("fill", NUMBA_CPU_NAME=level, NUMBA_CPU_FEATURES="")
+        assert filled == compiled + told
+    version = tmp_path / "compiled" / numba.__version__
+    for level in levels:  # the next one serves where the best is not there
+        assert run() == told
+        (version / level).rename(tmp_path / level)
+    assert not list((tmp_path / "cache").rglob("push*.nbi"))
+    (tmp_path / level).rename(version / level)
+    version.rename(tmp_path / "compiled" / "0.0")
+    another = told.replace("False", "True")
+    assert run() == compiled + another
+    assert run() == another  # kept in the user's folder

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from hybridnav._base.threads import cores
 from hybridnav.cli import warm
 from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.planner import load_preset
@@ -99,7 +100,7 @@ def test_a_second_process_compiles_what_a_first_plan_searches_with(
     monkeypatch: pytest.MonkeyPatch, preset: str, processors: int, start: str, jobs: list[str]
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(warm, "processors", lambda: processors)
+    monkeypatch.setattr(warm, "cores", lambda: processors)
     monkeypatch.setattr(warm, "_is_kept", lambda _: start == "warm")
     monkeypatch.setattr(warm, "start", begun.append)
     with warm.compiling_beside(load_preset(preset)) as compiled:
@@ -108,7 +109,7 @@ def test_a_second_process_compiles_what_a_first_plan_searches_with(
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
-@pytest.mark.skipif(warm.processors() == 1, reason="one processor compiles alone")
+@pytest.mark.skipif(cores() == 1, reason="one processor compiles alone")
 def test_ctrl_c_ends_the_process_that_compiles(tmp_path: Path) -> None:
     with started(tmp_path) as process:
         wait_until(lambda: compilers(tmp_path))

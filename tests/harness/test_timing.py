@@ -6,7 +6,7 @@ import statistics
 import time
 from collections import Counter
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta, timezone
 
 import pytest
 
@@ -170,7 +170,7 @@ def test_a_busy_machine_is_a_warning(settings, tmp_path):
 
 def loads_over_time(before, within, seconds, step_s=20):
     """Records of a pass of some seconds; each second of it has a load, and the mean forgets."""
-    began = datetime(2026, 5, 1, tzinfo=UTC)
+    began = datetime(2026, 5, 1, tzinfo=timezone.utc)
     load, found = before, []
     for second in range(seconds + 1):
         if second % step_s == 0:

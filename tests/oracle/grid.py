@@ -1,7 +1,7 @@
 """Grid paths judged by other means than the package's: edge lists for scipy, plain recounting."""
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from hybridnav.maps import OccupancyGrid
 Bools = NDArray[np.bool_]
 Cells = NDArray[np.int64]
 Floats = NDArray[np.float64]
-Moves = sparse.csr_array[np.float64, tuple[int, int]]
+Moves: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"
 
 Cell = tuple[int, int]
 

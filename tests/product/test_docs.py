@@ -5,11 +5,11 @@ import inspect
 import os
 import pkgutil
 import re
-import tomllib
 from pathlib import Path
 
 import nbformat
 import pytest
+import tomllib
 import yaml
 
 import hybridnav as hn

@@ -331,3 +331,14 @@ def test_a_wheel_made_from_the_source_distribution_is_the_same(wheel, tmp_path):
     assert crcs[0] == crcs[1]
     assert (folder / "tests" / "product" / "test_packaging.py").is_file()
     assert (folder / "maps" / "office" / "office.pgm").is_file()
+
+
+@pytest.mark.full  # compiles all kernels three times, and installs packages
+def test_a_wheel_with_kernels_compiles_nothing_and_answers_as_compiled_code_does(tmp_path):
+    tree = tmp_path / "tree"
+    subprocess.run(["git", "clone", "--quiet", ROOT, tree], check=True)
+    command = [sys.executable, "-m", "benchmarks", "wheels", "--out", tmp_path / "out"]
+    environment = os.environ | {"PYTHONPATH": f"{tree / 'src'}{os.pathsep}{tree}"}
+    done = subprocess.run(command, cwd=tree, env=environment, check=False, capture_output=True)
+    assert done.returncode == 0, done
+    assert b"equal: True; AVX2 compiled [], plain compiled []" in done.stdout

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import sys
 import time
 import warnings
 from functools import cache, cached_property
+from pathlib import Path
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+import llvmlite.binding as llvm
 import numba
 from numba.core import types
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    UserProvidedCacheLocator,
+    UserWideCacheLocator,
+)
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime.nrt import rtsys
 from numba.extending import register_jitable
 
 from hybridnav._base.trig import IN_KERNELS
@@ -29,11 +41,23 @@ for _function in IN_KERNELS:
     register_jitable(_function)
 
 
-def njit(**options: Any) -> Callable[[Any], Any]:
-    """Compile a function like `numba.njit`, without a cache if none can be written.
+SHIPPED = Path(__file__).parents[1] / "compiled"
+"""Folder of compiled kernels that a wheel brings, in one folder for each version of numba."""
+LEVELS: dict[str, tuple[str, ...]] = {
+    "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
+    "x86-64": (),
+}
+"""Processors that a wheel brings kernels for, as LLVM names them, and their features, best first.
 
-    numba keeps compiled code beside the module or in the user's home, and refuses the function if
-    it can write to neither: in a read-only installation, for a user without a home.
+A pyramid of the office grew as fast with code for AVX2 as with code for the processor that it was
+measured on, and took 1.2 times as long with that for all processors."""
+
+
+def njit(**options: Any) -> Callable[[Any], Any]:
+    """Compile a function like `numba.njit`, or take the code that the wheel brought.
+
+    numba keeps compiled code beside the module or in the user's home. Where it can write to neither
+    (a read-only installation, a user without a home) it refuses the function; here nothing is kept.
 
     Parameters
     ----------
@@ -44,32 +68,18 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     -------
     Callable
         The decorator.
-
-    Warns
-    -----
-    CacheWarning
-        Once in a program, when a cache was requested and there is no folder for it.
     """
 
     def decorate(function: Any) -> Any:
-        try:
-            return _kernel(function, options)
-        except RuntimeError as error:
-            if "no locator available" not in str(error):
-                raise
-        _tell()
-        return _kernel(function, {**options, "cache": False})
+        wanted = {**options, "no_cfunc_wrapper": True, "cache": False}  # never called from C
+        kernel = numba.njit(**wanted)(function)
+        if isinstance(kernel, CPUDispatcher):
+            kernel.__class__ = _Kernel
+            if options.get("cache"):
+                kernel.enable_caching()
+        return kernel
 
     return decorate
-
-
-def _kernel(function: Any, options: dict[str, Any]) -> Any:
-    """Compile a function for Python and for other kernels; leave it as it is with the compiler
-    off."""
-    kernel = numba.njit(**{**options, "no_cfunc_wrapper": True})(function)  # never called from C
-    if isinstance(kernel, CPUDispatcher):
-        kernel.__class__ = _Kernel
-    return kernel
 
 
 @cache
@@ -83,6 +93,116 @@ def _tell() -> None:
             CacheWarning,
             stacklevel=4,
         )
+
+
+class _Nowhere(UserWideCacheLocator):
+    """The place of compiled code where no folder can be written."""
+
+    def ensure_cache_path(self) -> None:
+        """Ask for no folder."""
+
+
+class _Entries(CompileResultCacheImpl):
+    """What is kept of a compiled kernel: the machine code.
+
+    numba adds the code that compiled callers link to, which are the twins' alone, and a listing:
+    three quarters of the bytes.
+    """
+
+    _locator_classes: ClassVar = [  # type: ignore[misc]
+        *(UserProvidedCacheLocator, InTreeCacheLocator, UserWideCacheLocator),
+        _Nowhere,
+    ]
+
+    def reduce(self, cres: Any) -> Any:
+        """Return what is written of a compiled kernel."""
+        (name, kind, (code, _)), about, *others = super().reduce(cres)  # type: ignore[no-untyped-call]
+        # numba asks that code which functions there are.
+        names = about.llvm_func_name, about.llvm_cpython_wrapper_name
+        stub = "".join(f'define void @"{one}"() {{ ret void }}\n' for one in names)
+        others[4] = ""
+        return ((name, kind, (code, llvm.parse_assembly(stub).as_bitcode())), about, *others)
+
+
+class _Cache(FunctionCache):
+    """Kept code of a kernel: what was compiled for this processor, or what the wheel brought.
+
+    The wheel's is read only. numba's key of an entry holds the name and features of a processor;
+    there it holds one of `LEVELS`.
+    """
+
+    _impl_class = _Entries
+
+    @property
+    def cache_path(self) -> Any:
+        """Folder of what is compiled here, None where none can be written."""
+        return None if isinstance(self._impl.locator, _Nowhere) else self._cache_path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load code, without the declarations that only a compiler needs: a sixth of a start."""
+        rtsys.initialize(target_context)
+        kept = self._load_overload(sig, target_context)
+        if kept is None:
+            _load_arrays()
+        return kept
+
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        kept = None
+        if self.cache_path is not None:
+            kept = super()._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        if kept is not None or not SHIPPED.exists():
+            return kept
+        key: Any = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
+        _, (triple, *_), code = key
+        for level in _levels():
+            entry = self._shipped(level).load((sig, (triple, level, ""), code))
+            if entry is not None:
+                return self._impl.rebuild(target_context, entry)
+        return None
+
+    def _shipped(self, level: str) -> Any:
+        folder = SHIPPED / numba.__version__ / level / self._py_func.__module__
+        stamp = self._impl.locator.get_source_stamp()
+        name = self._impl.filename_base
+        return IndexDataCacheFile(str(folder), name, stamp)  # type: ignore[no-untyped-call]
+
+    def is_warm(self) -> bool:
+        """Return whether a version of the kernel is kept, or none can be."""
+        places = [self._cache_file, *map(self._shipped, _levels())]
+        return self.cache_path is None or any(Path(one._index_path).exists() for one in places)  # noqa: SLF001
+
+    def _save_overload(self, sig: Any, data: Any) -> None:
+        if self.cache_path is not None:
+            super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+
+@cache
+def _load_arrays() -> None:
+    """Load numba's functions of arrays without the linear algebra of scipy, for which they look.
+
+    That takes longer than the rest of a first kernel, and none of ours multiplies matrices. Whoever
+    does in this process still can: numba looks again when it compiles such a product.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas in sys.modules:
+        return
+    sys.modules[blas] = None  # type: ignore[assignment]
+    try:
+        pass
+    finally:
+        del sys.modules[blas]
+
+
+def is_for_another_numba() -> bool:
+    """Return whether a wheel brought kernels that this version of numba cannot read."""
+    return SHIPPED.exists() and not (SHIPPED / numba.__version__).exists()
+
+
+@cache
+def _levels() -> list[str]:
+    """Return the levels of `LEVELS` that this processor has."""
+    has = llvm.get_host_cpu_features()
+    return [level for level, features in LEVELS.items() if all(map(has.get, features))]
 
 
 class _Renewed(CPUDispatcher):
@@ -126,15 +246,26 @@ def _type_of(argument: Any) -> Any:
 class _Kernel(_Renewed):
     """A kernel that Python calls; other kernels call its twin. Slow compilations are logged."""
 
+    def enable_caching(self) -> None:
+        """Keep what is compiled, and look for what is kept."""
+        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
+
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or load it from the cache."""
         began, n_missed = time.perf_counter(), self._n_missed()
         entry = super().compile(sig)
         if self._n_missed() > n_missed:
             seconds, name = time.perf_counter() - began, self.py_func.__name__
-            about = {"seconds": seconds, "is_kept": self.stats.cache_path is not None}
+            is_kept = self.stats.cache_path is not None
+            if not is_kept and isinstance(self._cache, _Cache):
+                _tell()
+            about = {"seconds": seconds, "is_kept": is_kept}
             _LOG.info("compiled %s in %.1f s", name, seconds, extra=about)
         return entry
+
+    def is_warm(self) -> bool:
+        """Return whether a version of the kernel is kept, or none can be."""
+        return not isinstance(self._cache, _Cache) or self._cache.is_warm()
 
     def _n_missed(self) -> int:
         """Return the number of cache misses."""

@@ -1,11 +1,17 @@
-"""What threads share: work arrays that no two use at a time, and turns at a structure."""
+"""What threads share: work arrays that no two use at a time, and turns at a structure; and
+processes of our own."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from hybridnav.errors import CacheWarning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -21,6 +27,44 @@ def cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+_PACKAGES = Path(__file__).parents[2]
+_RUN = """import sys
+if sys.path[:1] == [""]:
+    del sys.path[0]
+import runpy
+runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)"""
+
+
+def start_module(module: str, *arguments: str, **pipes: Any) -> subprocess.Popen[bytes]:
+    """Start a module of this package by this interpreter, in a session of its own.
+
+    An interrupt from the keyboard does not reach it, and it finds no modules in the working
+    directory, whose files may have their names: Python 3.10 has no `-P`.
+
+    Parameters
+    ----------
+    module
+        Its name.
+    arguments
+        Its command line.
+    pipes
+        Options of `subprocess.Popen`.
+
+    Returns
+    -------
+    subprocess.Popen
+        The process. It does not warn where no compiled code can be kept: this one does.
+    """
+    paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
+    return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
+        [sys.executable, "-W", f"ignore:{CacheWarning.opening}", "-c", _RUN, module, *arguments],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        **pipes,
+    )
 
 
 class Pool(Generic[T]):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -189,7 +188,6 @@ def read_settings(
     if map_file is not None and is_model_file(map_file):
         from hybridnav.planner.saved import open_model  # noqa: PLC0415
 
-        load_numba()
         given = None if preset is None else read_preset(preset)
         plain = open_model(map_file, max_cells=MAX_CELLS).fitted(given)
     else:
@@ -221,29 +219,12 @@ def overridden(
         raise UsageError(str(error)) from None
 
 
-def load_numba() -> None:
-    """Load numba without the linear algebra of scipy, for which it looks at its first kernel.
-
-    That takes longer than the rest of that kernel, and none of ours multiplies matrices. Whoever
-    does in this process still can: numba looks again when it compiles such a product.
-    """
-    blas = "scipy.linalg.cython_blas"
-    if blas in sys.modules:
-        return
-    sys.modules[blas] = None  # type: ignore[assignment]
-    try:
-        import numba.np.arraymath  # noqa: F401, PLC0415 - it looks
-    finally:
-        del sys.modules[blas]
-
-
 def load_model(
     path: Path, preset: Preset, seconds: dict[str, float], reading: MapOptions
 ) -> hn.Model:
     """Load a model or a map, inflated as a preset states, without the islands that the user
     drops."""
     with stage(f"reading {path}", seconds, "load"):
-        load_numba()
         model = hn.load(
             path,
             robot_radius_m=preset.pyramid.robot_radius_m,

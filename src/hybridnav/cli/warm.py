@@ -14,12 +14,11 @@ import threading
 import time
 from contextlib import contextmanager
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
+from hybridnav._base.threads import cores, start_module
 from hybridnav.cli.common import complain, stage
-from hybridnav.errors import CacheWarning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,8 +32,8 @@ _PATIENCE_S = 2.0
 """Seconds of compiling after which a line informs the user."""
 SEARCHES = ("shortest", "octile", "grid-astar", "paper")
 """Methods whose search can be compiled without a pyramid."""
-_PACKAGES = Path(__file__).parents[2]
 _FIRST = "compiling kernels, each once, when a command first needs it; the next start is quick"
+_NOT_MINE = " (those of this package are for another version of numba)"
 
 
 class _Teller(logging.Handler):
@@ -52,7 +51,9 @@ class _Teller(logging.Handler):
         before, seconds = self._spent_s, record.__dict__.get("seconds", 0.0)
         self._spent_s += seconds if record.__dict__.get("is_kept") else 0.0
         if before < _PATIENCE_S <= self._spent_s:
-            complain(_FIRST)
+            from hybridnav._base.jit import is_for_another_numba  # noqa: PLC0415 - loads numba
+
+            complain(_FIRST + _NOT_MINE * is_for_another_numba())
 
 
 @contextmanager
@@ -86,7 +87,7 @@ def compiling_beside(preset: Preset) -> Iterator[Callable[[], None]]:
         Waits until it is compiled.
     """
     job = preset.planner.underlying.method
-    if job not in SEARCHES or processors() == 1 or not _is_cold(job):
+    if job not in SEARCHES or cores() == 1 or not _is_cold(job):
         yield lambda: None
         return
     process = start(job)
@@ -104,13 +105,6 @@ def _wait_for(process: subprocess.Popen[bytes] | None) -> None:
             process.wait()
 
 
-def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def _is_cold(job: str) -> bool:
     """Return whether neither the pyramid nor a search was compiled yet, and numba keeps what it
     compiles."""
@@ -126,31 +120,14 @@ def _is_cold(job: str) -> bool:
 
 def _is_kept(kernel: Any) -> bool:
     """Return whether a kernel needs no compilation, or is compiled anew at every start."""
-    stats = getattr(kernel, "stats", None)
-    if stats is None or stats.cache_path is None:
-        return True
-    source = Path(kernel.py_func.__code__.co_filename)
-    begun = f"{source.stem}.{kernel.__name__}-*.nbi"
-    try:
-        changed = source.stat().st_mtime
-        return any(index.stat().st_mtime >= changed for index in Path(stats.cache_path).glob(begun))
-    except OSError:
-        return True
+    return not hasattr(kernel, "is_warm") or kernel.is_warm()
 
 
 def start(*jobs: str) -> subprocess.Popen[bytes] | None:
     """Start a process that compiles; it ends with this one, whose end of the pipe is closed."""
-    quiet = ("-W", f"ignore:{CacheWarning.opening}")
-    paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
+    pipes = {"stdin": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with contextlib.suppress(OSError):
-        return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
-            [sys.executable, "-P", *quiet, "-m", "hybridnav.cli.warm", *jobs],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # an interrupt from the keyboard is for this process
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
-        )
+        return start_module("hybridnav.cli.warm", *jobs, **pipes)
     return None
 
 
@@ -236,7 +213,7 @@ def compile_all() -> None:
             waiting = list(wave)
             running: list[subprocess.Popen[bytes] | None] = []
             while waiting or running:
-                while waiting and len(running) < processors():
+                while waiting and len(running) < cores():
                     running.append(start(waiting.pop(0)))
                 for process in running.copy():
                     if process is None or process.poll() is not None:

@@ -10,7 +10,7 @@ import re
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import MAX_CELLS
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from hybridnav._base.typing import LongArray
 
 try:

@@ -15,7 +15,7 @@ import statistics
 import time
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -153,7 +153,7 @@ def circumstances() -> Record:
     """Return the date and the load of the machine, the mean of the last minute of processes that
     run or wait."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {"date": datetime.now(UTC).isoformat(timespec="seconds"), "load": load}
+    return {"date": datetime.now(timezone.utc).isoformat(timespec="seconds"), "load": load}
 
 
 BUSY = 1.5

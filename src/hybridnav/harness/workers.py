@@ -273,7 +273,7 @@ def _as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
             done, waiting = distributed.wait(  # type: ignore[no-untyped-call]
                 waiting, timeout=_LOOK_S, return_when="FIRST_COMPLETED"
             )
-        except TimeoutError:
+        except distributed.TimeoutError:
             if client.nthreads():
                 seen = time.monotonic()
             elif time.monotonic() - seen > NO_WORKER_S:

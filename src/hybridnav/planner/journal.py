@@ -8,7 +8,7 @@ import re
 import time
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,7 +196,8 @@ class Journal:
         MapError
             When the journal cannot be read or written.
         """
-        made = OutOfOrder(what, f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S}", why, by)
+        since = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M:%S")
+        made = OutOfOrder(what, since, why, by)
         with self._alone() as items:
             others = [item for item in items if item.what != what]
             if len(others) >= _MOST_ITEMS:

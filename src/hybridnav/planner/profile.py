@@ -7,7 +7,7 @@ width. What is planned under it is proved for that problem.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import ArrayLike
+    from typing_extensions import Self
 
     from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid, RoomLabels

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from typing_extensions import Self
+
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planner.costs import PlannerCosts
@@ -32,7 +34,7 @@ COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
 
 
-class PlanStatus(StrEnum):
+class PlanStatus(str, Enum):
     """Outcome of a plan, as a value, not an error.
 
     Examples
@@ -56,6 +58,8 @@ class PlanStatus(StrEnum):
     """A sampling-based planner came near the goal but did not reach it."""
     TIMEOUT = "timeout"
     """A sampling-based planner found nothing in its time."""
+
+    __str__ = str.__str__
 
 
 class RouteSource(Protocol):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     AfterValidator,
@@ -19,6 +19,9 @@ from pydantic_core import PydanticCustomError
 
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.refine.ompl.settings import OmplSettings
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from hybridnav.refine.kernels.sweep import look_ahead
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+    from typing_extensions import Self
 
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
     from hybridnav.refine.footprint import Footprint

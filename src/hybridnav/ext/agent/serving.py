@@ -28,7 +28,7 @@ async def answered(answers: MapAnswers, name: str, arguments: dict[str, Any]) ->
     call = asyncio.to_thread(answers.call, name, arguments)
     try:
         return await asyncio.wait_for(call, LIMIT_S)
-    except TimeoutError:
+    except asyncio.TimeoutError:
         return {
             "ok": False,
             "text": f"no answer within {LIMIT_S:g} s: ask again, and for less",

@@ -23,7 +23,7 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
-from hybridnav.cli.reading import check_model, load_numba, read_settings
+from hybridnav.cli.reading import check_model, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
@@ -55,7 +55,6 @@ def load_floors(
 ) -> hn.ext.fleet.Building:
     """Load a building as the options say."""
     preset = preset_of_floors(reading)
-    load_numba()
     with stage(f"reading {file}", seconds, "load"):
         return hn.ext.fleet.load_building(
             file,

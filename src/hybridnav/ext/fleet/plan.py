@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from hybridnav.errors import PlanError
 from hybridnav.ext.fleet.floors import ROUNDED
@@ -19,6 +19,8 @@ from hybridnav.planner.guide import FloorChange, Instruction, Space, sentences
 from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from hybridnav.ext.fleet.floors import Floor
     from hybridnav.ext.fleet.links import LinkNetwork, Part
     from hybridnav.ext.fleet.search import Endpoint, LinkSearch

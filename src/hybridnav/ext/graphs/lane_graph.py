@@ -289,7 +289,7 @@ def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
             part_of < 0, return_distances=False, return_indices=True
         )
         cells = cells.copy()
-        cells[is_blocked] = nearest[:, *cells[is_blocked].T].T
+        cells[is_blocked] = nearest[(slice(None), *cells[is_blocked].T)].T
     return cells
 
 

@@ -21,7 +21,7 @@ from hybridnav.cli.common import (
     progress_bar,
     timings,
 )
-from hybridnav.cli.reading import check_room_to_be, load_numba
+from hybridnav.cli.reading import check_room_to_be
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.names import read_point
 
@@ -87,7 +87,6 @@ def explore(
     if out is not None:
         check_writable(out.with_suffix(".pgm"), "--out")
     check_output(plot, "--plot", (".gif",))
-    load_numba()
     world = hn.load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells).grid
     check_room_to_be(world)
     if out is not None:

@@ -13,7 +13,6 @@ import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
-from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
@@ -140,7 +139,6 @@ def map(  # noqa: A001 - the command's name
             )
     if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
         return
-    load_numba()
     from hybridnav.ext.live.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
 
     model = LaserModel(when_hit, when_passed, max_range_m, min_range_m, clear_range_m, tolerance_m)

@@ -20,7 +20,6 @@ from hybridnav.cli.common import (
     check_output,
     progress_bar,
 )
-from hybridnav.cli.reading import load_numba
 from hybridnav.errors import MapError
 from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -80,7 +79,6 @@ def replay(
         raise UsageError("--every, --scans and --resolution are for a log, got map files")
     if is_log and rooms_file is not None:
         raise UsageError("--rooms is for map files, got a log: its rooms are found")
-    load_numba()
     from hybridnav.ext.live import ReplayFigures  # noqa: PLC0415 - loads numba
     from hybridnav.ext.live import replay as follow  # noqa: PLC0415
 

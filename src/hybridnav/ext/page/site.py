@@ -6,7 +6,7 @@ import math
 import threading
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
@@ -21,6 +21,8 @@ from hybridnav.topology.rooms import find_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    from typing_extensions import Self
 
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry

@@ -119,10 +119,11 @@ def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, Lon
     cells = np.argwhere(diagram)
     endpoints, cosine = basis_pairs(cells, basis)
     cells, endpoints = cells[cosine <= _OPPOSITE], endpoints[cosine <= _OPPOSITE]
-    rank = clearance[*cells.T]
+    rank = clearance[tuple(cells.T)]
     candidates = np.zeros_like(diagram)
-    candidates[*cells[rank == least_nearby(cells, rank, diagram.shape, epsilon_cells)].T] = True
-    chosen = middles_of_passages(candidates, np.where(diagram, clearance, 0.0))[*cells.T]
+    least = cells[rank == least_nearby(cells, rank, diagram.shape, epsilon_cells)]
+    candidates[tuple(least.T)] = True
+    chosen = middles_of_passages(candidates, np.where(diagram, clearance, 0.0))[tuple(cells.T)]
     return cells[chosen] - 1, endpoints[chosen] - 1
 
 
@@ -145,10 +146,11 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
     axis = np.zeros_like(free)
     place = np.indices(free.shape)
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1, :], np.s_[1:, :])):
-        first, second = basis[:, *here], basis[:, *there]
+        each, other = (np.s_[:], *here), (np.s_[:], *there)
+        first, second = basis[each], basis[other]
         apart = first - second
         # The cell of the two that is nearer to the bisector of both basis points.
-        hand = (apart * (first + second - place[:, *here] - place[:, *there])).sum(axis=0)
+        hand = (apart * (first + second - place[each] - place[other])).sum(axis=0)
         meet = (apart**2).sum(axis=0) > 1
         axis[here] |= meet & (hand >= 0)
         axis[there] |= meet & (hand <= 0)
@@ -186,7 +188,7 @@ def least_nearby(
 ) -> FloatArray:
     """Return the least value among the cells within some 8-neighbour steps of each cell."""
     index_of = np.full(shape, len(cells))
-    index_of[*cells.T] = np.arange(len(cells))
+    index_of[tuple(cells.T)] = np.arange(len(cells))
     around = cells[:, None, :] + _STEPS
     nearby = index_of[around[..., 0], around[..., 1]]
     least = np.append(values, np.inf)
@@ -219,7 +221,7 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
     order = np.lexsort((squared, run))
     nearest = cells[order[np.searchsorted(run[order], np.arange(n_runs))]]
     chosen = np.zeros_like(candidates)
-    chosen[*nearest[n_exits >= 2].T] = True  # noqa: PLR2004 - in and out
+    chosen[tuple(nearest[n_exits >= 2].T)] = True  # noqa: PLR2004 - in and out
     return chosen
 
 

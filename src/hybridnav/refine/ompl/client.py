@@ -8,18 +8,17 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 import weakref
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hybridnav.errors import CacheWarning, OmplError
+from hybridnav._base.threads import start_module
+from hybridnav.errors import OmplError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -133,7 +132,6 @@ _LATE = 0.3
 """Share of a query's time before its end from which its reply is late."""
 _START_S = 120.0
 _END_S = 1.0
-_PACKAGES = Path(__file__).parents[3]
 
 
 def require_ompl() -> None:
@@ -351,17 +349,8 @@ class _Running:
 
 def _launch(descriptor: int) -> subprocess.Popen[bytes]:
     # With its own command: a spawned process of multiprocessing would run the caller's main module.
-    # Without the working directory, whose files may have the names of modules.
-    quiet = ("-W", f"ignore:{CacheWarning.opening}")  # this process has warned
-    paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
-    return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
-        [sys.executable, "-P", *quiet, "-m", "hybridnav.refine.ompl.server", str(descriptor)],
-        pass_fds=[descriptor],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,  # only the planner receives an interrupt from the keyboard
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
-    )
+    server, pipes = "hybridnav.refine.ompl.server", {"stdin": subprocess.DEVNULL}
+    return start_module(server, str(descriptor), pass_fds=[descriptor], **pipes)
 
 
 def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -> None:

@@ -3,7 +3,7 @@
 import itertools
 import json
 from collections import Counter
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import datetime, timedelta, timezone
 
 import pytest
 from hypothesis import assume, given, settings
@@ -14,7 +14,7 @@ from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.graphs.files.lif_schema import read_lif
 from tests.strategies import examples
 
-NOON = datetime(2026, 3, 1, 12, 30, 15, 120000, tzinfo=UTC)
+NOON = datetime(2026, 3, 1, 12, 30, 15, 120000, tzinfo=timezone.utc)
 
 
 @pytest.fixture(scope="module")

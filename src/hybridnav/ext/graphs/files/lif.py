@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections import Counter
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import NewFile
@@ -291,14 +291,15 @@ def export_lif(
             f"vehicle_types is {vehicle_types!r:.80}, expected one or more texts, such as "
             "'MANUFACTURER.SERIES'"
         )
-    exported_at = datetime.now(UTC) if exported_at is None else exported_at
+    exported_at = datetime.now(timezone.utc) if exported_at is None else exported_at
     if exported_at.tzinfo is None:
         raise InvalidValueError(f"exported_at is {exported_at}, expected a time with a time zone")
     layouts = _lif_out_layouts(join_links(building), list(dict.fromkeys(vehicle_types)))
     meta = {
         "projectIdentification": building.name,
         "creator": f"hybridnav {__version__}",
-        "exportTimestamp": f"{exported_at.astimezone(UTC):%Y-%m-%dT%H:%M:%S.%f}"[:-4] + "Z",
+        "exportTimestamp": f"{exported_at.astimezone(timezone.utc):%Y-%m-%dT%H:%M:%S.%f}"[:-4]
+        + "Z",
         "lifVersion": LIF_VERSION,
     }
     head = f'{{"metaInformation": {json.dumps(meta)}, "layouts": [\n'

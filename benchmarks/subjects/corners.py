@@ -1,0 +1,48 @@
+"""The oldest and the newest Python and numpy: tests of what plans, in environments of their own.
+
+Installs the package with its dependencies into an environment of the first and of the last Python,
+the first with the oldest numpy that is allowed, and runs there the tests of `TESTS`: the kernels,
+every preset, pyramids and rooms, the saved models, and that answers depend on no processor. Exits
+with 1 where one fails.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.common import ROOT, option
+from benchmarks.subjects.wheels import Environment
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+OLDEST = "numpy==1.26.*"
+TESTS = (
+    *("tests/_base", "tests/planner/test_named_plans.py", "tests/planner/test_results.py"),
+    *("tests/pyramid/test_invariants.py", "tests/search/test_search.py", "tests/topology"),
+)
+PACKAGES = ("hypothesis", "pytest", "h11")
+VERSIONS = "import sys, numpy, numba; print(sys.version.split()[0], numpy.__version__)"
+
+OPTIONS = [option("--python", nargs="+", default=[sys.executable], help="the oldest first")]
+
+
+def main(given: Namespace) -> int:
+    """Run the tests in both environments."""
+    codes = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for at, python in enumerate(dict.fromkeys((given.python[0], given.python[-1]))):
+            environment = Environment(python, Path(scratch) / str(at))
+            oldest = () if at else (OLDEST,)
+            environment.install(*PACKAGES, *oldest, "--editable", f"{ROOT}")
+            paths = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(Path(scratch) / "cache")}
+            print("Python and numpy:", flush=True)
+            subprocess.run([str(environment.python), "-c", VERSIONS], check=True)
+            command = [str(environment.python), "-m", "pytest", "-q", "-m", "not full", *TESTS]
+            codes.append(subprocess.run(command, cwd=ROOT, env=os.environ | paths, check=False))
+    return int(any(done.returncode for done in codes))

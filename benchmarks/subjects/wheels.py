@@ -1,0 +1,189 @@
+"""Build wheels that bring compiled kernels, one for each Python, and try them: `make wheels`.
+
+In a clean clone, commands, pages, presets and notebooks run once, which lists the kernels and the
+types that they are called with. For each Python they are compiled for the levels of x86-64 in
+`hybridnav._base.jit.LEVELS` and packed. Each wheel is then installed into an empty environment with
+a home that cannot be written: nothing may be compiled there, and the answers of `tests.answers`
+must be those of a run that compiles for this processor, bit for bit. Exits with 1 where one fails.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.common import ROOT, Refused, option
+from hybridnav._base.jit import LEVELS
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+EXERCISE = (
+    *("tests/product/test_readme.py", "tests/product/test_examples.py"),
+    *("tests/product/test_notebooks.py", "tests/planner/test_named_plans.py"),
+    *("tests/cli", "tests/ext/page", "tests/ext/agent"),
+)
+"""Tests that run what the pages and notebooks promise, and all presets."""
+TAG = f"manylinux_2_28_{platform.machine()}"
+"""llvmlite's own wheels need as much."""
+COUNTED = """
+import sys
+from numba.core import event
+compiled = []
+class Listener(event.Listener):
+    def on_start(self, event): compiled.append(event.data["dispatcher"].__name__)
+    def on_end(self, event): pass
+event.register("numba:compile", Listener())
+import runpy
+sys.argv = sys.argv[1:]
+try:
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+finally:
+    sys.stderr.write(f"compiled {compiled}\\n")
+"""
+
+
+def run(*words: Any, **settings: Any) -> str:
+    """Run a command and return what it prints."""
+    command = list(map(str, words))
+    done = subprocess.run(command, check=False, text=True, stdout=subprocess.PIPE, **settings)
+    if done.returncode:
+        raise Refused(f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout}")
+    return str(done.stdout)
+
+
+def kernels_of(tree: Path) -> list[tuple[str, str, list[Any]]]:
+    """Return module, name and signatures of the kernels in the caches of a source tree."""
+    found: dict[tuple[str, str], list[Any]] = defaultdict(list)
+    for index in sorted((tree / "src").rglob("*.nbi")):
+        stem, _, _ = index.name.rpartition("-")
+        module, _, name = stem.partition(".")
+        if name.endswith("_inner"):  # linked into the others
+            continue
+        with index.open("rb") as file:
+            pickle.load(file)  # noqa: S301 - numba's version, as all of its files
+            _, entries = pickle.loads(file.read())  # noqa: S301
+        folder = index.parents[1].relative_to(tree / "src")
+        parts = folder.parts if module == "__init__" else (*folder.parts, module)
+        found[".".join(parts), name] += sorted((key[0] for key in entries), key=str)
+    return [(module, name, each) for (module, name), each in found.items()]
+
+
+class Environment:
+    """A virtual environment of one Python."""
+
+    def __init__(self, python: str, folder: Path) -> None:
+        self.folder = folder
+        run(python, "-m", "venv", folder)
+        self.python = folder / "bin" / "python"
+        self.name = run(self.python, "-c", "import sys; print('cp%d%d' % sys.version_info[:2])")
+        self.name = self.name.strip()
+
+    def install(self, *words: Any) -> None:
+        """Install packages."""
+        run(self.python, "-m", "pip", "install", "--quiet", *words)
+
+
+def compile_for(environment: Environment, listed: Path, folder: Path) -> None:
+    """Compile the listed kernels into a folder, a process for each level."""
+    script = Path(__file__).with_name("_wheels_compile.py")
+    at_work = []
+    for level in LEVELS:
+        settings = {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
+        settings["NUMBA_CACHE_DIR"] = str(environment.folder / level)
+        command = [str(environment.python), str(script), str(listed), str(folder)]
+        at_work.append(subprocess.Popen(command, env=os.environ | settings))
+    codes = [process.wait() for process in at_work]
+    if any(codes):
+        raise Refused(f"{environment.name}: a kernel does not compile")
+
+
+def build(environment: Environment, tree: Path, listed: Path) -> Path:
+    """Build the wheel of one Python in a clean tree."""
+    environment.install("hatchling", "wheel", tree)
+    compile_for(environment, listed, tree / "src" / "hybridnav" / "compiled")
+    dist = tree / "dist"
+    run(environment.python, "-m", "hatchling", "build", "-t", "wheel", "-d", dist, cwd=tree)
+    (plain,) = dist.glob("*-none-any.whl")
+    tags = [f"--python-tag={environment.name}", f"--abi-tag={environment.name}"]
+    run(environment.python, "-m", "wheel", "tags", *tags, f"--platform-tag={TAG}", plain)
+    (made,) = dist.glob(f"*-{environment.name}-*.whl")
+    return made
+
+
+def answers(python: Path, folder: Path, **settings: str) -> tuple[dict[str, Any], str]:
+    """Return the answers of a Python in a home that cannot be written, and what it compiled."""
+    command = [str(python), "-c", COUNTED, "tests.answers"]
+    clean = {"PATH": os.environ["PATH"], "HOME": "/dev/null", "PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        command, cwd=folder, env=clean | settings, check=True, text=True, capture_output=True
+    )
+    return json.loads(done.stdout)["answers"], done.stderr.strip().splitlines()[-1]
+
+
+def judge(environment: Environment, tree: Path, folder: Path) -> bool:
+    """Print whether an installed wheel compiles nothing, and answers as compiled code does."""
+    for part in ("tests", "benchmarks", "maps"):
+        shutil.copytree(tree / part, folder / part)
+    (packages,) = environment.folder.glob("lib/python*/site-packages")
+    for place in (packages / "hybridnav").rglob("__pycache__"):
+        shutil.rmtree(place)
+    for place in [packages / "hybridnav", *(packages / "hybridnav").rglob("*/")]:
+        (place / "__pycache__").touch()  # stops the super-user too, as permissions do not
+    best, compiled = answers(environment.python, folder)
+    compiled_folder = packages / "hybridnav" / "compiled"
+    (version,) = compiled_folder.iterdir()
+    (version / "x86-64-v3").rename(version / "kept")
+    plain, compiled_plain = answers(environment.python, folder)
+    compiled_folder.rename(compiled_folder.with_name("kept"))
+    own, compiled_own = answers(environment.python, folder, NUMBA_CACHE_DIR=str(folder / "cache"))
+    is_equal = best == plain == own
+    print(f"  {len(own)} answers, equal: {is_equal}; AVX2 {compiled}, plain {compiled_plain}")
+    nothing = "compiled []"
+    return is_equal and compiled == compiled_plain == nothing != compiled_own
+
+
+OPTIONS = [
+    option("--python", nargs="+", default=[sys.executable]),
+    option("--out", type=Path, default=ROOT / "out" / "wheels"),
+]
+
+
+def main(given: Namespace) -> int:
+    """Build and try the wheels."""
+    if run("git", "status", "--porcelain", cwd=ROOT):
+        raise Refused("the tree is not clean: commit first, kernels are built from commits")
+    given.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        tree, listed = Path(scratch) / "tree", Path(scratch) / "kernels.pickle"
+        run("git", "clone", "--quiet", ROOT, tree)
+        paths = f"{tree / 'src'}{os.pathsep}{tree}"
+        clean = {key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        clean |= {"PYTHONPATH": paths, "HYBRIDNAV_DATA": ""}
+        # One process: two that keep versions of one kernel may lose one.
+        run(sys.executable, "-m", "hybridnav.cli.warm", cwd=tree, env=clean)
+        run(sys.executable, "-m", "pytest", "-q", "-m", "not full", *EXERCISE, cwd=tree, env=clean)
+        run(sys.executable, "-m", "tests.answers", cwd=tree, env=clean)
+        kernels = kernels_of(tree)
+        listed.write_bytes(pickle.dumps(kernels))
+        print(f"{len(kernels)} kernels, {sum(len(each) for _, _, each in kernels)} signatures")
+        is_fine = []
+        for at, python in enumerate(given.python):
+            work = Path(scratch) / str(at)
+            run("git", "clone", "--quiet", ROOT, work / "tree")
+            made = build(Environment(python, work / "build"), work / "tree", listed)
+            shutil.copy(made, given.out)
+            print(f"{made.name}: {made.stat().st_size / 1e6:.1f} MB", flush=True)
+            environment = Environment(python, work / "empty")
+            environment.install(made, "h11")
+            is_fine.append(judge(environment, work / "tree", work / "elsewhere"))
+    return 0 if all(is_fine) else 1
