@@ -231,6 +231,10 @@ def test_cells_of_a_metre_are_taken_for_those_of_a_building():
 
 
 def test_the_page_on_the_harness_states_their_limits():
-    page = (ROOT / "docs" / "reference" / "harness-methods.md").read_text(encoding="utf-8").replace("\n", " ")
+    page = (
+        (ROOT / "docs" / "reference" / "harness-methods.md")
+        .read_text(encoding="utf-8")
+        .replace("\n", " ")
+    )
     assert f"with {NODES:,} nodes aimed at" in page
     assert f"has more than {MOST_SKELETON:,} cells" in page
