@@ -119,11 +119,11 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    mesh, graph = search.mesh, search.graph
+    mesh, (graph, works) = search.mesh, search.engine()
     place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
     arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
     at = n = 0
-    with (search.works if graph is None else search.corner_works).lent() as work:
+    with works.lent() as work:
         while at < count:
             rest = place, asked, work.arrays, work.bounds, effort
             found = (length, bound, starts, positions), at, n

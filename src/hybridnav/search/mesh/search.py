@@ -16,8 +16,15 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
-from hybridnav.search.mesh.build import CornerHierarchy, add_landmarks, contract_corners, find_edges
-from hybridnav.search.mesh.kernels import polyanya
+from hybridnav.search.mesh.build import (
+    CornerGraph,
+    CornerHierarchy,
+    add_landmarks,
+    contract_corners,
+    find_edges,
+)
+from hybridnav.search.mesh.hubs import HubLabels, label_corners
+from hybridnav.search.mesh.kernels import hubs, polyanya
 from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.intervals import G
 from hybridnav.search.mesh.kernels.polyanya import N
@@ -26,7 +33,7 @@ from hybridnav.search.mesh.kernels.queries import query, query_hierarchy
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
+    from hybridnav.search.mesh.build import ConvexMesh
 
 
 KERNEL = query
@@ -139,6 +146,27 @@ class _HierarchyWork(_Work):
         return *self.endpoints, self.views, self.records, self.touched, *tail
 
 
+class _HubWork(_Work):
+    """Work arrays of a query of hub labels."""
+
+    def __init__(self, mesh: ConvexMesh) -> None:
+        super().__init__(mesh)
+        n = len(mesh.corners)
+        self.sights, self.costs = np.empty((2, _ROOM), np.int8), np.empty((2, _ROOM), np.int64)
+        self.totals = np.empty(_ROOM, np.int64)
+        self.hubs = np.full(n, hubs.FAR), np.empty(n, np.int32)
+
+    def make_room(self) -> None:
+        self.sights = np.concatenate([self.sights, self.sights], axis=1)
+        self.costs = np.concatenate([self.costs, self.costs], axis=1)
+        self.totals = np.empty(self.costs.shape[1], np.int64)
+
+    @property
+    def arrays(self) -> tuple[object, ...]:
+        """The arrays in the order of `query_hubs`."""
+        return self.sights, self.costs, self.totals, *self.hubs, self.counts, self.bounds
+
+
 @copies_alike
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
@@ -177,6 +205,9 @@ class MeshSearch:
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
+        self.labels: HubLabels | None = None
+        """Hub labels of the corners, which answer all queries; None unless they were asked for."""
+        self._hub_works: Pool[Any] = Pool(partial(_HubWork, mesh))
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock = threading.Lock()
@@ -228,6 +259,34 @@ class MeshSearch:
         self.edges, self._graph = edges, graph
         self.is_prepared = True
 
+    def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
+        """Build hub labels of the corners, which answer later queries in microseconds.
+
+        Parameters
+        ----------
+        most_mb
+            Most memory of the labels, in 10^6 bytes.
+        progress
+            See `prepare`.
+
+        Returns
+        -------
+        bool
+            False if they need more memory: queries are then answered as before.
+        """
+        self.prepare()
+        if self.edges is not None:
+            made = label_corners(self.mesh, self.arrays, self.edges, most_mb, progress)
+            self.labels = made
+        return self.labels is not None
+
+    def engine(self) -> tuple[CornerGraph | CornerHierarchy | HubLabels | None, Pool[Any]]:
+        """Return what answers queries, None for the mesh itself, and its work arrays."""
+        if self.labels is not None:
+            return self.labels, self._hub_works
+        graph = self._graph
+        return graph, self.works if graph is None else self.corner_works
+
     def path(
         self,
         cells: tuple[Cell, Cell],
@@ -269,8 +328,8 @@ class MeshSearch:
             known = np.concatenate([endpoints[:1], known[1:-1], endpoints[1:]])
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
         points = endpoints[0][1], endpoints[0][0], endpoints[1][1], endpoints[1][0]
-        graph = self.graph
-        with (self.works if graph is None else self.corner_works).lent() as work:
+        graph, works = self.engine()
+        with works.lent() as work:
             path = self._run(graph, (*cells[0], *cells[1]), points, work, (upper, epsilon, until))
             length, bound = work.bounds.tolist()
             bound = length if bound >= length else bound * SURE
@@ -281,7 +340,7 @@ class MeshSearch:
 
     def _run(
         self,
-        graph: CornerGraph | CornerHierarchy | None,
+        graph: CornerGraph | CornerHierarchy | HubLabels | None,
         where: tuple[int, ...],
         points: tuple[float, ...],
         work: Any,
@@ -297,7 +356,7 @@ class MeshSearch:
                 blocks = self.mesh.block_of, self.tree, at
                 found = query(self.arrays, *blocks, where, points, work.arrays, left)
             else:
-                answer = query_hierarchy if isinstance(graph, CornerHierarchy) else query_corners
+                answer = _KERNELS[type(graph)]
                 place = self.mesh.component, at, where
                 found = answer(self.arrays, graph.arrays, place, points, work.arrays, left)
             status, path = found
@@ -309,6 +368,13 @@ class MeshSearch:
                 limit = -1
             else:
                 limit += SLICE
+
+
+_KERNELS = {
+    CornerGraph: query_corners,
+    CornerHierarchy: query_hierarchy,
+    HubLabels: hubs.query_hubs,
+}
 
 
 def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -18,6 +18,7 @@ from hybridnav.search.mesh.kernels.corner_search import (
     polygons_of_endpoints,
     query_corners,
 )
+from hybridnav.search.mesh.kernels.hubs import query_hubs
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
     DONE,
@@ -147,7 +148,7 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
     mesh
         See `successors`.
     graph
-        Arrays of a `CornerGraph` or a `CornerHierarchy`; for a search of intervals the block of
+        Arrays of a `CornerGraph`, a `CornerHierarchy` or `HubLabels`; for a search of intervals the block of
         each slot, and the tree of `query`.
     place
         Component of polygons, and the polygon of each cell.
@@ -205,9 +206,14 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
     def by_hierarchy(mesh, graph, place, where, points, work, effort):
         return query_hierarchy(mesh, graph, (place[0], place[1], where), points, work, effort)
 
+    def by_hubs(mesh, graph, place, where, points, work, effort):
+        return query_hubs(mesh, graph, (place[0], place[1], where), points, work, effort)
+
     if isinstance(graph[1], types.BaseTuple):
         return by_intervals
-    return by_corners if len(graph) == 3 else by_hierarchy
+    if len(graph) == 3:
+        return by_corners
+    return by_hierarchy if len(graph) == 4 else by_hubs
 
 
 # Kernels of the search of the hierarchy of corners: shortest any-angle paths.
