@@ -115,6 +115,13 @@ class OverMesh(Method):
             search.prepare(lambda done, total: progress(done + 1, total + 1))
         return search
 
+    def label(self, most_mb: float, progress: Progress) -> bool:
+        """Build hub labels of the corners of the mesh; see `Method`."""
+        if self._is_renewed:  # a patched mesh does not know which cells are free
+            with self._building:
+                self._search, self._is_renewed = MeshSearch(build_mesh(self._free)), False
+        return self._on_mesh().label(most_mb, progress)
+
     def _on_mesh(self) -> MeshSearch:
         """Return the search of the mesh, which is built once."""
         if self._search is None:
@@ -163,8 +170,8 @@ class OverMesh(Method):
             return self.find(query).cost_m
         position_of = self._frame.position_of
         start, goal = (position_of(*point[:2].tolist()) for point in query.points)
-        found = self._search.path(query.cells, (start, goal), epsilon=self._epsilon)
-        return found.length_cells * self._placing[0]
+        length = self._search.length(query.cells, (start, goal), epsilon=self._epsilon)
+        return length * self._placing[0]
 
     def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
         """Return the path of the search of the mesh, and the nodes expanded."""

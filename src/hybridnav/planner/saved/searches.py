@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from hybridnav.planner.saved.structures import (
     CORNER_EDGES,
     CORNER_GRAPH,
     CORNER_HIERARCHY,
+    HUB_LABELS,
     JUMP_GRAPH,
     MESH,
     refusal,
@@ -26,7 +28,13 @@ if TYPE_CHECKING:
     from hybridnav.planner import PlannerSettings
     from hybridnav.planner.saved.container import FiledPart, Part
     from hybridnav.search.found import Prepared
-    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+    from hybridnav.search.mesh import (
+        ConvexMesh,
+        CornerGraph,
+        CornerHierarchy,
+        HubLabels,
+        MeshSearch,
+    )
     from hybridnav.search.octile import JumpSearch
 
 
@@ -111,6 +119,16 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
     parts = [MESH.part(mesh, sizes, values)]
     if search.edges is None or graph is None:
         return parts
+    labels = search.labels
+    if labels is not None:
+        of_labels = {
+            "corners": len(mesh.corners),
+            "parts": len(labels.heads),
+            "entries": len(labels.entries),
+            "squares": len(labels.begin) - 1,
+            "views": len(labels.views),
+        }
+        parts.append(HUB_LABELS.part(labels, of_labels, key))
     sizes = {"corners": len(mesh.corners), "edges": len(search.edges[1])}
     if isinstance(graph, meshes.CornerGraph):
         sizes["landmarks"] = graph.landmark_distances.shape[1]
@@ -132,7 +150,27 @@ def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch
     search.expanded = values.expanded
     if values.is_prepared:
         search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
+    if HUB_LABELS.kind in fitting:
+        search.labels = _labels_of(fitting[HUB_LABELS.kind], known, len(mesh.corners))
     return search
+
+
+def _labels_of(filed: FiledPart, known: dict[str, int], n_corners: int) -> HubLabels:
+    """Read hub labels; refuse what would lead a query out of their arrays."""
+    _check_same(filed, "corners", n_corners)
+    labels = meshes.HubLabels(**HUB_LABELS.read(filed, known))
+    side, n_across, bits, unit = labels.layout.tolist()
+    is_whole = side >= 1 and side == int(side) and bits in range(1, meshes.MOST_BITS + 1)
+    if not is_whole or not 0 < unit < math.inf:
+        raise refusal(filed, f"a layout of {labels.layout}")
+    rows, cols = (known[name] // int(side) + 2 for name in ("rows", "cols"))
+    if n_across != cols or len(labels.begin) != rows * cols + 1:
+        raise refusal(filed, f"{len(labels.begin) - 1} squares of {side:.0f} cells")
+    twice, low, high = labels.views.T
+    is_inside = (twice >> 1 < n_corners) & (low <= high) & (high <= len(labels.entries))
+    if not is_inside.all() or (labels.entries >> int(bits) >= n_corners).any():
+        raise refusal(filed, "views or entries name what does not exist")
+    return labels
 
 
 def _check_mesh(filed: FiledPart, mesh: ConvexMesh) -> None:

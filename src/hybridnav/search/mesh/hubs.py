@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,7 +30,7 @@ _SOURCES = 100
 _BYTES, _BYTES_OF_VIEW = 8, 12
 """Bytes of an entry of a label, and of a corner of a square."""
 
-_MOST_BITS = 46
+MOST_BITS = 46
 """Most bits of a distance, so that the number of a corner has room below the sum of two."""
 
 
@@ -52,8 +51,9 @@ class HubLabels:
     begin: IntArray
     """int32 (squares + 1,), offsets of the views of each square."""
     views: IntArray
-    """int32 (v, 3), a corner that sees something of the square, and its entries from one to before
-    another: on all others, a path from the square would be slack."""
+    """int32 (v, 3), twice the number of a corner that sees something of the square, plus 1 if it
+    sees all free space there; its entries from one to before another: on all others, a path from
+    the square would be slack."""
     first: IntArray
     """int32 (2 n + 1,), the parts of the label of corner i whose paths go on into one of the two
     quadrants beside its blocked cell are `first[2 i]` to `first[2 i + 1]`, the others
@@ -113,29 +113,23 @@ def label_corners(
     progress(2, 3)
     if not is_whole:
         return None
-    entries, first, offset, heads, turns, scale = _parted(mesh, ranked, *labels)
+    entries, first, offset, heads, turns, scale = _parted(mesh, ranked, labels)
     left = most - sum(array.nbytes for array in (entries, first, offset, heads))
     squares = _squares(mesh, arrays, (first, offset, turns), left)
     progress(3, 3)
     if squares is None:
         return None
-    layout, begin, views = squares
-    layout = np.array([*layout, *scale])
-    found = HubLabels(entries, layout, begin, views, first, offset, heads)
+    sizes, begin, views = squares
+    found = HubLabels(entries, np.array([*sizes, *scale]), begin, views, first, offset, heads)
     for array in found.arrays:
         array.flags.writeable = False
     return found
 
 
 def _parted(
-    mesh: ConvexMesh,
-    ranked: IntArray,
-    offset: LongArray,
-    hubs: IntArray,
-    lengths: FloatArray,
-    onward: IntArray,
+    mesh: ConvexMesh, ranked: IntArray, labels: list[AnyArray]
 ) -> tuple[LongArray, IntArray, IntArray, IntArray, FloatArray, tuple[float, float]]:
-    """Part labels by the next corner.
+    """Part labels of `labels_of_corners` by the next corner.
 
     Returns
     -------
@@ -144,6 +138,7 @@ def _parted(
         direction to the next corner, along the wall and away from it; bits of a distance, and the
         unit in cells.
     """
+    offset, hubs, lengths, onward = labels
     n = len(mesh.corners)
     at = np.repeat(np.arange(n, dtype=np.int32), np.diff(offset))
     towards = (mesh.corners[onward] - mesh.corners[at])[:, ::-1].astype(np.float64)
@@ -157,7 +152,7 @@ def _parted(
     own, ranks = np.repeat(ranked, 2), np.repeat(np.arange(len(ranked), dtype=np.int32), 2)
     place = np.concatenate([2 * own + np.arange(len(own)) % 2, 2 * at + lobe])
     heads = np.concatenate([own, onward])
-    turns = np.concatenate([np.tile(np.float32([1, 0]), (len(own), 1)), turns])
+    turns = np.concatenate([np.tile(np.array([1, 0], np.float32), (len(own), 1)), turns])
     is_other = np.arange(len(place)) >= len(own)
     order = np.lexsort((heads, turns[:, 1], is_other, place))
     place, heads, turns = place[order], heads[order], turns[order]
@@ -165,9 +160,9 @@ def _parted(
     begins[1:] = (place[1:] != place[:-1]) | (heads[1:] != heads[:-1])
     begin = np.flatnonzero(begins)
     first = np.searchsorted(place[begin], np.arange(2 * n + 1)).astype(np.int32)
-    bits = min(_MOST_BITS, 62 - len(ranked).bit_length())
-    longest = lengths.max(initial=float(sum(mesh.polygon_at.shape)))
-    unit = 2.0 ** (math.ceil(math.log2(longest + 1.0)) - bits)
+    bits = min(MOST_BITS, 62 - len(ranked).bit_length())
+    longest = int(lengths.max(initial=float(sum(mesh.polygon_at.shape))))
+    unit = 2.0 ** (longest.bit_length() - bits)
     units = np.concatenate([np.zeros(len(own)), np.round(lengths / unit)]).astype(np.int64)
     entries = (np.concatenate([ranks, hubs]).astype(np.int64) << bits | units)[order]
     ends = np.append(begin, len(order)).astype(np.int32)

@@ -26,8 +26,6 @@ from hybridnav.search.mesh.build import (
 from hybridnav.search.mesh.hubs import HubLabels, label_corners
 from hybridnav.search.mesh.kernels import hubs, polyanya
 from hybridnav.search.mesh.kernels.corner_search import query_corners
-from hybridnav.search.mesh.kernels.intervals import G
-from hybridnav.search.mesh.kernels.polyanya import N
 from hybridnav.search.mesh.kernels.queries import query, query_hierarchy
 
 if TYPE_CHECKING:
@@ -47,6 +45,8 @@ SLICE = 256
 """Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
+_ALONE = math.inf, 0.0, 0.0
+"""Effort of a query by hub labels for the length alone: no time for the path."""
 SURE = 1.0 - 1e-12
 """Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
 _WORTH = 20_000
@@ -338,6 +338,20 @@ class MeshSearch:
             self.expanded += expanded
         return MeshPath(path if len(path) else known, length, bound, expanded)
 
+    def length(
+        self, cells: tuple[Cell, Cell], positions: tuple[Position, Position], *, epsilon: float
+    ) -> float:
+        """Return the length in cells of the path that `path` finds, infinite for none."""
+        labels = self.labels
+        if labels is None:
+            return self.path(cells, positions, epsilon=epsilon).length_cells
+        (row, col), (to_row, to_col) = (
+            round_into(*end) for end in zip(cells, positions, strict=True)
+        )
+        with self._hub_works.lent() as work:
+            self._run(labels, (*cells[0], *cells[1]), (col, row, to_col, to_row), work, _ALONE)
+            return float(work.bounds[0])
+
     def _run(
         self,
         graph: CornerGraph | CornerHierarchy | HubLabels | None,
@@ -348,7 +362,7 @@ class MeshSearch:
     ) -> FloatArray:
         """Run a kernel in slices until it is done, or out of time."""
         upper, epsilon, until = effort
-        limit = NO_LIMIT if math.isinf(until) else SLICE
+        limit = 0 if not until else NO_LIMIT if math.isinf(until) else SLICE
         at = self.mesh.polygon_at
         while True:
             left = upper, 1.0 + epsilon, limit
@@ -394,121 +408,3 @@ def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
     rounded = np.round(positions * GRAIN) / GRAIN
     clipped: FloatArray = np.clip(rounded, cells, cells + 1.0)
     return clipped
-
-
-# The intervals of a search of the mesh, to draw and count.
-
-
-_LEFT, _RIGHT = 1, 2
-"""Bits of a node: its interval reaches the left, the right corner of its side."""
-
-
-@dataclass(frozen=True, eq=False)
-class SearchTrace:
-    """The intervals that a search of the mesh made, in order.
-
-    An interval is a part of a side that is visible as a whole from one point, its root.
-    """
-
-    mesh: ConvexMesh
-    path: MeshPath
-    endpoints: FloatArray
-    """float64 (2, 2), (row, col) of start and goal in grid units."""
-    intervals: FloatArray
-    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as seen from
-    its root."""
-    roots: FloatArray
-    """float64 (n, 2), (row, col) of each interval's root: the start, or the corner at which the
-    path to the interval turns last."""
-    costs_cells: FloatArray
-    """float64 (n,), length of the path from the start to each root."""
-    parents: IntArray
-    """int32 (n,), the interval behind which each was found, -1 for the first ones."""
-
-
-def trace_search(
-    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
-) -> SearchTrace:
-    """Search a shortest path as `MeshSearch.path` does, and keep the intervals.
-
-    Parameters
-    ----------
-    mesh
-        The mesh of the map's free space.
-    cells
-        The free cells (row, col) of start and goal.
-    positions
-        Start and goal, (row, col) in grid units, in the closed squares of these cells.
-
-    Returns
-    -------
-    SearchTrace
-        Without intervals if start and goal lie in one polygon or apart.
-
-    Examples
-    --------
-    >>> from hybridnav.search.mesh import build_mesh, trace_search
-    >>> free = np.array([[True, False, True], [True, True, True]])
-    >>> trace = trace_search(build_mesh(free), ((0, 0), (0, 2)), ((0.5, 0.5), (0.5, 2.5)))
-    >>> len(trace.intervals), round(trace.path.length_cells, 3)
-    (2, 2.414)
-    """
-    endpoints = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
-    path, whole, real = _nodes(mesh, cells, positions)
-    slots, roots, parents, marks = whole.T
-    # Nodes for the goal itself have no side.
-    kept = slots >= 0
-    number = np.append(np.cumsum(kept) - 1, -1)
-    sides = _sides(mesh, slots[kept])
-    at = mesh.corners[roots[kept]].astype(np.float64)
-    at[roots[kept] < 0] = endpoints[0]
-    return SearchTrace(
-        mesh,
-        path,
-        endpoints,
-        _seen(sides, at, marks[kept], real[kept]),
-        at,
-        real[kept, G],
-        number[parents[kept]].astype(np.int32),
-    )
-
-
-def _nodes(
-    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
-) -> tuple[MeshPath, IntArray, FloatArray]:
-    """Return the path of a search, and its nodes; see the columns in `_interval_kernels`."""
-    search = MeshSearch(mesh)
-    path = search.path(cells, positions)
-    # No other code has this search: it lends the arrays that the query has just returned.
-    with search.works.lent() as work:
-        n = work.counts[N]
-        whole, real = work.nodes
-        return path, whole[:n].copy(), real[:n].copy()
-
-
-def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
-    """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
-    first."""
-    endpoints = np.stack([mesh.begins, mesh.finishes], axis=1)[slots]
-    pairs: FloatArray = mesh.corners[endpoints].astype(np.float64)
-    return pairs
-
-
-def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArray) -> FloatArray:
-    """Return the parts of sides that are seen between two rays, (n, 2, 2)."""
-    intervals = sides.copy()
-    along = sides[:, 1] - sides[:, 0]
-    off = sides[:, 0] - roots
-    at_side = (sides == roots[:, None]).all(axis=2).any(axis=1)
-    for end, bit, ray in ((0, _LEFT, real[:, 2:0:-1]), (1, _RIGHT, real[:, 4:2:-1])):
-        cut = (marks >= 0) & (marks & bit == 0) & ~at_side
-        direction = (ray - roots)[cut]
-        side, start = along[cut], off[cut]
-        share = _cross(start, direction) / _cross(direction, side)
-        intervals[cut, end] = sides[cut, 0] + share.clip(0, 1)[:, None] * side
-    return intervals
-
-
-def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    found: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    return found

@@ -233,9 +233,9 @@ def _view(mesh, labels, x, y, sights, costs):
     if high - low > len(costs):
         return low, -1
     for k in range(high - low):
-        corner = views[low + k, 0]
+        corner, sights[k] = views[low + k, 0] >> 1, views[low + k, 0] & 1
         dx, dy = cx[corner] - x, cy[corner] - y
-        costs[k], sights[k] = np.int64(math.sqrt(dx * dx + dy * dy) * units + 0.5), 0
+        costs[k] = np.int64(math.sqrt(dx * dx + dy * dy) * units + 0.5)
     return low, high
 
 
@@ -267,7 +267,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
         corners of the goal. By hub, int64 the least distance from the start, above the number of
         its corner (`FAR`); int32 hubs touched. Counts and bounds.
     effort
-        See `query`.
+        See `query`; with a limit of 0 the length is found without the path.
 
     Returns
     -------
@@ -318,13 +318,15 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
         if totals[m] >= best:
             break
         totals[m] = FAR
-        if _is_hidden(mesh, polygon_at, cells[2:], (tx, ty), views[to_low + m, 0], sights[1], m):
+        if _is_hidden(
+            mesh, polygon_at, cells[2:], (tx, ty), views[to_low + m, 0] >> 1, sights[1], m
+        ):
             continue
         for packed in entries[views[to_low + m, 1] : views[to_low + m, 2]]:
             hub, reached = packed >> shift, costs[1, m] + (packed & mask)
             while reached + (least[hub] >> ABOVE) < best:
                 k = least[hub] & ((1 << ABOVE) - 1)
-                corner = views[low + k, 0]
+                corner = views[low + k, 0] >> 1
                 if _is_hidden(mesh, polygon_at, cells[:2], (sx, sy), corner, sights[0], k):
                     least[hub] = _next_best(labels, low, high, hub, sights[0], costs[0])
                 else:
@@ -332,11 +334,11 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
                     one, two = low + k, to_low + m
     for hub in touched[:n_touched]:
         least[hub] = FAR
-    if one < 0:
-        bounds[:] = np.inf
+    bounds[:] = np.inf if one < 0 else best * layout[3]
+    if one < 0 or effort[2] == 0:
         return DONE, np.empty((0, 2))
-    there = _corners_to(labels, views[one, 0], best_hub, shift)
-    back = _corners_to(labels, views[two, 0], best_hub, shift)
+    there = _corners_to(labels, views[one, 0] >> 1, best_hub, shift)
+    back = _corners_to(labels, views[two, 0] >> 1, best_hub, shift)
     path = _path_through(mesh, endpoints, there, back)
     length = 0.0
     for k in range(len(path) - 1):
@@ -422,7 +424,7 @@ def views_of_squares(mesh, parts, layout, begin, corners):
     Returns
     -------
     tuple
-        int32 (squares + 1,) offsets; int32 (v, 3) corner, first entry, and the one after the last.
+        int32 (squares + 1,) offsets; int32 (v, 3) see `HubLabels`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, offset, turns = parts
@@ -431,7 +433,8 @@ def views_of_squares(mesh, parts, layout, begin, corners):
     kept = np.zeros(len(begin), np.int32)
     for square in range(len(begin) - 1):
         y, x = corner_of_square(square, side, n_across)
-        for corner in corners[begin[square] : begin[square + 1]]:
+        for twice in corners[begin[square] : begin[square + 1]]:
+            corner = twice >> 1
             ex = 1.0 if kinds[corner] & 1 else -1.0
             ey = 1.0 if kinds[corner] & 2 else -1.0
             low = high = -1
@@ -454,7 +457,7 @@ def views_of_squares(mesh, parts, layout, begin, corners):
                     part += 1
                 high = offset[part]
             if low < high:
-                views[n, 0], views[n, 1], views[n, 2] = corner, low, high
+                views[n, 0], views[n, 1], views[n, 2] = twice, low, high
                 n += 1
         kept[square + 1] = n
     return kept, views[:n].copy()

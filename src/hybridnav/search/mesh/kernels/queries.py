@@ -148,8 +148,8 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
     mesh
         See `successors`.
     graph
-        Arrays of a `CornerGraph`, a `CornerHierarchy` or `HubLabels`; for a search of intervals the block of
-        each slot, and the tree of `query`.
+        Arrays of a `CornerGraph`, a `CornerHierarchy` or `HubLabels`; for a search of intervals
+        the block of each slot, and the tree of `query`.
     place
         Component of polygons, and the polygon of each cell.
     asked

@@ -22,7 +22,7 @@ _WIDER = 1e-6
 @njit(cache=True, nogil=True)
 def line_before(value, side):
     """Return the number of the row or column of squares in which a coordinate lies."""
-    return int(math.floor((value - _SHIFT) / side)) + 1
+    return math.floor((value - _SHIFT) / side) + 1
 
 
 @njit(cache=True, nogil=True)
@@ -93,31 +93,34 @@ def _mark(target, polygon, x, y, rays):
     Parameters
     ----------
     target
-        Results of `squares_of_polygons`; side of the squares and number in a row; int32 stamps of
-        all squares; int64 the stamp, and the number of squares found, which goes on where there is
-        no room; int32 room for them.
+        Results of `squares_of_polygons`; side of the squares and number in a row; int32 (n, 2)
+        stamps of all squares, and how many polygons of each are seen as far as they lie in it;
+        int64 the stamp, and the number of squares found, which goes on where there is no room;
+        int32 room for them.
     polygon, x, y, rays
         The polygon, the corner, and points on the left and the right ray.
     """
     offset, squares, (side, n_across), stamps, state, found = target
     lx, ly, rx, ry = rays
     left_x, left_y, right_x, right_y = lx - x, ly - y, rx - x, ry - y
-    # What the best of a square's corners adds to the turn of its first one.
-    most = side * (max(-right_y, 0.0) + max(right_x, 0.0)) + _WIDER
-    least = side * (min(-left_y, 0.0) + min(left_x, 0.0)) - _WIDER
+    # What the best of a square's corners adds to the turn of its first one, and what the worst.
+    best_right = side * (max(-right_y, 0.0) + max(right_x, 0.0))
+    best_left = side * (min(-left_y, 0.0) + min(left_x, 0.0))
+    worst_right = side * (right_x - right_y) - best_right
+    worst_left = side * (left_x - left_y) - best_left
     for square in squares[offset[polygon] : offset[polygon + 1]]:
-        if stamps[square] == state[0]:
-            continue
         up, across = corner_of_square(square, side, n_across)
-        up, across = up - y, across - x
-        if right_x * up - right_y * across + most < 0.0:
+        right = right_x * (up - y) - right_y * (across - x)
+        left = left_x * (up - y) - left_y * (across - x)
+        if right + best_right < -_WIDER or left + best_left > _WIDER:
             continue
-        if left_x * up - left_y * across + least > 0.0:
-            continue
-        stamps[square] = state[0]
-        if state[1] < len(found):
-            found[state[1]] = square
-        state[1] += 1
+        if stamps[square, 0] != state[0]:
+            stamps[square, 0], stamps[square, 1] = state[0], 0
+            if state[1] < len(found):
+                found[state[1]] = square
+            state[1] += 1
+        # Coordinates are multiples of a quarter: these turns are exact.
+        stamps[square, 1] += right + worst_right >= 0.0 and left + worst_left <= 0.0
 
 
 @overload(has_target)
@@ -147,7 +150,8 @@ def squares_of_views(mesh, walls, squares, layout, found):
     layout
         Side of the squares, float; squares in a row, squares in all.
     found
-        int32, room for the squares.
+        int32, room for the squares: twice their numbers, plus 1 if the corner sees all free space
+        in the square.
 
     Returns
     -------
@@ -157,7 +161,10 @@ def squares_of_views(mesh, walls, squares, layout, found):
     cx, cy, kinds, first, _, _, twins, polygon_of = mesh
     side, n_across, n_squares = layout
     state = np.zeros(2, np.int64)
-    target = (*squares, (side, n_across), np.full(n_squares, -1, np.int32), state, found)
+    stamps, n_polygons = np.full((n_squares, 2), -1, np.int32), np.zeros(n_squares, np.int32)
+    for square in squares[1]:
+        n_polygons[square] += 1
+    target = (*squares, (side, n_across), stamps, state, found)
     room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
     offset = np.zeros(len(kinds) + 1, np.int64)
     for corner in range(len(kinds)):
@@ -177,21 +184,25 @@ def squares_of_views(mesh, walls, squares, layout, found):
                 n = 2 * len(room[2])
                 room = np.empty((n, 2), np.int32), np.empty((n, 4)), np.empty(n, np.int32)
         offset[corner + 1] = state[1]
+        for k in range(offset[corner], min(state[1], len(found))):
+            square = found[k]
+            found[k] = 2 * square + (stamps[square, 1] == n_polygons[square])
     return offset
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def corners_by_square(offset, found, n_squares):
-    """Return the corners of each square: int32 (n_squares + 1,) offsets, and int32 corners."""
+    """Return the corners of each square: int32 (n_squares + 1,) offsets, and int32 twice the number
+    of each corner, plus 1 if it sees all free space in the square."""
     begin = np.zeros(n_squares + 1, np.int32)
-    for square in found:
-        begin[square + 1] += 1
+    for twice in found:
+        begin[(twice >> 1) + 1] += 1
     for square in range(n_squares):
         begin[square + 1] += begin[square]
     at, corners = begin[:-1].copy(), np.empty(len(found), np.int32)
     for corner in range(len(offset) - 1):
-        for square in found[offset[corner] : offset[corner + 1]]:
-            corners[at[square]] = corner
-            at[square] += 1
+        for twice in found[offset[corner] : offset[corner + 1]]:
+            corners[at[twice >> 1]] = 2 * corner + (twice & 1)
+            at[twice >> 1] += 1
     return begin, corners
