@@ -10,7 +10,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from benchmarks.worlds import office_world
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
@@ -18,6 +17,28 @@ from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
+
+
+def rooms(rows: int, cols: int, seed: int = 3) -> Any:
+    """Classes of rooms with doors and pillars."""
+    rng = np.random.default_rng(seed)
+    classes = np.full((rows, cols), CellClass.FREE, dtype=np.uint8)
+    for row in range(19, rows, 20):
+        classes[row] = CellClass.OCCUPIED
+    for col in range(24, cols, 25):
+        classes[:, col] = CellClass.OCCUPIED
+    for row, col in rng.integers(0, (rows - 3, cols - 3), (rows * cols // 150, 2)):
+        classes[row : row + 2, col : col + 2] = CellClass.OCCUPIED
+    for row, col in rng.integers(0, (rows - 3, cols - 3), (rows * cols // 200, 2)):
+        classes[row : row + 4, col : col + 4] = CellClass.FREE
+    return classes
+
+
+def labels_of(planner: hn.HybridPlanner) -> Any:
+    """The hub labels of a planner."""
+    search = planner.prepared
+    assert isinstance(search, MeshSearch)
+    return search.labels
 
 
 def labelled(free: Any, most_mb: float = 20.0) -> MeshSearch:
@@ -67,13 +88,13 @@ def test_ends_at_the_corner_where_two_cells_meet_belong_to_their_cells() -> None
 def test_open_maps_and_maps_without_a_free_cell_are_labelled(shape: tuple[int, int]) -> None:
     search = labelled(np.ones(shape, dtype=bool))
     cells = (0, 0), (shape[0] - 1, shape[1] - 1)
-    positions = tuple((row + 0.5, col + 0.5) for row, col in cells)
+    positions = (0.5, 0.5), (shape[0] - 0.5, shape[1] - 0.5)
     assert search.path(cells, positions).length_cells == np.hypot(*np.subtract(*cells))
     assert labelled(np.zeros(shape, dtype=bool)).labels is not None
 
 
 def test_labels_keep_to_the_memory_that_is_allowed() -> None:
-    free = office_world(90, 140, seed=3).classes == CellClass.FREE
+    free = rooms(90, 140) == CellClass.FREE
     cells, positions = ends_in(free, 1, 200)
     wide = labelled(free)
     lengths = shortest_paths(MeshSearch(wide.mesh), cells, positions).length_cells
@@ -91,7 +112,7 @@ def test_labels_keep_to_the_memory_that_is_allowed() -> None:
 
 
 def test_a_budget_or_a_path_that_is_known_changes_nothing() -> None:
-    free = office_world(60, 80, seed=3).classes == CellClass.FREE
+    free = rooms(60, 80) == CellClass.FREE
     search = labelled(free)
     (starts, goals), points = ends_in(free, 2, 1)
     asked = (tuple(starts[0]), tuple(goals[0])), (tuple(points[0][0]), tuple(points[1][0]))
@@ -108,12 +129,12 @@ def planner_of(grid: hn.OccupancyGrid, preset: str = "shortest") -> hn.HybridPla
 
 @pytest.mark.parametrize("compress", [False, True])
 def test_models_hold_labels(tmp_path: Path, *, compress: bool) -> None:
-    grid = occupancy_grid(office_world(60, 80, seed=3).classes)
+    grid = occupancy_grid(rooms(60, 80))
     planner = planner_of(grid)
     planner.prepare(labels=5)
     hn.save(planner, tmp_path / "office.hnm", compress=compress)
     loaded = hn.load(tmp_path / "office.hnm").planner()
-    ours, theirs = planner.prepared.labels, loaded.prepared.labels
+    ours, theirs = labels_of(planner), labels_of(loaded)
     for mine, other in zip(ours.arrays, theirs.arrays, strict=True):
         assert mine.dtype == other.dtype
         np.testing.assert_array_equal(mine, other)
@@ -145,9 +166,9 @@ def test_models_hold_labels(tmp_path: Path, *, compress: bool) -> None:
 def test_labels_that_lead_out_of_their_arrays_are_refused(
     tmp_path: Path, name: str, at: Any, value: float
 ) -> None:
-    planner = planner_of(occupancy_grid(office_world(60, 80, seed=3).classes))
+    planner = planner_of(occupancy_grid(rooms(60, 80)))
     planner.prepare(labels=5)
-    array = getattr(planner.prepared.labels, name)
+    array = getattr(labels_of(planner), name)
     array.flags.writeable = True
     array[at] = value
     hn.save(planner, tmp_path / "office.hnm")
@@ -156,7 +177,7 @@ def test_labels_that_lead_out_of_their_arrays_are_refused(
 
 
 def test_a_change_of_the_map_drops_labels_and_they_can_be_built_again() -> None:
-    grid = occupancy_grid(office_world(60, 80, seed=3).classes)
+    grid = occupancy_grid(rooms(60, 80))
     planner = planner_of(grid)
     planner.prepare(labels=5)
     rng = np.random.default_rng(4)
@@ -166,9 +187,9 @@ def test_a_change_of_the_map_drops_labels_and_they_can_be_built_again() -> None:
         classes[row : row + 6, col : col + 6] = rng.integers(1, 3, (6, 6))
         changed = occupancy_grid(classes)
         planner.update(grid=changed)
-        assert planner.prepared is None or planner.prepared.labels is None
+        assert planner.prepared is None
         planner.prepare(labels=5)
-        assert planner.prepared.labels is not None
+        assert labels_of(planner) is not None
         free = classes == CellClass.FREE
         cells, points = ends_in(free, 5, 60)
         lengths = shortest_paths(MeshSearch(build_mesh(free)), cells, points).length_cells
@@ -186,9 +207,9 @@ def test_other_budgets_are_refused(labels: Any) -> None:
 
 
 def test_too_little_memory_and_presets_without_labels_are_named() -> None:
-    planner = planner_of(occupancy_grid(office_world(60, 80, seed=3).classes))
+    planner = planner_of(occupancy_grid(rooms(60, 80)))
     with pytest.raises(InvalidValueError, match=r"need more than 0\.001 MB"):
         planner.prepare(labels=0.001)
-    assert planner.prepared.labels is None
+    assert labels_of(planner) is None
     with pytest.raises(InvalidValueError, match="no hub labels"):
         planner_of(hn.example_map("figure1"), "octile").prepare(labels=5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -159,17 +158,8 @@ def _labels_of(filed: FiledPart, known: dict[str, int], n_corners: int) -> HubLa
     """Read hub labels; refuse what would lead a query out of their arrays."""
     _check_same(filed, "corners", n_corners)
     labels = meshes.HubLabels(**HUB_LABELS.read(filed, known))
-    side, n_across, bits, unit = labels.layout.tolist()
-    is_whole = side >= 1 and side == int(side) and bits in range(1, meshes.MOST_BITS + 1)
-    if not is_whole or not 0 < unit < math.inf:
-        raise refusal(filed, f"a layout of {labels.layout}")
-    rows, cols = (known[name] // int(side) + 2 for name in ("rows", "cols"))
-    if n_across != cols or len(labels.begin) != rows * cols + 1:
-        raise refusal(filed, f"{len(labels.begin) - 1} squares of {side:.0f} cells")
-    twice, low, high = labels.views.T
-    is_inside = (twice >> 1 < n_corners) & (low <= high) & (high <= len(labels.entries))
-    if not is_inside.all() or (labels.entries >> int(bits) >= n_corners).any():
-        raise refusal(filed, "views or entries name what does not exist")
+    if fault := labels.fault((known["rows"], known["cols"]), n_corners):
+        raise refusal(filed, fault)
     return labels
 
 

@@ -10,7 +10,7 @@ from .cut import (
     renew_mesh as renew_mesh,
     shortest_paths as shortest_paths,
 )
-from .hubs import MOST_BITS as MOST_BITS, HubLabels as HubLabels
+from .hubs import HubLabels as HubLabels
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
 from .trace import SearchTrace as SearchTrace, trace_search as trace_search
 

@@ -9,7 +9,12 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav.search.mesh.kernels.hubs import labels_of_corners, uses_of_corners, views_of_squares
+from hybridnav.search.mesh.kernels.hubs import (
+    ABOVE,
+    labels_of_corners,
+    uses_of_corners,
+    views_of_squares,
+)
 from hybridnav.search.mesh.kernels.squares import (
     corners_by_square,
     squares_of_polygons,
@@ -23,14 +28,16 @@ if TYPE_CHECKING:
 
     Edges = tuple[LongArray, IntArray]
 
-_SIDES = (8, 16, 32, 64)
+_SIDES = (4, 8, 16, 32, 64)
 """Sides of squares in cells, of which the first that the memory allows is taken."""
 _SOURCES = 100
 """Corners from which paths are counted to rank all: four times as many leave 5 % fewer entries."""
 _BYTES, _BYTES_OF_VIEW = 8, 12
 """Bytes of an entry of a label, and of a corner of a square."""
 
-MOST_BITS = 46
+_MOST_SEEN = 1 << ABOVE
+"""Most corners of a square."""
+_MOST_BITS = 46
 """Most bits of a distance, so that the number of a corner has room below the sum of two."""
 
 
@@ -41,6 +48,16 @@ class HubLabels:
 
     A shortest path leads from its start to a corner that it sees, from there to a hub, and on to a
     corner that its goal sees. Both corners have the hub in their labels.
+
+    Examples
+    --------
+    >>> from hybridnav.search.mesh import MeshSearch, build_mesh
+    >>> search = MeshSearch(build_mesh(np.array([[True, False, True], [True, True, True]])))
+    >>> search.label(1.0)
+    True
+    >>> len(search.labels.entries), round(search.path(((0, 0), (0, 2)),
+    ...     ((0.5, 0.5), (0.5, 2.5))).length_cells, 3)
+    (5, 2.414)
     """
 
     entries: LongArray
@@ -74,6 +91,24 @@ class HubLabels:
     def n_bytes(self) -> int:
         """Bytes of memory."""
         return sum(array.nbytes for array in self.arrays)
+
+    def fault(self, shape: tuple[int, int], n_corners: int) -> str:
+        """Return what would lead a query out of the arrays, on a map of a shape with so many
+        corners; empty for nothing."""
+        side, n_across, bits, unit = self.layout.tolist()
+        is_whole = side >= 1 and side == int(side) and bits in range(1, _MOST_BITS + 1)
+        if not is_whole or not 0 < unit < np.inf:
+            return f"a layout of {self.layout}"
+        rows, cols = (size // int(side) + 2 for size in shape)
+        if n_across != cols or len(self.begin) != rows * cols + 1:
+            return f"{len(self.begin) - 1} squares of {side:.0f} cells"
+        if np.diff(self.begin).max(initial=0) > _MOST_SEEN:
+            return "more corners of a square than have a number"
+        twice, low, high = self.views.T
+        is_inside = (twice >> 1 < n_corners) & (low <= high) & (high <= len(self.entries))
+        if not is_inside.all() or (self.entries >> int(bits) >= n_corners).any():
+            return "views or entries name what does not exist"
+        return ""
 
 
 def label_corners(
@@ -160,7 +195,7 @@ def _parted(
     begins[1:] = (place[1:] != place[:-1]) | (heads[1:] != heads[:-1])
     begin = np.flatnonzero(begins)
     first = np.searchsorted(place[begin], np.arange(2 * n + 1)).astype(np.int32)
-    bits = min(MOST_BITS, 62 - len(ranked).bit_length())
+    bits = min(_MOST_BITS, 62 - len(ranked).bit_length())
     longest = int(lengths.max(initial=float(sum(mesh.polygon_at.shape))))
     unit = 2.0 ** (longest.bit_length() - bits)
     units = np.concatenate([np.zeros(len(own)), np.round(lengths / unit)]).astype(np.int64)
@@ -192,6 +227,6 @@ def _squares(
             found = np.empty(offset[-1], np.int32)
             offset = squares_of_views(arrays, walls, squares, layout, found)
         listed = corners_by_square(offset, found[: offset[-1]], n_squares)
-        views = views_of_squares(arrays, parts, (float(side), n_across), *listed)
-        return (side, n_across), *views
+        begin, seen = views_of_squares(arrays, parts, (float(side), n_across), *listed)
+        return None if np.diff(begin).max() > _MOST_SEEN else ((side, n_across), begin, seen)
     return None
