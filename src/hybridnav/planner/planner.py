@@ -334,20 +334,14 @@ class HybridPlanner(Questions):
             return self._now.plan_many((first, last), smooth, blocked)
 
     def prepare(self, *, labels: float | None = None, progress: Progress = no_progress) -> None:
-        """Build the structures for queries now: mesh and graph of corners, jump-point graph,
-        or lattice.
-
-        Structures that exist already are kept; what `update` has made stale is renewed. Threads may
-        call this, and plan meanwhile: each structure is built once.
+        """Build what queries need, each once, and renew what is stale; threads may plan meanwhile.
 
         Parameters
         ----------
         labels
-            Most MB of hub labels, by which `shortest` needs no search; None for none. `update` of
-            the map drops them.
+            Most MB of hub labels for `shortest`, which a change of the map drops; None for none.
         progress
-            Called after each step with the number of steps done and of all steps, as for a progress
-            bar.
+            Called after each step with the number of steps done and of all steps.
 
         Raises
         ------

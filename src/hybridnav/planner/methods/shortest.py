@@ -224,15 +224,21 @@ class OverMesh(Method):
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def labels(self) -> LabelSource | None:
-        """Return labels in the hierarchy of corners, or on the graph that is not contracted; see
-        `Method`."""
+        """Return labels in the hierarchy of corners; where it is not contracted by hubs, or on the
+        graph; see `Method`."""
         # Loads kernels for tables alone.
-        from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
+        from hybridnav.search.mesh.labels import (  # noqa: PLC0415
+            HubTables,
+            MeshLabels,
+            ViewLabels,
+        )
 
         search = self._on_mesh()
         search.prepare()
         if isinstance(search.graph, CornerHierarchy):
             return MeshLabels(search, search.graph)
+        if search.labels is not None:
+            return HubTables(search, search.labels)
         return None if search.edges is None else ViewLabels(search, search.edges)
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:

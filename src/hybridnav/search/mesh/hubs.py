@@ -13,12 +13,12 @@ from hybridnav.search.mesh.kernels.hubs import (
     ABOVE,
     labels_of_corners,
     uses_of_corners,
-    views_of_squares,
 )
 from hybridnav.search.mesh.kernels.squares import (
     corners_by_square,
     squares_of_polygons,
     squares_of_views,
+    views_of_squares,
 )
 
 if TYPE_CHECKING:

@@ -26,14 +26,11 @@ from hybridnav.search.mesh.kernels.polyanya import (
     push,
     put_corner,
 )
-from hybridnav.search.mesh.kernels.squares import corner_of_square, line_before
+from hybridnav.search.mesh.kernels.squares import line_before
 from hybridnav.search.mesh.kernels.views import distance, lobe_of
 
 _SAME = 1e-12
 """Difference of two distances that counts as none, in cells: rounding alone causes it."""
-_STRAIGHT = 2e-5
-"""Sine of a turn that counts as none. A path that turns by more to the slack side is longer than a
-shortest one by a hundred times `_SAME`, so that no hub is missed."""
 
 
 @njit(cache=True, nogil=True)
@@ -223,7 +220,7 @@ def _see_each_other(polygon_at, cells, endpoints):
 
 
 @njit(cache=True, nogil=True)
-def _view(mesh, labels, x, y, sights, costs):
+def view_of_square(mesh, labels, x, y, sights, costs):
     """Write the distances of the corners of a point's square, in units; return the first view and
     the one after the last, or -1 without room."""
     cx, cy = mesh[0], mesh[1]
@@ -240,7 +237,7 @@ def _view(mesh, labels, x, y, sights, costs):
 
 
 @njit(cache=True, nogil=True)
-def _is_hidden(mesh, polygon_at, cell, point, corner, sights, k):
+def is_hidden(mesh, polygon_at, cell, point, corner, sights, k):
     """Return whether a point does not see a corner, which is looked up once in `sights[k]`."""
     if sights[k] == 0:
         is_seen = _sees(polygon_at, cell, point[0], point[1], mesh[0][corner], mesh[1][corner])
@@ -285,8 +282,8 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     bounds[:] = math.hypot(tx - sx, ty - sy)
     if _see_each_other(polygon_at, cells, endpoints):
         return DONE, _path_through(mesh, endpoints, none, none)
-    low, high = _view(mesh, labels, sx, sy, sights[0], costs[0])
-    to_low, to_high = _view(mesh, labels, tx, ty, sights[1], costs[1])
+    low, high = view_of_square(mesh, labels, sx, sy, sights[0], costs[0])
+    to_low, to_high = view_of_square(mesh, labels, tx, ty, sights[1], costs[1])
     if high < 0 or to_high < 0:
         return WORK_FULL, np.empty((0, 2))
 
@@ -318,7 +315,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
         if totals[m] >= best:
             break
         totals[m] = FAR
-        if _is_hidden(
+        if is_hidden(
             mesh, polygon_at, cells[2:], (tx, ty), views[to_low + m, 0] >> 1, sights[1], m
         ):
             continue
@@ -327,7 +324,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
             while reached + (least[hub] >> ABOVE) < best:
                 k = least[hub] & ((1 << ABOVE) - 1)
                 corner = views[low + k, 0] >> 1
-                if _is_hidden(mesh, polygon_at, cells[:2], (sx, sy), corner, sights[0], k):
+                if is_hidden(mesh, polygon_at, cells[:2], (sx, sy), corner, sights[0], k):
                     least[hub] = _next_best(labels, low, high, hub, sights[0], costs[0])
                 else:
                     best, best_hub = reached + (least[hub] >> ABOVE), hub
@@ -402,62 +399,3 @@ def _path_through(mesh, endpoints, there, back):
         n = put_corner(path, n, cx[corner], cy[corner])
     n = put_corner(path, n, sx, sy)
     return path[n:].copy()
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def views_of_squares(mesh, parts, layout, begin, corners):
-    """Return the corners of squares with the entries of their labels that a path may go on to.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    parts
-        Offsets of the parts of labels by corner and lobe, and of the entries of each part; float32
-        (p, 2) the direction to the next corner, along the wall and away from it.
-    layout
-        Side of the squares in cells, number in a row.
-    begin, corners
-        Results of `corners_by_square`.
-
-    Returns
-    -------
-    tuple
-        int32 (squares + 1,) offsets; int32 (v, 3) see `HubLabels`.
-    """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, offset, turns = parts
-    side, n_across = layout
-    views, n = np.empty((len(corners), 3), np.int32), 0
-    kept = np.zeros(len(begin), np.int32)
-    for square in range(len(begin) - 1):
-        y, x = corner_of_square(square, side, n_across)
-        for twice in corners[begin[square] : begin[square + 1]]:
-            corner = twice >> 1
-            ex = 1.0 if kinds[corner] & 1 else -1.0
-            ey = 1.0 if kinds[corner] & 2 else -1.0
-            low = high = -1
-            for lobe in range(2):
-                # The square as seen from the corner, in axes that point to where a path comes from.
-                sign = 1.0 if lobe == 0 else -1.0
-                u, w = (cx[corner] - x) * ex * sign, (y - cy[corner]) * ey * sign
-                u_low, u_high = (u - side, u) if ex * sign > 0.0 else (u, u + side)
-                w_low, w_high = (w, w + side) if ey * sign > 0.0 else (w - side, w)
-                if u_high < 0.0 or w_high < 0.0:
-                    continue
-                if lobe == 1:
-                    u_low, u_high, w_low, w_high = w_low, w_high, u_low, u_high
-                near, far = max(u_low, 0.0), w_high
-                slack = _STRAIGHT * (1.0 + u_high + w_high)
-                part, last = first[2 * corner + lobe], first[2 * corner + lobe + 1]
-                if low < 0:
-                    low = offset[part]
-                while part < last and turns[part, 1] * near - turns[part, 0] * far <= slack:
-                    part += 1
-                high = offset[part]
-            if low < high:
-                views[n, 0], views[n, 1], views[n, 2] = twice, low, high
-                n += 1
-        kept[square + 1] = n
-    return kept, views[:n].copy()

@@ -17,6 +17,9 @@ _SHIFT = 0.25
 none of them."""
 _WIDER = 1e-6
 """Widening of views, against rounding."""
+_STRAIGHT = 2e-5
+"""Sine of a turn that counts as none. A path that turns by more to the slack side is longer than a
+shortest one by a hundred times the rounding of labels, so that no hub is missed."""
 
 
 @njit(cache=True, nogil=True)
@@ -206,3 +209,62 @@ def corners_by_square(offset, found, n_squares):
             corners[at[twice >> 1]] = 2 * corner + (twice & 1)
             at[twice >> 1] += 1
     return begin, corners
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def views_of_squares(mesh, parts, layout, begin, corners):
+    """Return the corners of squares with the entries of their labels that a path may go on to.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    parts
+        Offsets of the parts of labels by corner and lobe, and of the entries of each part; float32
+        (p, 2) the direction to the next corner, along the wall and away from it.
+    layout
+        Side of the squares in cells, number in a row.
+    begin, corners
+        Results of `corners_by_square`.
+
+    Returns
+    -------
+    tuple
+        int32 (squares + 1,) offsets; int32 (v, 3) see `HubLabels`.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    first, offset, turns = parts
+    side, n_across = layout
+    views, n = np.empty((len(corners), 3), np.int32), 0
+    kept = np.zeros(len(begin), np.int32)
+    for square in range(len(begin) - 1):
+        y, x = corner_of_square(square, side, n_across)
+        for twice in corners[begin[square] : begin[square + 1]]:
+            corner = twice >> 1
+            ex = 1.0 if kinds[corner] & 1 else -1.0
+            ey = 1.0 if kinds[corner] & 2 else -1.0
+            low = high = -1
+            for lobe in range(2):
+                # The square as seen from the corner, in axes that point to where a path comes from.
+                sign = 1.0 if lobe == 0 else -1.0
+                u, w = (cx[corner] - x) * ex * sign, (y - cy[corner]) * ey * sign
+                u_low, u_high = (u - side, u) if ex * sign > 0.0 else (u, u + side)
+                w_low, w_high = (w, w + side) if ey * sign > 0.0 else (w - side, w)
+                if u_high < 0.0 or w_high < 0.0:
+                    continue
+                if lobe == 1:
+                    u_low, u_high, w_low, w_high = w_low, w_high, u_low, u_high
+                near, far = max(u_low, 0.0), w_high
+                slack = _STRAIGHT * (1.0 + u_high + w_high)
+                part, last = first[2 * corner + lobe], first[2 * corner + lobe + 1]
+                if low < 0:
+                    low = offset[part]
+                while part < last and turns[part, 1] * near - turns[part, 0] * far <= slack:
+                    part += 1
+                high = offset[part]
+            if low < high:
+                views[n, 0], views[n, 1], views[n, 2] = twice, low, high
+                n += 1
+        kept[square + 1] = n
+    return kept, views[:n].copy()
