@@ -238,7 +238,21 @@ def view_of_square(mesh, labels, x, y, sights, costs):
 
 @njit(cache=True, nogil=True)
 def is_hidden(mesh, polygon_at, cell, point, corner, sights, k):
-    """Return whether a point does not see a corner, which is looked up once in `sights[k]`."""
+    """Return whether a point does not see a corner, which is found out once.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    polygon_at
+        int32 (rows, cols), -1 for cells that are not free.
+    cell, point
+        The cell of the point, and its x and y.
+    corner
+        The corner.
+    sights, k
+        Where the answer is kept: 1 for seen, -1 for hidden, 0 before that.
+    """
     if sights[k] == 0:
         is_seen = _sees(polygon_at, cell, point[0], point[1], mesh[0][corner], mesh[1][corner])
         sights[k] = 1 if is_seen else -1
