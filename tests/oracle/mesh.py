@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hybridnav.search.mesh import ConvexMesh, MeshSearch
 from hybridnav.search.mesh.build import find_edges
 
-KINDS = "intervals", "landmarks", "hierarchy"
+KINDS = "intervals", "landmarks", "hierarchy", "labels"
 """What a search of a mesh may search."""
 
 
@@ -23,6 +23,8 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
             "hybridnav.search.mesh.build._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
         )
         search.prepare()
+    if kind == "labels":
+        assert search.label(10.0)
     return search
 
 

@@ -21,7 +21,7 @@ from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
 from hybridnav.planner.preset import check_radius
-from hybridnav.planner.questions import Questions, explained
+from hybridnav.planner.questions import Questions, explained, prepare
 from hybridnav.planner.settings import OmplPlannerSettings
 
 if TYPE_CHECKING:
@@ -333,20 +333,22 @@ class HybridPlanner(Questions):
         with self._query():
             return self._now.plan_many((first, last), smooth, blocked)
 
-    def prepare(self, *, progress: Progress = no_progress) -> None:
-        """Build the structures for queries now: mesh and graph of corners, jump-point graph,
-        or lattice.
-
-        Structures that exist already are kept; what `update` has made stale is renewed. Threads may
-        call this, and plan meanwhile: each structure is built once.
+    def prepare(self, *, labels: float | None = None, progress: Progress = no_progress) -> None:
+        """Build what queries need, each once, and renew what is stale; threads may plan meanwhile.
 
         Parameters
         ----------
+        labels
+            Most MB of hub labels for `shortest`, which a change of the map drops; None for none.
         progress
-            Called after each step with the number of steps done and of all steps, as for a progress
-            bar.
+            Called after each step with the number of steps done and of all steps.
+
+        Raises
+        ------
+        InvalidValueError
+            When the labels need more memory, or the preset has none; all else is prepared.
         """
-        self._preparing.alone(lambda: self._now.method.prepare(progress))
+        self._preparing.alone(lambda: prepare(self._now.method, labels, progress))
 
     def update(
         self,

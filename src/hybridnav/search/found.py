@@ -242,6 +242,10 @@ class Method(Protocol):
         each pair."""
         return None
 
+    def label(self, most_mb: float, progress: Progress) -> bool | None:  # noqa: ARG002
+        """Build hub labels in so much memory; False if they need more, None without any."""
+        return None
+
     @property
     def prepared(self) -> Prepared | None:
         """The structure for queries that is worth keeping; None until it is built, and without."""

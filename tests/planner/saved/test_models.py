@@ -16,7 +16,13 @@ import hybridnav as hn
 from benchmarks.worlds import figure1_world
 from hybridnav.planner.saved import structures
 from hybridnav.pyramid.record import Record
-from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+from hybridnav.search.mesh import (
+    ConvexMesh,
+    CornerGraph,
+    CornerHierarchy,
+    HubLabels,
+    MeshSearch,
+)
 from hybridnav.search.octile.jumps import JumpGraph
 from tests.product.test_copies import assert_alike, kernels
 from tests.strategies import Scene, examples, scenes
@@ -291,6 +297,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.MESH, ConvexMesh, ()),
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
+        (structures.HUB_LABELS, HubLabels, ()),
         (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses")),
     ],

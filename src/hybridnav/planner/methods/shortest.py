@@ -121,6 +121,13 @@ class OverMesh(Method):
             search.prepare(lambda done, total: progress(done + 1, total + 1))
         return search
 
+    def label(self, most_mb: float, progress: Progress) -> bool:
+        """Build hub labels of the corners of the mesh; see `Method`."""
+        if self._is_renewed:  # a patched mesh does not know which cells are free
+            with self._building:
+                self._search, self._is_renewed = MeshSearch(build_mesh(self._free)), False
+        return self._on_mesh().label(most_mb, progress)
+
     def _on_mesh(self) -> MeshSearch:
         """Return the search of the mesh, which is built once."""
         if self._search is None:
@@ -166,8 +173,8 @@ class OverMesh(Method):
         if query.closed is not None or self._search is None or self._budget_s is not None:
             return self.find(query).cost_m
         positions = query.positions or self._positions(query)
-        found = self._search.path(query.cells, positions, epsilon=self._epsilon)
-        return found.length_cells * self._placing[0]
+        length = self._search.length(query.cells, positions, epsilon=self._epsilon)
+        return length * self._placing[0]
 
     def _positions(self, query: Query) -> tuple[Position, Position]:
         """Return the points of a query as (row, col) in grid units."""
@@ -227,10 +234,14 @@ class OverMesh(Method):
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
-        """Return labels in the hierarchy of corners, or on the graph that is not contracted; with
-        closed cells of a mesh without them. See `Method`."""
+        """Return labels in the hierarchy of corners; where it is not contracted by hubs, or on the
+        graph; with closed cells of a mesh without them. See `Method`."""
         # Loads kernels for tables alone.
-        from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
+        from hybridnav.search.mesh.labels import (  # noqa: PLC0415
+            HubTables,
+            MeshLabels,
+            ViewLabels,
+        )
 
         search = self._on_mesh()
         if closed is not None:
@@ -239,6 +250,8 @@ class OverMesh(Method):
         search.prepare()
         if isinstance(search.graph, CornerHierarchy):
             return MeshLabels(search, search.graph)
+        if search.labels is not None:
+            return HubTables(search, search.labels)
         return None if search.edges is None else ViewLabels(search, search.edges)
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:

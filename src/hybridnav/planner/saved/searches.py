@@ -12,6 +12,7 @@ from hybridnav.planner.saved.structures import (
     CORNER_EDGES,
     CORNER_GRAPH,
     CORNER_HIERARCHY,
+    HUB_LABELS,
     JUMP_GRAPH,
     MESH,
     refusal,
@@ -26,7 +27,13 @@ if TYPE_CHECKING:
     from hybridnav.planner import PlannerSettings
     from hybridnav.planner.saved.container import FiledPart, Part
     from hybridnav.search.found import Prepared
-    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+    from hybridnav.search.mesh import (
+        ConvexMesh,
+        CornerGraph,
+        CornerHierarchy,
+        HubLabels,
+        MeshSearch,
+    )
     from hybridnav.search.octile import JumpSearch
 
 
@@ -111,6 +118,16 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
     parts = [MESH.part(mesh, sizes, values)]
     if search.edges is None or graph is None:
         return parts
+    labels = search.labels
+    if labels is not None:
+        of_labels = {
+            "corners": len(mesh.corners),
+            "parts": len(labels.heads),
+            "entries": len(labels.entries),
+            "squares": len(labels.begin) - 1,
+            "views": len(labels.views),
+        }
+        parts.append(HUB_LABELS.part(labels, of_labels, key))
     sizes = {"corners": len(mesh.corners), "edges": len(search.edges[1])}
     if isinstance(graph, meshes.CornerGraph):
         sizes["landmarks"] = graph.landmark_distances.shape[1]
@@ -132,7 +149,18 @@ def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch
     search.expanded = values.expanded
     if values.is_prepared:
         search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
+    if HUB_LABELS.kind in fitting:
+        search.labels = _labels_of(fitting[HUB_LABELS.kind], known, len(mesh.corners))
     return search
+
+
+def _labels_of(filed: FiledPart, known: dict[str, int], n_corners: int) -> HubLabels:
+    """Read hub labels; refuse what would lead a query out of their arrays."""
+    _check_same(filed, "corners", n_corners)
+    labels = meshes.HubLabels(**HUB_LABELS.read(filed, known))
+    if fault := labels.fault((known["rows"], known["cols"]), n_corners):
+        raise refusal(filed, fault)
+    return labels
 
 
 def _check_mesh(filed: FiledPart, mesh: ConvexMesh) -> None:

@@ -269,6 +269,27 @@ CORNER_HIERARCHY = Structure(
     {"corners": "4*cells", "arcs": "2000*corners"},
 )
 
+HUB_LABELS = Structure(
+    "hub labels",
+    1,
+    (
+        ArraySpec("entries", "int64", ("entries",), least=0),
+        ArraySpec("layout", "float64", (4,), least=0),
+        ArraySpec("begin", "int32", ("squares+1",), below="views", is_offsets=True),
+        ArraySpec("views", "int32", ("views", 3), least=0),
+        ArraySpec("first", "int32", ("2*corners+1",), below="parts", is_offsets=True),
+        ArraySpec("offset", "int32", ("parts+1",), below="entries", is_offsets=True),
+        ArraySpec("heads", "int32", ("parts",), least=0, below="corners"),
+    ),
+    {
+        "corners": "4*cells",
+        "parts": "400*corners",
+        "entries": "10000*corners",
+        "squares": "cells+100",
+        "views": "4096*squares",
+    },
+)
+
 JUMP_GRAPH = Structure(
     "jump graph",
     2,
@@ -316,6 +337,7 @@ KINDS = frozenset(
         CORNER_GRAPH,
         CORNER_EDGES,
         CORNER_HIERARCHY,
+        HUB_LABELS,
         JUMP_GRAPH,
     )
 )

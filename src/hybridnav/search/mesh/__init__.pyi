@@ -10,7 +10,8 @@ from .cut import (
     renew_mesh as renew_mesh,
     shortest_paths as shortest_paths,
 )
+from .hubs import HubLabels as HubLabels
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
-from .search import SearchTrace as SearchTrace, trace_search as trace_search
+from .trace import SearchTrace as SearchTrace, trace_search as trace_search
 
 __all__: list[str]

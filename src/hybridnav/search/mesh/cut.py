@@ -120,11 +120,11 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    graph = search.graph
+    graph, works = search.engine()
     place, asked = search.place, (where, endpoints)
     arrays: Any = search.blocks if graph is None else graph.arrays
     at = n = 0
-    with (search.works if graph is None else search.corner_works).lent() as work:
+    with works.lent() as work:
         while at < count:
             rest = place, asked, work.arrays, work.bounds, effort
             found = (length, bound, starts, positions), at, n

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.moves import FAR
 from hybridnav.search.distance_table import BLOCK, ROOM, by_number, climbing_room
+from hybridnav.search.mesh.kernels import hubs
 from hybridnav.search.mesh.kernels.ends import (
     costs_to_corners,
+    hub_labels_of_points,
     labels_of_points,
     polygons_of_points,
     straight_costs,
@@ -21,7 +23,7 @@ from hybridnav.search.mesh.search import rounded_into
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.search.distance_table import Ends, Labels
-    from hybridnav.search.mesh import CornerHierarchy, MeshSearch
+    from hybridnav.search.mesh import CornerHierarchy, HubLabels, MeshSearch
 
     Placed = tuple[FloatArray, LongArray, IntArray]
     """float64 (n, 2) points, (row, col), and their polygons: offsets, int32."""
@@ -111,6 +113,42 @@ class ViewLabels(MeshLabels):
         """Return the corners that each goal sees."""
         found: Labels = views_of_points(self._mesh, ends, _view_room())
         return found
+
+
+class HubTables(MeshLabels):
+    """The same by hub labels, where there is no hierarchy.
+
+    Parameters
+    ----------
+    search
+        A search with labels.
+    labels
+        Its labels.
+    """
+
+    def __init__(self, search: MeshSearch, labels: HubLabels) -> None:
+        mesh = search.mesh
+        self._mesh, self._place = search.arrays, (mesh.component, mesh.polygon_at)
+        self._labels = labels.arrays
+        self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
+
+    def placed(self, ends: Ends) -> Any:
+        """Return points with the polygons that contain them, and their cells."""
+        return *super().placed(ends), ends[0]
+
+    def labels(self, ends: Any) -> Labels:
+        """Return the labels of ends."""
+        room = np.empty(ROOM, np.int8), np.empty(ROOM, np.int64), np.full(self.n_corners, hubs.FAR)
+        found: Labels = hub_labels_of_points(
+            self._mesh, self._labels, self._place[1], (ends[3], ends[0]), room
+        )
+        return found
+
+    goal_labels = labels
+
+    def direct(self, starts: Any, goals: Any, table: LongArray) -> None:
+        """Set the entries of ends that see each other."""
+        super().direct(starts[:3], goals[:3], table)
 
 
 def _view_room() -> tuple[IntArray, FloatArray, IntArray]:

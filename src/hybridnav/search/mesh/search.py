@@ -17,9 +17,8 @@ from hybridnav._base.moves import FAR
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.build import CornerHierarchy, add_landmarks, contract_corners, find_edges
-from hybridnav.search.mesh.kernels import polyanya
-from hybridnav.search.mesh.kernels.intervals import G
-from hybridnav.search.mesh.kernels.polyanya import N
+from hybridnav.search.mesh.hubs import HubLabels, label_corners
+from hybridnav.search.mesh.kernels import hubs, polyanya
 from hybridnav.search.mesh.kernels.queries import answer
 
 if TYPE_CHECKING:
@@ -39,6 +38,8 @@ SLICE = 256
 """Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
+_ALONE = math.inf, 0.0, 0.0
+"""Effort of a query by hub labels for the length alone: no time for the path."""
 SURE = 1.0 - 1e-12
 """Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
 _WORTH = 20_000
@@ -138,6 +139,27 @@ class _HierarchyWork(_Work):
         return *self.endpoints, self.views, self.records, self.touched, *tail
 
 
+class _HubWork(_Work):
+    """Work arrays of a query of hub labels."""
+
+    def __init__(self, mesh: ConvexMesh) -> None:
+        super().__init__(mesh)
+        n = len(mesh.corners)
+        self.sights, self.costs = np.empty((2, _ROOM), np.int8), np.empty((2, _ROOM), np.int64)
+        self.totals = np.empty(_ROOM, np.int64)
+        self.hubs = np.full(n, hubs.FAR), np.empty(n, np.int32)
+
+    def make_room(self) -> None:
+        self.sights = np.concatenate([self.sights, self.sights], axis=1)
+        self.costs = np.concatenate([self.costs, self.costs], axis=1)
+        self.totals = np.empty(self.costs.shape[1], np.int64)
+
+    @property
+    def arrays(self) -> tuple[object, ...]:
+        """The arrays in the order of `query_hubs`."""
+        return self.sights, self.costs, self.totals, *self.hubs, self.counts, self.bounds
+
+
 @copies_alike
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
@@ -177,6 +199,9 @@ class MeshSearch:
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
+        self.labels: HubLabels | None = None
+        """Hub labels of the corners, which answer all queries; None unless they were asked for."""
+        self._hub_works: Pool[Any] = Pool(partial(_HubWork, mesh))
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock = threading.Lock()
@@ -228,6 +253,34 @@ class MeshSearch:
         self.edges, self._graph = edges, graph
         self.is_prepared = True
 
+    def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
+        """Build hub labels of the corners, which answer later queries in microseconds.
+
+        Parameters
+        ----------
+        most_mb
+            Most memory of the labels, in 10^6 bytes.
+        progress
+            See `prepare`.
+
+        Returns
+        -------
+        bool
+            False if they need more memory: queries are then answered as before.
+        """
+        self.prepare()
+        if self.edges is not None:
+            made = label_corners(self.mesh, self.arrays, self.edges, most_mb, progress)
+            self.labels = made
+        return self.labels is not None
+
+    def engine(self) -> tuple[CornerGraph | CornerHierarchy | HubLabels | None, Pool[Any]]:
+        """Return what answers queries, None for the mesh itself, and its work arrays."""
+        if self.labels is not None:
+            return self.labels, self._hub_works
+        graph = self._graph
+        return graph, self.works if graph is None else self.corner_works
+
     def path(
         self,
         cells: tuple[Cell, Cell],
@@ -270,8 +323,7 @@ class MeshSearch:
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        graph = self._graph
-        works = self.works if graph is None else self.corner_works
+        graph, works = self.engine()
         work = works.take()
         _, path, length, bound, expanded = self._run(graph, ends, work, (upper, epsilon, until))
         works.give(work)
@@ -280,16 +332,29 @@ class MeshSearch:
         bound = length if bound >= length else bound * SURE
         return MeshPath(path if len(path) else known, length, bound, expanded)
 
+    def length(
+        self, cells: tuple[Cell, Cell], positions: tuple[Position, Position], *, epsilon: float
+    ) -> float:
+        """Return the length in cells of the path that `path` finds, infinite for none."""
+        if self.labels is None:
+            return self.path(cells, positions, epsilon=epsilon).length_cells
+        (row, col), (to_row, to_col) = positions
+        ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
+        work = self._hub_works.take()
+        length = self._run(self.labels, ends, work, _ALONE)[2]
+        self._hub_works.give(work)
+        return length
+
     def _run(
         self,
-        graph: CornerGraph | CornerHierarchy | None,
+        graph: CornerGraph | CornerHierarchy | HubLabels | None,
         ends: tuple[tuple[int, ...], tuple[float, ...]],
         work: Any,
         effort: tuple[float, float, float],
     ) -> tuple[int, FloatArray, float, float, int]:
         """Run a kernel in slices until it is done, or out of time; see `answer`."""
         upper, epsilon, until = effort
-        limit = NO_LIMIT if until == math.inf else SLICE
+        limit = 0 if not until else NO_LIMIT if until == math.inf else SLICE
         arrays: Any = self.blocks if graph is None else graph.arrays
         while True:
             left = upper, 1.0 + epsilon, limit
@@ -322,121 +387,3 @@ def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
     rounded = np.round(positions * GRAIN) / GRAIN
     clipped: FloatArray = np.clip(rounded, cells, cells + 1.0)
     return clipped
-
-
-# The intervals of a search of the mesh, to draw and count.
-
-
-_LEFT, _RIGHT = 1, 2
-"""Bits of a node: its interval reaches the left, the right corner of its side."""
-
-
-@dataclass(frozen=True, eq=False)
-class SearchTrace:
-    """The intervals that a search of the mesh made, in order.
-
-    An interval is a part of a side that is visible as a whole from one point, its root.
-    """
-
-    mesh: ConvexMesh
-    path: MeshPath
-    endpoints: FloatArray
-    """float64 (2, 2), (row, col) of start and goal in grid units."""
-    intervals: FloatArray
-    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as seen from
-    its root."""
-    roots: FloatArray
-    """float64 (n, 2), (row, col) of each interval's root: the start, or the corner at which the
-    path to the interval turns last."""
-    costs_cells: FloatArray
-    """float64 (n,), length of the path from the start to each root."""
-    parents: IntArray
-    """int32 (n,), the interval behind which each was found, -1 for the first ones."""
-
-
-def trace_search(
-    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
-) -> SearchTrace:
-    """Search a shortest path as `MeshSearch.path` does, and keep the intervals.
-
-    Parameters
-    ----------
-    mesh
-        The mesh of the map's free space.
-    cells
-        The free cells (row, col) of start and goal.
-    positions
-        Start and goal, (row, col) in grid units, in the closed squares of these cells.
-
-    Returns
-    -------
-    SearchTrace
-        Without intervals if start and goal lie in one polygon or apart.
-
-    Examples
-    --------
-    >>> from hybridnav.search.mesh import build_mesh, trace_search
-    >>> free = np.array([[True, False, True], [True, True, True]])
-    >>> trace = trace_search(build_mesh(free), ((0, 0), (0, 2)), ((0.5, 0.5), (0.5, 2.5)))
-    >>> len(trace.intervals), round(trace.path.length_cells, 3)
-    (2, 2.414)
-    """
-    endpoints = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
-    path, whole, real = _nodes(mesh, cells, positions)
-    slots, roots, parents, marks = whole.T
-    # Nodes for the goal itself have no side.
-    kept = slots >= 0
-    number = np.append(np.cumsum(kept) - 1, -1)
-    sides = _sides(mesh, slots[kept])
-    at = mesh.corners[roots[kept]].astype(np.float64)
-    at[roots[kept] < 0] = endpoints[0]
-    return SearchTrace(
-        mesh,
-        path,
-        endpoints,
-        _seen(sides, at, marks[kept], real[kept]),
-        at,
-        real[kept, G],
-        number[parents[kept]].astype(np.int32),
-    )
-
-
-def _nodes(
-    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
-) -> tuple[MeshPath, IntArray, FloatArray]:
-    """Return the path of a search, and its nodes; see the columns in `_interval_kernels`."""
-    search = MeshSearch(mesh)
-    path = search.path(cells, positions)
-    # No other code has this search: it lends the arrays that the query has just returned.
-    with search.works.lent() as work:
-        n = work.counts[N]
-        whole, real = work.nodes
-        return path, whole[:n].copy(), real[:n].copy()
-
-
-def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
-    """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
-    first."""
-    endpoints = np.stack([mesh.begins, mesh.finishes], axis=1)[slots]
-    pairs: FloatArray = mesh.corners[endpoints].astype(np.float64)
-    return pairs
-
-
-def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArray) -> FloatArray:
-    """Return the parts of sides that are seen between two rays, (n, 2, 2)."""
-    intervals = sides.copy()
-    along = sides[:, 1] - sides[:, 0]
-    off = sides[:, 0] - roots
-    at_side = (sides == roots[:, None]).all(axis=2).any(axis=1)
-    for end, bit, ray in ((0, _LEFT, real[:, 2:0:-1]), (1, _RIGHT, real[:, 4:2:-1])):
-        cut = (marks >= 0) & (marks & bit == 0) & ~at_side
-        direction = (ray - roots)[cut]
-        side, start = along[cut], off[cut]
-        share = _cross(start, direction) / _cross(direction, side)
-        intervals[cut, end] = sides[cut, 0] + share.clip(0, 1)[:, None] * side
-    return intervals
-
-
-def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    found: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    return found

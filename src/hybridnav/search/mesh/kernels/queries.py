@@ -19,6 +19,7 @@ from hybridnav.search.mesh.kernels.corner_search import (
     polygons_of_endpoints,
     query_corners,
 )
+from hybridnav.search.mesh.kernels.hubs import query_hubs
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
     DONE,
@@ -183,8 +184,8 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
     mesh
         See `successors`.
     graph
-        Arrays of a `CornerGraph` or a `CornerHierarchy`; for a search of intervals the block of
-        each slot, and the tree of `query`.
+        Arrays of a `CornerGraph`, a `CornerHierarchy` or `HubLabels`; for a search of intervals
+        the block of each slot, and the tree of `query`.
     place
         Component of polygons, and the polygon of each cell.
     asked
@@ -228,7 +229,7 @@ def _answer(mesh, graph, place, where, points, work, effort):
     """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
     if isinstance(graph[1], tuple):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
-    kernel = query_corners if len(graph) == 3 else query_hierarchy
+    kernel = {3: query_corners, 4: query_hierarchy}.get(len(graph), query_hubs)
     return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
@@ -245,9 +246,14 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
     def by_hierarchy(mesh, graph, place, where, points, work, effort):
         return query_hierarchy(mesh, graph, (place[0], place[1], where), points, work, effort)
 
+    def by_hubs(mesh, graph, place, where, points, work, effort):
+        return query_hubs(mesh, graph, (place[0], place[1], where), points, work, effort)
+
     if isinstance(graph[1], types.BaseTuple):
         return by_intervals
-    return by_corners if len(graph) == 3 else by_hierarchy
+    if len(graph) == 3:
+        return by_corners
+    return by_hierarchy if len(graph) == 4 else by_hubs
 
 
 # Kernels of the search of the hierarchy of corners: shortest any-angle paths.

@@ -23,6 +23,8 @@ from hybridnav.search.contraction import pack
 _LEFT, _RIGHT = 1, 2
 _BENDING = 4
 """Paths may bend round corners of kinds below this one."""
+_OF_MANY = 4
+"""Length of a target that stands for many points."""
 
 
 @njit(cache=True, nogil=True)
@@ -57,7 +59,7 @@ def lobe_of(kind, dx, dy):
 
 
 @njit(cache=True, nogil=True)
-def _axes(kind, lobe):
+def axes(kind, lobe):
     """Return the right and the left limit of a quadrant of `lobe_of`, as directions."""
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
@@ -151,7 +153,7 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
     """
     cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
     x, y = cx[corner], cy[corner]
-    rx, ry, lx, ly = _axes(kinds[corner], lobe)
+    rx, ry, lx, ly = axes(kinds[corner], lobe)
     quadrant = (x + rx, y + ry, x + lx, y + ly)
     n = 0
     while slot >= 0:
@@ -231,13 +233,13 @@ def _is_behind(mesh, x, y, corner, other):
     return (ux - x) * (wx - x) + (uy - y) * (wy - y) > 0.0
 
 
-def _has_target(target, polygon, x, y, rays):
+def has_target(target, polygon, x, y, rays):
     """Return whether a target in a polygon is seen from a point between two rays."""
 
 
-@overload(_has_target)
-def _has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
-    """Return what stands for `_has_target`: one target, or many, of which those seen are marked."""
+@overload(has_target)
+def has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
+    """Return what stands for `has_target`: one target, or many, of which those seen are marked."""
 
     def one(target, polygon, x, y, rays):
         tx, ty, goals = target
@@ -256,7 +258,9 @@ def _has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's 
                 is_seen[k] = True
         return False
 
-    return one if isinstance(target[0], types.Float) else many
+    if isinstance(target[0], types.Float):
+        return one
+    return many if len(target) == _OF_MANY else None  # `kernels.squares` has another kind
 
 
 @njit(cache=True, nogil=True)
@@ -285,7 +289,7 @@ def _spread(mesh, x, y, target, room, n, found):
             return -1, False
 
         # All of a convex polygon that lies between the rays is seen, hence a target there too.
-        is_target_seen |= _has_target(target, polygon, x, y, (lx, ly, rx, ry))
+        is_target_seen |= has_target(target, polygon, x, y, (lx, ly, rx, ry))
 
         # The first end is the right one of the entry. It lies on the right ray or right of it, so
         # the ray itself limits the first interval.

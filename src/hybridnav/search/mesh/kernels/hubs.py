@@ -1,0 +1,415 @@
+"""Kernels of hub labels: shortest any-angle paths without a search.
+
+The label of a corner holds hubs, corners that many shortest paths pass, with the distances to them:
+any two corners that a path joins have a hub of a shortest one in both labels. A label is parted by
+the corner to which the path to the hub goes next, in the order of directions, those nearest to the
+wall first. A path that arrives at a corner may go on only to the first few of them without being
+slack, so a query reads one label in twenty.
+
+T. Akiba, Y. Iwata, Y. Yoshida: Fast exact shortest-path distance queries on large networks by
+pruned landmark labeling, 2013. J. Du, B. Shen, S. Zhao, M. A. Cheema, A. N. Toosi: Ultrafast
+Euclidean shortest path computation using hub labeling, 2023.
+"""
+
+import math
+
+import numpy as np
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow
+from hybridnav._base.kernels.exact import is_legal, turn_of
+from hybridnav.search.mesh.kernels.polyanya import (
+    DONE,
+    EXPANDED,
+    WORK_FULL,
+    pop,
+    push,
+    put_corner,
+)
+from hybridnav.search.mesh.kernels.squares import line_before
+from hybridnav.search.mesh.kernels.views import distance, lobe_of
+
+_SAME = 1e-12
+"""Difference of two distances that counts as none, in cells: rounding alone causes it."""
+
+
+@njit(cache=True, nogil=True)
+def _reach_next(mesh, edges, here, work, size, n_touched):
+    """Reach the corners to which a shortest path may go on from a corner.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    edges
+        See `edges_of`.
+    here
+        The corner.
+    work
+        Cost of corners (infinite), corner before, corners touched; keys and values of the heap.
+    size, n_touched
+        Sizes of the heap and of the list of corners touched; returned.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    first, heads = edges
+    costs, before, touched, heap = work
+    x, y, cost, last, hand = cx[here], cy[here], costs[here], before[here], 0.0
+    low, high, px, py = first[2 * here], first[2 * here + 2], x, y
+    if last >= 0:
+        px, py, kind = cx[last], cy[last], kinds[here]
+        at = 2 * here + lobe_of(kind, x - px, y - py)
+        low, high = first[at], first[at + 1]
+        # The blocked cell lies on the left of the path here, or on the right.
+        hand = (x - px) * (1.0 if kind & 2 else -1.0) - (y - py) * (1.0 if kind & 1 else -1.0)
+    for other in heads[low:high]:
+        reached = cost + distance(x, y, cx[other], cy[other])
+        known = costs[other]
+        if reached < known and turn_of(px, py, x, y, cx[other], cy[other]) * hand >= 0.0:
+            if known == np.inf:
+                touched[n_touched] = other
+                n_touched += 1
+            costs[other], before[other] = reached, here
+            size = push(heap, size, reached, other)
+    return size, n_touched
+
+
+@njit(cache=True, nogil=True)
+def _room_for(n, n_edges):
+    """Return work arrays for `_reach_next`; every edge is queued once at most."""
+    heap = np.empty(n_edges + 1), np.empty(n_edges + 1, np.int32)
+    return np.full(n, np.inf), np.empty(n, np.int32), np.empty(n, np.int32), heap
+
+
+@njit(cache=True, nogil=True)
+def uses_of_corners(mesh, edges, sources):
+    """Count the shortest paths from some corners to all others that each corner is on, float64."""
+    n = len(mesh[0])
+    work = _room_for(n, len(edges[1]))
+    costs, before, touched, heap = work
+    uses, below, order = np.zeros(n), np.zeros(n), np.empty(n, np.int32)
+    for source in sources:
+        costs[source], before[source], touched[0] = 0.0, -1, source
+        size, n_touched, n_settled = push(heap, 0, 0.0, source), 1, 0
+        while size:
+            cost, here = heap[0][0], heap[1][0]
+            size = pop(heap, size)
+            if cost == costs[here]:
+                order[n_settled], below[here] = here, 1.0
+                n_settled += 1
+                size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
+        for k in range(n_settled - 1, 0, -1):
+            here = order[k]
+            uses[here] += below[here]
+            below[before[here]] += below[here]
+        for corner in touched[:n_touched]:
+            costs[corner] = np.inf
+    return uses
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def labels_of_corners(mesh, edges, ranked, most):
+    """Label corners with hubs: search from each, and stop where labels so far say as much.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    edges
+        See `edges_of`.
+    ranked
+        int32, the corners at which paths bend, those on most paths first.
+    most
+        Most entries.
+
+    Returns
+    -------
+    tuple
+        int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32 the next corner on the
+        path to the hub, without the corner itself as its own hub; whether there was room for all.
+    """
+    n = len(mesh[0])
+    work = _room_for(n, len(edges[1]))
+    costs, before, touched, heap = work
+    to_hub = np.full(len(ranked), np.inf)
+    # Each corner has a run of entries in a common pool, and moves to a longer one when it is full.
+    begin, count, room = np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros(n, np.int32)
+    hubs, lengths, onward = np.empty(4096, np.int32), np.empty(4096), np.empty(4096, np.int32)
+    used = total = 0
+    for rank in range(len(ranked)):
+        root = ranked[rank]
+        for k in range(begin[root], begin[root] + count[root]):
+            to_hub[hubs[k]] = lengths[k]
+        costs[root], before[root], touched[0] = 0.0, -1, root
+        size, n_touched = push(heap, 0, 0.0, root), 1
+        while size:
+            cost, here = heap[0][0], heap[1][0]
+            size = pop(heap, size)
+            if cost > costs[here]:
+                continue
+            at, stop = begin[here], begin[here] + count[here]
+            while at < stop and to_hub[hubs[at]] + lengths[at] > cost + _SAME:
+                at += 1
+            if at < stop:
+                continue
+            if here != root:
+                if count[here] == room[here]:
+                    room[here] = max(8, 2 * room[here])
+                    while used + room[here] > len(hubs):
+                        hubs, lengths, onward = grow(hubs), grow(lengths), grow(onward)
+                    for k in range(count[here]):
+                        old, new = begin[here] + k, used + k
+                        hubs[new], lengths[new], onward[new] = hubs[old], lengths[old], onward[old]
+                    begin[here] = used
+                    used += room[here]
+                at = begin[here] + count[here]
+                hubs[at], lengths[at], onward[at] = rank, cost, before[here]
+                count[here] += 1
+                total += 1
+            size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
+        for corner in touched[:n_touched]:
+            costs[corner] = np.inf
+        for k in range(begin[root], begin[root] + count[root]):
+            to_hub[hubs[k]] = np.inf
+        if total > most:
+            return begin, hubs[:0], lengths[:0], onward[:0], False
+    offset = np.zeros(n + 1, np.int64)
+    for corner in range(n):
+        offset[corner + 1] = offset[corner] + count[corner]
+    kept = np.empty(total, np.int64)
+    for corner in range(n):
+        for k in range(count[corner]):
+            kept[offset[corner] + k] = begin[corner] + k
+    return offset, hubs[kept], lengths[kept], onward[kept], True
+
+
+# A query. An entry holds the rank of its hub above the distance to it, in units.
+
+FAR = 1 << 62
+"""No distance from the start."""
+ABOVE = 12
+"""Bits of the number of a corner of a square, below a distance from the start. Distances have at
+most 47 bits, two of them 48: `FAR` is above all sums."""
+
+
+@njit(cache=True, nogil=True)
+def _sees(polygon_at, cell, x, y, to_x, to_y):
+    """Return whether a point in the closed square of a cell sees another point."""
+    row, col = cell
+    if x == math.floor(x) and y == math.floor(y):
+        # Where two free cells meet only at a corner, a point there belongs to one of them.
+        up, right = 1 if y > row else -1, 1 if x > col else -1
+        rows, cols = polygon_at.shape
+        if 0 <= row + up < rows and 0 <= col + right < cols:
+            is_shut = polygon_at[row + up, col] < 0 and polygon_at[row, col + right] < 0
+            if is_shut and ((to_x - x) * right > 0.0 or (to_y - y) * up > 0.0):
+                return False
+    return (x == to_x and y == to_y) or is_legal(polygon_at, y, x, to_y, to_x, 0, 0)
+
+
+@njit(cache=True, nogil=True)
+def _see_each_other(polygon_at, cells, endpoints):
+    """Return whether the ends of a query see each other."""
+    from_row, from_col, to_row, to_col = cells
+    sx, sy, tx, ty = endpoints
+    if sx == tx and sy == ty and from_row != to_row and from_col != to_col:
+        return polygon_at[from_row, to_col] >= 0 or polygon_at[to_row, from_col] >= 0
+    return _sees(polygon_at, (from_row, from_col), sx, sy, tx, ty) and _sees(
+        polygon_at, (to_row, to_col), tx, ty, sx, sy
+    )
+
+
+@njit(cache=True, nogil=True)
+def view_of_square(mesh, labels, x, y, sights, costs):
+    """Write the distances of the corners of a point's square, in units; return the first view and
+    the one after the last, or -1 without room."""
+    cx, cy = mesh[0], mesh[1]
+    layout, begin, views = labels[1], labels[2], labels[3]
+    square = line_before(y, layout[0]) * int(layout[1]) + line_before(x, layout[0])
+    low, high, units = begin[square], begin[square + 1], 1.0 / layout[3]
+    if high - low > len(costs):
+        return low, -1
+    for k in range(high - low):
+        corner, sights[k] = views[low + k, 0] >> 1, views[low + k, 0] & 1
+        dx, dy = cx[corner] - x, cy[corner] - y
+        costs[k] = np.int64(math.sqrt(dx * dx + dy * dy) * units + 0.5)
+    return low, high
+
+
+@njit(cache=True, nogil=True)
+def is_hidden(mesh, polygon_at, cell, point, corner, sights, k):
+    """Return whether a point does not see a corner, which is found out once.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    polygon_at
+        int32 (rows, cols), -1 for cells that are not free.
+    cell, point
+        The cell of the point, and its x and y.
+    corner
+        The corner.
+    sights, k
+        Where the answer is kept: 1 for seen, -1 for hidden, 0 before that.
+    """
+    if sights[k] == 0:
+        is_seen = _sees(polygon_at, cell, point[0], point[1], mesh[0][corner], mesh[1][corner])
+        sights[k] = 1 if is_seen else -1
+    return sights[k] < 0
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def query_hubs(mesh, labels, where, endpoints, work, effort):
+    """Find a shortest path between two points by the labels of corners.
+
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    labels
+        The arrays of `HubLabels`.
+    where
+        See `look_from_endpoints`.
+    work
+        Room for the corners of both ends: int8 (2, n) whether the end sees each (1), or not (-1),
+        or it is not known (0); int64 (2, n) distances to them; int64 (n,) least distances by the
+        corners of the goal. By hub, int64 the least distance from the start, above the number of
+        its corner (`FAR`); int32 hubs touched. Counts and bounds.
+    effort
+        See `query`; with a limit of 0 the length is found without the path.
+
+    Returns
+    -------
+    tuple
+        See `query`.
+    """
+    _, polygon_at, cells = where
+    sights, costs, totals, least, touched, counts, bounds = work
+    sx, sy, tx, ty = endpoints
+    entries, layout, _, views = labels[:4]
+    shift = int(layout[2])
+    mask = (np.int64(1) << shift) - 1
+    none = np.empty(0, np.int32)
+    counts[:] = 0
+    bounds[:] = math.hypot(tx - sx, ty - sy)
+    if _see_each_other(polygon_at, cells, endpoints):
+        return DONE, _path_through(mesh, endpoints, none, none)
+    low, high = view_of_square(mesh, labels, sx, sy, sights[0], costs[0])
+    to_low, to_high = view_of_square(mesh, labels, tx, ty, sights[1], costs[1])
+    if high < 0 or to_high < 0:
+        return WORK_FULL, np.empty((0, 2))
+
+    # All corners of the start, seen or not: the least distances to hubs, then to corners of the
+    # goal. They are lower bounds.
+    n_touched = 0
+    for k in range(high - low):
+        cost = costs[0, k]
+        for packed in entries[views[low + k, 1] : views[low + k, 2]]:
+            hub, reached = packed >> shift, cost + (packed & mask) << ABOVE | k
+            known = least[hub]
+            if reached < known:
+                least[hub] = reached
+                if known == FAR:
+                    touched[n_touched] = hub
+                    n_touched += 1
+    n_goal = to_high - to_low
+    for m in range(n_goal):
+        least_to = FAR
+        for packed in entries[views[to_low + m, 1] : views[to_low + m, 2]]:
+            least_to = min(least_to, (packed & mask) + (least[packed >> shift] >> ABOVE))
+        totals[m] = costs[1, m] + least_to
+
+    # The corner of the goal with the least bound is looked at until none is better than the path.
+    # If the corner of the start is hidden, the hub has its next best corner.
+    best, best_hub, one, two = FAR >> ABOVE, -1, -1, -1
+    while n_goal:
+        m = totals[:n_goal].argmin()
+        if totals[m] >= best:
+            break
+        totals[m] = FAR
+        if is_hidden(
+            mesh, polygon_at, cells[2:], (tx, ty), views[to_low + m, 0] >> 1, sights[1], m
+        ):
+            continue
+        for packed in entries[views[to_low + m, 1] : views[to_low + m, 2]]:
+            hub, reached = packed >> shift, costs[1, m] + (packed & mask)
+            while reached + (least[hub] >> ABOVE) < best:
+                k = least[hub] & ((1 << ABOVE) - 1)
+                corner = views[low + k, 0] >> 1
+                if is_hidden(mesh, polygon_at, cells[:2], (sx, sy), corner, sights[0], k):
+                    least[hub] = _next_best(labels, low, high, hub, sights[0], costs[0])
+                else:
+                    best, best_hub = reached + (least[hub] >> ABOVE), hub
+                    one, two = low + k, to_low + m
+    for hub in touched[:n_touched]:
+        least[hub] = FAR
+    bounds[:] = np.inf if one < 0 else best * layout[3]
+    if one < 0 or effort[2] == 0:
+        return DONE, np.empty((0, 2))
+    there = _corners_to(labels, views[one, 0] >> 1, best_hub, shift)
+    back = _corners_to(labels, views[two, 0] >> 1, best_hub, shift)
+    path = _path_through(mesh, endpoints, there, back)
+    length = 0.0
+    for k in range(len(path) - 1):
+        length += distance(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
+    bounds[:] = length
+    counts[EXPANDED] = len(there) + len(back)
+    return DONE, path
+
+
+@njit(cache=True, nogil=True)
+def _next_best(labels, low, high, hub, sights, costs):
+    """Return the least distance to a hub by a corner that is not known as hidden, above the
+    corner's number."""
+    entries, layout, _, views = labels[:4]
+    shift = int(layout[2])
+    mask = (np.int64(1) << shift) - 1
+    best = FAR
+    for k in range(high - low):
+        if sights[k] >= 0:
+            for packed in entries[views[low + k, 1] : views[low + k, 2]]:
+                if packed >> shift == hub:
+                    best = min(best, costs[k] + (packed & mask) << ABOVE | k)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _corners_to(labels, corner, hub, shift):
+    """Return the corners on the path from a corner to a hub in its label, with both, int32."""
+    entries, first, offset, heads = labels[0], labels[4], labels[5], labels[6]
+    found, n = np.empty(16, np.int32), 0
+    # Each corner on the path has the hub in its label too; the count ends a walk in altered labels.
+    for _ in range(len(first)):
+        if n == len(found):
+            found = grow(found)
+        found[n] = corner
+        n += 1
+        part, last = first[2 * corner], first[2 * corner + 2]
+        at, end = offset[part], offset[last]
+        while at < end and entries[at] >> shift != hub:
+            at += 1
+        while part < last and offset[part + 1] <= at:
+            part += 1
+        if part == last or heads[part] == corner:
+            break
+        corner = heads[part]
+    return found[:n]
+
+
+@njit(cache=True, nogil=True)
+def _path_through(mesh, endpoints, there, back):
+    """Return the path through some corners and, backwards, some others; see `path_to`."""
+    cx, cy = mesh[0], mesh[1]
+    sx, sy, tx, ty = endpoints
+    n = len(there) + len(back) + 1
+    path = np.empty((n + 1, 2))
+    path[n, 0], path[n, 1] = ty, tx
+    for corner in back:
+        n = put_corner(path, n, cx[corner], cy[corner])
+    # Both end with the hub.
+    for corner in there[-2::-1]:
+        n = put_corner(path, n, cx[corner], cy[corner])
+    n = put_corner(path, n, sx, sy)
+    return path[n:].copy()

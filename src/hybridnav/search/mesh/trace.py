@@ -1,0 +1,131 @@
+"""The intervals of a search of the mesh, to draw and count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.search.mesh.kernels.intervals import G
+from hybridnav.search.mesh.kernels.polyanya import N
+from hybridnav.search.mesh.search import Cell, MeshPath, MeshSearch, Position, round_into
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import FloatArray, IntArray
+    from hybridnav.search.mesh.build import ConvexMesh
+
+
+_LEFT, _RIGHT = 1, 2
+"""Bits of a node: its interval reaches the left, the right corner of its side."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchTrace:
+    """The intervals that a search of the mesh made, in order.
+
+    An interval is a part of a side that is visible as a whole from one point, its root.
+    """
+
+    mesh: ConvexMesh
+    path: MeshPath
+    endpoints: FloatArray
+    """float64 (2, 2), (row, col) of start and goal in grid units."""
+    intervals: FloatArray
+    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as seen from
+    its root."""
+    roots: FloatArray
+    """float64 (n, 2), (row, col) of each interval's root: the start, or the corner at which the
+    path to the interval turns last."""
+    costs_cells: FloatArray
+    """float64 (n,), length of the path from the start to each root."""
+    parents: IntArray
+    """int32 (n,), the interval behind which each was found, -1 for the first ones."""
+
+
+def trace_search(
+    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
+) -> SearchTrace:
+    """Search a shortest path as `MeshSearch.path` does, and keep the intervals.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the map's free space.
+    cells
+        The free cells (row, col) of start and goal.
+    positions
+        Start and goal, (row, col) in grid units, in the closed squares of these cells.
+
+    Returns
+    -------
+    SearchTrace
+        Without intervals if start and goal lie in one polygon or apart.
+
+    Examples
+    --------
+    >>> from hybridnav.search.mesh import build_mesh, trace_search
+    >>> free = np.array([[True, False, True], [True, True, True]])
+    >>> trace = trace_search(build_mesh(free), ((0, 0), (0, 2)), ((0.5, 0.5), (0.5, 2.5)))
+    >>> len(trace.intervals), round(trace.path.length_cells, 3)
+    (2, 2.414)
+    """
+    endpoints = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
+    path, whole, real = _nodes(mesh, cells, positions)
+    slots, roots, parents, marks = whole.T
+    # Nodes for the goal itself have no side.
+    kept = slots >= 0
+    number = np.append(np.cumsum(kept) - 1, -1)
+    sides = _sides(mesh, slots[kept])
+    at = mesh.corners[roots[kept]].astype(np.float64)
+    at[roots[kept] < 0] = endpoints[0]
+    return SearchTrace(
+        mesh,
+        path,
+        endpoints,
+        _seen(sides, at, marks[kept], real[kept]),
+        at,
+        real[kept, G],
+        number[parents[kept]].astype(np.int32),
+    )
+
+
+def _nodes(
+    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
+) -> tuple[MeshPath, IntArray, FloatArray]:
+    """Return the path of a search, and its nodes; see the columns in `_interval_kernels`."""
+    search = MeshSearch(mesh)
+    path = search.path(cells, positions)
+    # No other code has this search: it lends the arrays that the query has just returned.
+    with search.works.lent() as work:
+        n = work.counts[N]
+        whole, real = work.nodes
+        return path, whole[:n].copy(), real[:n].copy()
+
+
+def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
+    """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
+    first."""
+    endpoints = np.stack([mesh.begins, mesh.finishes], axis=1)[slots]
+    pairs: FloatArray = mesh.corners[endpoints].astype(np.float64)
+    return pairs
+
+
+def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArray) -> FloatArray:
+    """Return the parts of sides that are seen between two rays, (n, 2, 2)."""
+    intervals = sides.copy()
+    along = sides[:, 1] - sides[:, 0]
+    off = sides[:, 0] - roots
+    at_side = (sides == roots[:, None]).all(axis=2).any(axis=1)
+    for end, bit, ray in ((0, _LEFT, real[:, 2:0:-1]), (1, _RIGHT, real[:, 4:2:-1])):
+        cut = (marks >= 0) & (marks & bit == 0) & ~at_side
+        direction = (ray - roots)[cut]
+        side, start = along[cut], off[cut]
+        share = _cross(start, direction) / _cross(direction, side)
+        intervals[cut, end] = sides[cut, 0] + share.clip(0, 1)[:, None] * side
+    return intervals
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    found: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return found
