@@ -109,12 +109,11 @@ def _paths(search: MeshSearch, asked: tuple[Any, Any]) -> None:
     answers = np.empty(count), np.empty(count), np.zeros(count + 1, np.int64)
     positions = np.empty((1 << 20, 2))
     graph, works = search.engine()
-    mesh = search.mesh
-    arrays: Any = (mesh.block_of, search.tree) if graph is None else graph.arrays
+    arrays: Any = search.blocks if graph is None else graph.arrays
     with works.lent() as work:
         at = n = 0
         while at < count:
-            rest = (mesh.component, mesh.polygon_at), asked, work.arrays, work.bounds
+            rest = search.place, asked, work.arrays, work.bounds
             at, n, status = many(
                 search.arrays, arrays, *rest, (np.inf, 1.0, 1 << 62), (*answers, positions), at, n
             )

@@ -238,10 +238,7 @@ def header_message(frame_id: str, stamp_ns: int) -> dict[str, Any]:
             f"stamp_ns must be whole nanoseconds since 1970, 0 to {_MOST_STAMP_NS - 1}, "
             f"got {brief(stamp_ns)}"
         )
-    return {
-        "stamp": {"sec": stamp // _NANO, "nanosec": stamp % _NANO},
-        "frame_id": frame_id,
-    }
+    return {"stamp": {"sec": stamp // _NANO, "nanosec": stamp % _NANO}, "frame_id": frame_id}
 
 
 def stamp_ns_of(message: Any, what: str) -> int:

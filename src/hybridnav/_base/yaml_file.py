@@ -200,11 +200,7 @@ def read_text(  # noqa: PLR0913 - keywords, most of them passed on
 
 
 def open_file(
-    path: PathLike,
-    *,
-    what: str,
-    error: type[HybridNavError],
-    missing: type[HybridNavError],
+    path: PathLike, *, what: str, error: type[HybridNavError], missing: type[HybridNavError]
 ) -> BinaryIO:
     """Open a regular file for reading bytes.
 

@@ -36,17 +36,9 @@ from .settings import (
     PlannerSettings as PlannerSettings,
     PyramidSettings as PyramidSettings,
 )
-from .speed import (
-    MotionLimits as MotionLimits,
-    SpeedMap as SpeedMap,
-    SpeedProfile as SpeedProfile,
-)
+from .speed import MotionLimits as MotionLimits, SpeedMap as SpeedMap, SpeedProfile as SpeedProfile
 from .tour import Tour as Tour, plan_tour as plan_tour
 from .why import Explanation as Explanation
-from .why_words import (
-    BlockedEnd as BlockedEnd,
-    Closure as Closure,
-    TightPlace as TightPlace,
-)
+from .why_words import BlockedEnd as BlockedEnd, Closure as Closure, TightPlace as TightPlace
 
 __all__: list[str]

@@ -66,11 +66,7 @@ class Track:
     """
 
     def __init__(
-        self,
-        tour: Tour,
-        near_m: float,
-        *,
-        costs: tuple[OccupancyGrid, CostLayer] | None = None,
+        self, tour: Tour, near_m: float, *, costs: tuple[OccupancyGrid, CostLayer] | None = None
     ) -> None:
         self._costs = costs
         path = tour.results[0].path

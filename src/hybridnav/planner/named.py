@@ -151,10 +151,7 @@ def check_waypoints(
 
 
 def _chosen(
-    space: _Space,
-    waypoints: Sequence[ArrayLike | str],
-    fixed: list[Any],
-    radius_m: float,
+    space: _Space, waypoints: Sequence[ArrayLike | str], fixed: list[Any], radius_m: float
 ) -> list[Any]:
     """Return the given points, and for rooms the points that make the path cheapest."""
     if all(point is not None for point in fixed):

@@ -144,11 +144,7 @@ class Path:
         return self._motion.spread(spacing_m).directions
 
     def profile(
-        self,
-        limits: MotionLimits,
-        spacing_m: float = 0.05,
-        *,
-        speed_map: SpeedMap | None = None,
+        self, limits: MotionLimits, spacing_m: float = 0.05, *, speed_map: SpeedMap | None = None
     ) -> SpeedProfile:
         """Return the speed along the path with which the robot arrives first.
 

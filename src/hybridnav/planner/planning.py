@@ -124,10 +124,7 @@ class Planning:
         return self.ompl is not None and self.ompl.ompl.has_heading
 
     def points_of(
-        self,
-        waypoints: Sequence[ArrayLike | str],
-        at: At,
-        blocked: Closable | ClosedCells | None,
+        self, waypoints: Sequence[ArrayLike | str], at: At, blocked: Closable | ClosedCells | None
     ) -> list[ArrayLike]:
         """Return a point for each waypoint, so that the path through all of them is cheapest."""
         check_at(at)

@@ -208,11 +208,7 @@ class Privacy:
     """
 
     def __init__(
-        self,
-        profile: Profile,
-        floors: Sequence[ProfiledFloor],
-        *,
-        whole: Any = None,
+        self, profile: Profile, floors: Sequence[ProfiledFloor], *, whole: Any = None
     ) -> None:
         self.profile, self._floors, self._whole = profile, tuple(floors), whole
         self._private = [
@@ -270,10 +266,7 @@ class Privacy:
         return closed
 
     def closed(
-        self,
-        now: Planning,
-        waypoints: Sequence[ArrayLike | str],
-        blocked: Any,
+        self, now: Planning, waypoints: Sequence[ArrayLike | str], blocked: Any
     ) -> ClosedCells | None:
         """Return the closed cells of a query on one map, with those of `blocked`."""
         shut = now.closed(blocked)

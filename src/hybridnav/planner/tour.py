@@ -26,12 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.planning import Smooth
     from hybridnav.search.found import ClosedCells
 
-_COUNTS = (
-    "expanded",
-    "expanded_places",
-    "expanded_intervals",
-    "corridor_cells",
-)
+_COUNTS = ("expanded", "expanded_places", "expanded_intervals", "corridor_cells")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,9 +171,7 @@ class Tour:
         return sentences(self.instructions, language)
 
 
-def _joined_points(
-    parts: list[dict[str, Any]],
-) -> tuple[list[list[float]], list[float]]:
+def _joined_points(parts: list[dict[str, Any]]) -> tuple[list[list[float]], list[float]]:
     """Return points and headings of all parts.
 
     A point at which one part ends and the next begins occurs once, unless the robot turns there. A

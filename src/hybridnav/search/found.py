@@ -32,14 +32,7 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 Position = tuple[float, float]
-Metric = Literal[
-    "octile",
-    "weighted",
-    "any-angle",
-    "any-angle-weighted",
-    "dubins",
-    "reeds-shepp",
-]
+Metric = Literal["octile", "weighted", "any-angle", "any-angle-weighted", "dubins", "reeds-shepp"]
 """What a path is judged by: the kind of its length, or of its cost."""
 
 

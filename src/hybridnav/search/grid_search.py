@@ -112,11 +112,7 @@ class GridSearch:
     """
 
     def __init__(
-        self,
-        enterable: BoolArray,
-        *,
-        corner_cutting: bool = False,
-        units: IntArray | None = None,
+        self, enterable: BoolArray, *, corner_cutting: bool = False, units: IntArray | None = None
     ) -> None:
         self._cols = enterable.shape[1]
         self._corner_cutting = corner_cutting

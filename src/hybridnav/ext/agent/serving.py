@@ -29,10 +29,7 @@ async def answered(answers: MapAnswers, name: str, arguments: dict[str, Any]) ->
     try:
         return await asyncio.wait_for(call, LIMIT_S)
     except asyncio.TimeoutError:
-        return {
-            "ok": False,
-            "text": f"no answer within {LIMIT_S:g} s: ask again, and for less",
-        }
+        return {"ok": False, "text": f"no answer within {LIMIT_S:g} s: ask again, and for less"}
 
 
 def schema_of(asks: Any) -> dict[str, Any]:

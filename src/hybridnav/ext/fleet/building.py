@@ -396,11 +396,7 @@ class Building:
         return asked._replace(blocked=blocked, closed_links=links)
 
     def _plans(
-        self,
-        start: FloorWaypoint,
-        goal: FloorWaypoint,
-        asked: _Asked,
-        limits: tuple[int, float],
+        self, start: FloorWaypoint, goal: FloorWaypoint, asked: _Asked, limits: tuple[int, float]
     ) -> BuildingAlternatives:
         """Plan as many routes as are wanted; again where a map changes meanwhile."""
         began = time.perf_counter()

@@ -57,10 +57,7 @@ def load_floors(
     preset = preset_of_floors(reading)
     with stage(f"reading {file}", seconds, "load"):
         return hn.ext.fleet.load_building(
-            file,
-            robot_radius_m=reading.robot_radius_m,
-            preset=preset,
-            max_cells=reading.max_cells,
+            file, robot_radius_m=reading.robot_radius_m, preset=preset, max_cells=reading.max_cells
         )
 
 

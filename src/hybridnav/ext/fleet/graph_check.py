@@ -12,12 +12,7 @@ from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
 from hybridnav.ext.graphs.gather import Findings, shown
-from hybridnav.ext.graphs.waypoint_graph import (
-    add_one_way,
-    components_of,
-    cut_off,
-    one_way_nodes,
-)
+from hybridnav.ext.graphs.waypoint_graph import add_one_way, components_of, cut_off, one_way_nodes
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:

@@ -46,11 +46,7 @@ class Network:
 
     @classmethod
     def of(
-        cls,
-        sight: Sight,
-        positions: FloatArray,
-        edges: LongArray,
-        usable: LongArray | None = None,
+        cls, sight: Sight, positions: FloatArray, edges: LongArray, usable: LongArray | None = None
     ) -> Network:
         """Prepare a graph.
 

@@ -283,11 +283,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
 
 
 def _refined(
-    chosen: Nodes,
-    wanted: _Wanted,
-    is_kept: BoolArray,
-    rng: np.random.Generator,
-    progress: Progress,
+    chosen: Nodes, wanted: _Wanted, is_kept: BoolArray, rng: np.random.Generator, progress: Progress
 ) -> LongArray:
     """Add bends and cover until routes are short; return the edges."""
     space = chosen.space

@@ -349,11 +349,7 @@ def _parts_answer(
     return counts | {"file": str(out), "map": str(map_file)}, lines
 
 
-def _summary(
-    out: Path,
-    graph: RouteGraph,
-    judged: GraphReport | None,
-) -> list[str]:
+def _summary(out: Path, graph: RouteGraph, judged: GraphReport | None) -> list[str]:
     grid, counts = graph.grid, _counts(graph)
     lines = [
         f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",

@@ -73,12 +73,7 @@ def plot_graph_check(
     grid, graph = check.grid, check.graph
     view = known_view(grid).holding(graph.points, _MARGIN_M)
     canvas = Canvas.opened(ax, width_in, view)
-    draw_cells(
-        canvas,
-        grid,
-        grid.classes,
-        style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED),
-    )
+    draw_cells(canvas, grid, grid.classes, style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED))
     line = canvas.sizes.line
     entries: list[Entry] = []
     for chosen, name, colour, width in (

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.graphs.strands import (
-    aligned,
-    crosses,
-    crossing,
-    length_between,
-    turn_of,
-)
+from hybridnav.ext.graphs.strands import aligned, crosses, crossing, length_between, turn_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

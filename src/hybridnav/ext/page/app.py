@@ -181,10 +181,7 @@ class _Answers:
             f"{floor}/stand": (Stand, lambda request, asked: on(request).stand(asked)),
             f"{floor}/at": (At, lambda request, asked: on(request).room_at(asked)),
             f"{floor}/edit": (Edit, lambda request, asked: on(request).edit(asked)),
-            f"{floor}/undo": (
-                Undo,
-                lambda request, asked: on(request).undo(asked.version),
-            ),
+            f"{floor}/undo": (Undo, lambda request, asked: on(request).undo(asked.version)),
             f"{floor}/save": (Save, lambda request, asked: on(request).save(asked)),
         }
         files = {at: self._export, floor: self._export_floor}

@@ -50,8 +50,7 @@ RouteOption = Annotated[
     ),
 ]
 PortOption = Annotated[
-    int,
-    typer.Option("--port", metavar="N", min=0, max=65535, help="Port on 127.0.0.1; 0 for any."),
+    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port on 127.0.0.1; 0 for any.")
 ]
 BrowserOption = Annotated[
     bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
@@ -284,8 +283,7 @@ def _save(site: Site, path: Path, routes: Sequence[str]) -> None:
     for text in routes:
         start, goal = (
             FloorPoint(
-                floor=number,
-                point=list(site.sessions[number].grid.frame.position_of(*point)[::-1]),
+                floor=number, point=list(site.sessions[number].grid.frame.position_of(*point)[::-1])
             )
             for number, point in _ends(text, site.names)
         )

@@ -27,12 +27,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
     from hybridnav.ext.page.kept import RoomsFile
-    from hybridnav.ext.page.requests import (
-        AlternativesQuery,
-        PartQuery,
-        PathQuery,
-        PlanQuery,
-    )
+    from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
     from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder, PlanResult
     from hybridnav.topology.rooms import Rooms
 
@@ -212,10 +207,7 @@ class _OverFloors:
     """Routes over the floors of a building; see `Site.of_building`."""
 
     def __init__(
-        self,
-        building: Building,
-        files: Mapping[str, RoomsFile] | None,
-        links: Sequence[LinkEntry],
+        self, building: Building, files: Mapping[str, RoomsFile] | None, links: Sequence[LinkEntry]
     ) -> None:
         self._building = building
         self._first = building.floors[0].planner.preset.name

@@ -176,10 +176,7 @@ def rooms_layer(labels: RoomLabels, grid: OccupancyGrid) -> Layer:
     colours = colour_vertices(_beside(labels), len(labels.names))
     index = _ground(grid)
     measured = grid.measured
-    for kind, first in (
-        (CellClass.FREE, _PLACES),
-        (CellClass.UNEXPLORED, _UNEXPLORED_PLACES),
-    ):
+    for kind, first in ((CellClass.FREE, _PLACES), (CellClass.UNEXPLORED, _UNEXPLORED_PLACES)):
         inside: BoolArray = (measured == kind) & (labels.label_of != NO_ROOM)
         index[inside] = (colours[labels.label_of[inside]] + first).astype(np.uint8)
     return _layer(index)

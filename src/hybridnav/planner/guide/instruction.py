@@ -11,14 +11,7 @@ Vehicle = Literal["lift", "stairs", "ramp"]
 Shape = Literal["corridor", "hall", "room", "passage", "storey"]
 Hand = Literal["left", "right"]
 Side = Literal[
-    "left",
-    "right",
-    "ahead",
-    "behind",
-    "ahead-left",
-    "ahead-right",
-    "behind-left",
-    "behind-right",
+    "left", "right", "ahead", "behind", "ahead-left", "ahead-right", "behind-left", "behind-right"
 ]
 LEAST_BEND_RAD = math.radians(55.0)
 """Turn from which a bend counts."""

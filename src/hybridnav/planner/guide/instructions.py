@@ -178,11 +178,7 @@ def _after(event: Event, doorway: Doorway | None, since: _Since, landmarks: Land
 
 
 def _doorway(
-    line: Line,
-    event: Event,
-    following: Stretch,
-    landmarks: Landmarks,
-    known: tuple[_Since, float],
+    line: Line, event: Event, following: Stretch, landmarks: Landmarks, known: tuple[_Since, float]
 ) -> Doorway:
     """Return a crossing for sentences: its door, and how the path comes and goes.
 
@@ -220,11 +216,7 @@ def _doorway(
 
 
 def _on_the_way(
-    line: Line,
-    event: Event,
-    landmarks: Landmarks,
-    doorway: Doorway,
-    known: tuple[_Since, float],
+    line: Line, event: Event, landmarks: Landmarks, doorway: Doorway, known: tuple[_Since, float]
 ) -> Doorway:
     """Return a crossing with its place for a person who has to walk to it."""
     since, door = known[0], event.door
@@ -240,11 +232,7 @@ def _on_the_way(
 
 
 def _beside(
-    line: Line,
-    event: Event,
-    known: tuple[_Since, float],
-    landmarks: Landmarks,
-    doorway: Doorway,
+    line: Line, event: Event, known: tuple[_Since, float], landmarks: Landmarks, doorway: Doorway
 ) -> Doorway:
     """Return a crossing with the hand at which its door lies, and the way on behind it."""
     (since, until_m), door = known, event.door

@@ -284,11 +284,7 @@ class Landmarks(DoorsInSight):
         return min(found, key=lambda one: one[:3])[3] if found else None
 
     def at_goal(
-        self,
-        point: tuple[float, float],
-        heading_rad: float,
-        room: str | None,
-        but: Collection[int],
+        self, point: tuple[float, float], heading_rad: float, room: str | None, but: Collection[int]
     ) -> Landmark | None:
         """Return the door that shows a person where a path ends.
 

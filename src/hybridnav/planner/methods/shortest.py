@@ -14,12 +14,7 @@ from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.geometry import (
-    cells_of_line,
-    line_between,
-    polyline_length,
-    polyline_lengths,
-)
+from hybridnav.maps.geometry import cells_of_line, line_between, polyline_length, polyline_lengths
 from hybridnav.planner.methods.grid import KnownMap, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats

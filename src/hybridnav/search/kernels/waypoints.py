@@ -7,12 +7,7 @@ import heapq
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.moves import (
-    COL_STEP,
-    DIAGONAL,
-    ROW_STEP,
-    STRAIGHT,
-)
+from hybridnav._base.kernels.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 
 @guarded

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -237,9 +236,7 @@ class MeshSearch:
             progress(2, 2)
 
     def adopt(
-        self,
-        edges: tuple[LongArray, IntArray] | None,
-        graph: CornerGraph | CornerHierarchy | None,
+        self, edges: tuple[LongArray, IntArray] | None, graph: CornerGraph | CornerHierarchy | None
     ) -> None:
         """Use a graph of corners of the same mesh, with its edges, for all later queries.
 

@@ -79,10 +79,7 @@ class RmfFloor:
         """Return the floor."""
         graph = WaypointGraph(**self.gathered.fields("rmf", name))
         return FloorGraph(
-            name=self.name,
-            graph=graph,
-            elevation_m=self.elevation_m,
-            doors=tuple(self.doors),
+            name=self.name, graph=graph, elevation_m=self.elevation_m, doors=tuple(self.doors)
         )
 
 

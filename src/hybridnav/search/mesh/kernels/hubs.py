@@ -18,14 +18,7 @@ import numpy as np
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import is_legal, turn_of
-from hybridnav.search.mesh.kernels.polyanya import (
-    DONE,
-    EXPANDED,
-    WORK_FULL,
-    pop,
-    push,
-    put_corner,
-)
+from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, pop, push, put_corner
 from hybridnav.search.mesh.kernels.squares import line_before
 from hybridnav.search.mesh.kernels.views import distance, lobe_of
 
