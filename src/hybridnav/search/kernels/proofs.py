@@ -235,6 +235,7 @@ def strings_of(walls, grain, ends, points, limit):
         float64 (n, 3), (row, col) of each corner, and the length of the string to it.
     """
     rows, cols = walls.shape
+    # By corner: the string's length and the corner before it; those found, in a heap.
     runs = _runs_of(walls)
     length = np.full((rows, cols), np.inf)
     before = np.full((rows, cols), np.int64(-1))
@@ -264,10 +265,12 @@ def strings_of(walls, grain, ends, points, limit):
                     last = back // cols * grain, back % cols * grain
                 string = row - last[0], col - last[1]
                 sector = _sector(walls, corner_row, corner_col, string, up)
+            # The first shaft, unless the sector is empty.
             left = 0
             if corner_row < 0 or sector[3] * sector[0] > sector[1] * sector[2]:
                 shafts[0] = row // grain if up > 0 else -(-row // grain) - 1, *sector
                 left = 1
+            # Each shaft in one row of cells: the columns between its directions there.
             while left > 0:
                 left -= 1
                 at, low, low_col, high, high_col = shafts[left]
@@ -298,6 +301,7 @@ def strings_of(walls, grain, ends, points, limit):
                     ):
                         if _bend(walls, line, to, up)[0] == 0:
                             continue
+                        # A string over it is worth a look if the rest may be straight.
                         over = so_far + math.hypot(line - y, to - x)
                         whole = over + math.hypot(line - ends[1, 0], to - ends[1, 1])
                         if whole < limit and over < length[line, to]:

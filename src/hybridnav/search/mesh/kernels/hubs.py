@@ -125,14 +125,18 @@ def labels_of_corners(mesh, edges, ranked, most):
     work = _room_for(n, len(edges[1]))
     costs, before, touched, heap = work
     to_hub = np.full(len(ranked), np.inf)
+    ranks = np.full(n, np.int64(len(ranked)))
     # Each corner has a run of entries in a common pool, and moves to a longer one when it is full.
     begin, count, room = np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros(n, np.int32)
     hubs, lengths, onward = np.empty(4096, np.int32), np.empty(4096), np.empty(4096, np.int32)
     used = total = 0
     for rank in range(len(ranked)):
         root = ranked[rank]
+        ranks[root] = rank
+        # The labels of the root by hub, for the tests below.
         for k in range(begin[root], begin[root] + count[root]):
             to_hub[hubs[k]] = lengths[k]
+        # Dijkstra from the root, which looks no further where labels say as much.
         costs[root], before[root], touched[0] = 0.0, -1, root
         size, n_touched = push(heap, 0, 0.0, root), 1
         while size:
@@ -140,11 +144,15 @@ def labels_of_corners(mesh, edges, ranked, most):
             size = pop(heap, size)
             if cost > costs[here]:
                 continue
+            # A hub of before, which may be the corner itself, lies on a path that is as short.
+            if ranks[here] < rank and to_hub[ranks[here]] <= cost + _SAME:
+                continue
             at, stop = begin[here], begin[here] + count[here]
             while at < stop and to_hub[hubs[at]] + lengths[at] > cost + _SAME:
                 at += 1
             if at < stop:
                 continue
+            # Write the entry, and move the run where it is full.
             if here != root:
                 if count[here] == room[here]:
                     room[here] = max(8, 2 * room[here])
@@ -160,12 +168,14 @@ def labels_of_corners(mesh, edges, ranked, most):
                 count[here] += 1
                 total += 1
             size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
+        # Only what was touched is reset.
         for corner in touched[:n_touched]:
             costs[corner] = np.inf
         for k in range(begin[root], begin[root] + count[root]):
             to_hub[hubs[k]] = np.inf
         if total > most:
             return begin, hubs[:0], lengths[:0], onward[:0], False
+    # The runs one behind the other, in the order of the corners.
     offset = np.zeros(n + 1, np.int64)
     for corner in range(n):
         offset[corner + 1] = offset[corner] + count[corner]
@@ -286,9 +296,11 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     mask = (np.int64(1) << shift) - 1
     none = np.empty(0, np.int32)
     counts[:] = 0
+    # The straight line, if nothing is in between.
     bounds[:] = math.hypot(tx - sx, ty - sy)
     if _see_each_other(polygon_at, cells, endpoints):
         return DONE, _path_through(mesh, endpoints, none, none)
+    # The corners in sight of the squares of both ends.
     low, high = view_of_square(mesh, labels, sx, sy, sights[0], costs[0])
     to_low, to_high = view_of_square(mesh, labels, tx, ty, sights[1], costs[1])
     if high < 0 or to_high < 0:
@@ -336,11 +348,13 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
                 else:
                     best, best_hub = reached + (least[hub] >> ABOVE), hub
                     one, two = low + k, to_low + m
+    # Only what was touched is reset. Then the path from hub to hub, and its length in order.
     for hub in touched[:n_touched]:
         least[hub] = FAR
     bounds[:] = np.inf if one < 0 else best * layout[3]
     if one < 0 or effort[2] == 0:
         return DONE, np.empty((0, 2))
+    # The corners from either end to the hub.
     there = _corners_to(labels, views[one, 0] >> 1, best_hub, shift)
     back = _corners_to(labels, views[two, 0] >> 1, best_hub, shift)
     path = _path_through(mesh, endpoints, there, back)
