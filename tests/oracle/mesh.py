@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from hybridnav.search.mesh import ConvexMesh, MeshSearch
 from hybridnav.search.mesh.build import find_edges
 
-KINDS = "intervals", "landmarks", "hierarchy", "labels"
-"""What a search of a mesh may search."""
+SEARCHED = "intervals", "landmarks", "hierarchy"
+"""What a search of a mesh may search, also of one that was cut."""
+KINDS = *SEARCHED, "labels"
+"""The same of a mesh as it was built."""
 
 
 def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
@@ -24,7 +26,7 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
         )
         search.prepare()
     if kind == "labels":
-        assert search.label(10.0)
+        assert search.label(100.0)
     return search
 
 

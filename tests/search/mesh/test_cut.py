@@ -29,7 +29,7 @@ from hybridnav.search.mesh import search as searches
 from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
-    KINDS,
+    SEARCHED,
     assert_sides_agree,
     corners_in_use,
     edges_between_corners,
@@ -82,7 +82,7 @@ def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     assert twice_the_area(mesh) == 2 * left.sum()
     assert_as_fresh(mesh, left)
     assume(left.any())
-    assert_shortest([search_of(mesh, kind) for kind in KINDS], left, seed)
+    assert_shortest([search_of(mesh, kind) for kind in SEARCHED], left, seed)
 
 
 def test_a_mesh_without_a_change_is_the_same() -> None:
@@ -159,7 +159,7 @@ def test_a_renewed_mesh_is_as_good_as_a_fresh_one(maps: list[Any], seed: int) ->
         assert twice_the_area(mesh) == 2 * free.sum()
         assert_as_fresh(mesh, free)
         if free.any():
-            searches = [search_of(mesh, kind) for kind in KINDS]
+            searches = [search_of(mesh, kind) for kind in SEARCHED]
             assert_shortest([*searches, prepared_by_queries(mesh, free)], free, seed)
 
 
@@ -178,7 +178,7 @@ def test_a_door_that_opens_and_closes_leaves_the_other_polygons_as_they_are() ->
         mesh = renewed
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SEARCHED)
 def test_corners_at_which_walls_run_straight_on_are_left_out(kind: str) -> None:
     old = drawn("#..", "#.#", "...", "#..", "#..", "##.", "#..") == CellClass.FREE
     free = drawn("#.#", "#..", "#.#", "#..", ".#.", "##.", "#..") == CellClass.FREE

@@ -253,6 +253,8 @@ class MeshSearch:
     def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
         """Build hub labels of the corners, which answer later queries in microseconds.
 
+        The mesh must be as it was built: one that was renewed does not know which cells are free.
+
         Parameters
         ----------
         most_mb
