@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 58_230,
-    "lines": 96_330,
-    "files": 396,
-    "code outside ext": 40_139,
-    "lines of a file, median": 265.0,
+    "code": 59_867,
+    "lines": 99_026,
+    "files": 399,
+    "code outside ext": 41_809,
+    "lines of a file, median": 274,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
-    "arrows, with single modules": 78,
-    "files visited by paper": 51,
-    "lines visited by paper": 13_061,
-    "modules of a plan and a picture": 130,
+    "arrows, with single modules": 79,
+    "files visited by paper": 52,
+    "lines visited by paper": 13_483,
+    "modules of a plan and a picture": 133,
     "imports, % of the code": 9.4,
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 60_018,
+    "lines of tests": 61_014,
 }
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, filled, frozen, on_demand
 from hybridnav._base.messages import path_message
 from hybridnav._base.poses import Motion
-from hybridnav.maps.geometry import centres
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -230,6 +229,9 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     points: Any = found.points
     cells, length_m = found.cells_on_demand, found.cost_m
     if points is None:
+        # Compiled: a copy of a result needs none.
+        from hybridnav.maps.geometry import centres  # noqa: PLC0415
+
         points = partial(centres, found.cells, frame.for_kernels)
     else:
         points = frozen(points if is_of_cells or length_m > 0 else points[:1])

@@ -46,8 +46,8 @@ class RoomWalls:
                 cell, beside = (np.divmod(each, label_of.shape[1]) for each in (own, other))
                 is_own = inside[cell]
                 over = np.subtract(beside, cell)[:, is_own]
-                way = np.select([over[1] > 0, over[0] > 0, over[1] < 0], [0, 1, 2], 3)
-                exit_of[self._side(cell[0][is_own], cell[1][is_own], way)] = number
+                course = np.select([over[1] > 0, over[0] > 0, over[1] < 0], [0, 1, 2], 3)
+                exit_of[self._side(cell[0][is_own], cell[1][is_own], course)] = number
         self._place: dict[int, tuple[int, int]] = {}
         self.walls: list[list[list[int]]] = []
         """What leads out in each wall as somebody meets it who has the wall at the right hand: its
@@ -56,10 +56,10 @@ class RoomWalls:
         self._lengths: list[FloatArray] = []
         self._follow(following.tolist(), step)
 
-    def _side(self, row: LongArray, col: LongArray, way: LongArray) -> LongArray:
+    def _side(self, row: LongArray, col: LongArray, course: LongArray) -> LongArray:
         """Return the indices of the sides of cells of the room that look along steps."""
         flat = (row - self._first[0]) * self._inside.shape[1] + col - self._first[1]
-        found: LongArray = np.searchsorted(self._sides, 4 * flat + way)
+        found: LongArray = np.searchsorted(self._sides, 4 * flat + course)
         return found
 
     def _length_along(self, sides: list[int], step: int) -> FloatArray:
@@ -134,12 +134,12 @@ class RoomWalls:
 
     def _side_between(self, last: tuple[int, int], here: tuple[int, int]) -> int:
         """Return the side at which a line leaves the room, from a cell of it to another cell."""
-        for way, (up, right) in enumerate(_STEPS):
+        for course, (up, right) in enumerate(_STEPS):
             beside = last[0] + up, last[1] + right
             is_towards = up * (here[0] - last[0]) + right * (here[1] - last[1]) > 0
             if is_towards and not self._inside[beside]:
                 flat = last[0] * self._inside.shape[1] + last[1]
-                return int(np.searchsorted(self._sides, 4 * flat + way))
+                return int(np.searchsorted(self._sides, 4 * flat + course))
         return 0
 
     def met(self, begin: tuple[int, int], hand: Hand) -> Iterator[tuple[int, float]]:
@@ -171,9 +171,9 @@ def _sides_of(inside: BoolArray) -> tuple[LongArray, LongArray]:
     flat = inside.ravel()
     cells = np.flatnonzero(flat)
     sides = np.sort(np.concatenate([4 * cells[~flat[cells + s]] + n for n, s in enumerate(steps)]))
-    cell, way = np.divmod(sides, 4)
-    ahead = cell + steps[(way + 1) % 4]
-    beyond = ahead + steps[way]
-    onward = np.where(flat[ahead], 4 * ahead + way, 4 * cell + (way + 1) % 4)
-    onward = np.where(flat[ahead] & flat[beyond], 4 * beyond + (way - 1) % 4, onward)
+    cell, course = np.divmod(sides, 4)
+    ahead = cell + steps[(course + 1) % 4]
+    beyond = ahead + steps[course]
+    onward = np.where(flat[ahead], 4 * ahead + course, 4 * cell + (course + 1) % 4)
+    onward = np.where(flat[ahead] & flat[beyond], 4 * beyond + (course - 1) % 4, onward)
     return sides, np.searchsorted(sides, onward)
