@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -15,15 +14,14 @@ from hybridnav.cli.common import UsageError, complain
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import GraphReport, RouteGraph
 
 STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
-_FEWEST, _MOST = 2, 3
-"""Numbers of an anchor: latitude, longitude, and the heading if there is one."""
-
 _MOST_PAIRS = 1_000_000
 LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 """Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
@@ -178,16 +176,10 @@ class Fleet:
         UsageError
             When an option is for another format, or one that the format needs is missing.
         """
-        homes = {
-            "--floor": (floor is not None, tuple(ENDINGS)),
-            "--anchor": (anchor is not None, ("osm",)),
-            "--vehicle": (bool(vehicles), ("lif",)),
-            "--no-doors": (no_doors, ("rmf",)),
-        }
-        for option, (is_given, kinds) in homes.items():
-            if is_given and kind not in kinds:
-                known = ", ".join(kinds)
-                raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+        check_homes({"--floor": floor}, ENDINGS, f"--format {kind}")
+        check_homes({"--anchor": anchor}, ("osm",), f"--format {kind}")
+        check_homes({"--vehicle": vehicles or None}, ("lif",), f"--format {kind}")
+        check_homes({"--no-doors": no_doors or None}, ("rmf",), f"--format {kind}")
         if kind not in ENDINGS:
             return None
         if kind == "osm" and anchor is None:
@@ -243,10 +235,16 @@ def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any
     """Refuse styles that are none, and options of the other one."""
     if style not in STYLES:
         raise UsageError(f"--style must be one of {', '.join(STYLES)}, got {style!r:.80}")
-    other = STYLES[style == "lanes"]
-    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
-        if given is not None:
-            raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
+    check_homes(of_roadmaps, ("roadmap",), f"--style {style}")
+    check_homes(of_lanes, ("lanes",), f"--style {style}")
+
+
+def check_homes(given: dict[str, Any], homes: Iterable[str], chosen: str) -> None:
+    """Refuse options that are not None where what is chosen, as `--format rmf`, is no home."""
+    what, _, got = chosen.partition(" ")
+    for option, value in given.items():
+        if value is not None and got not in homes:
+            raise UsageError(f"{option} is for {what} {', '.join(homes)}, got {got}: leave it out")
 
 
 def warn_of_loss(judged: dict[str, GraphReport]) -> None:
@@ -262,12 +260,8 @@ def warn_of_loss(judged: dict[str, GraphReport]) -> None:
 
 def _anchor(text: str) -> hn.ext.graphs.Anchor:
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not _FEWEST <= len(numbers) <= _MOST or not all(map(math.isfinite, numbers)):
-        raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}")
-    try:
-        return hn.ext.graphs.Anchor(*numbers)
+        return hn.ext.graphs.Anchor(*map(float, text.split(",")))
     except hn.errors.InvalidValueError as error:
         raise UsageError(f"--anchor: {error}") from None
+    except (TypeError, ValueError):  # other than two or three, or no numbers
+        raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}") from None
