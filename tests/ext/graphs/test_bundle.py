@@ -310,6 +310,16 @@ def test_rooms_keep_their_numbers_when_a_bundle_is_replaced(tmp_path):
     assert bath == 1
 
 
+def test_names_beyond_sixteen_bits_are_those_of_the_rooms(tmp_path):
+    here = topology_of(HOUSE)
+    names = tuple(f"{name} \U0001f6d7" for name in here.rooms.names)
+    rooms = hn.RoomLabels(names, here.rooms.labels.label_of)
+    bundle_of(hn.TopologicalMap(hn.DualGraphPyramid.build(here.grid, rooms=rooms)), tmp_path / "a")
+    known = yaml.safe_load((tmp_path / "a" / "room_names.yaml").read_text())["rooms"]
+    assert set(known.values()) == set(names)
+    assert set(names) <= set(yaml.safe_load((tmp_path / "a" / "poses.yaml").read_text()))
+
+
 def test_what_is_no_mask_of_a_bundle_is_refused(tmp_path):
     here = topology_of(HOUSE)
     for costs in (["clearance"], ["speed:a", "speed:b"], ["fast:a"]):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from importlib import resources
@@ -17,6 +16,7 @@ from hybridnav._base.trig import atan2, cos, sin
 from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs.files.nav2 import nav2_bytes, nav2_features
+from hybridnav.ext.graphs.files.rmf_write import quoted
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
@@ -343,7 +343,7 @@ def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - on demand
 
     text = resources.files("hybridnav.ext.graphs").joinpath(template).read_text(encoding="utf-8")
-    # Names are written as JSON, which YAML is, too; nothing of it is HTML.
+    # Names are quoted as YAML; nothing of it is HTML.
     environment = Environment(
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -351,7 +351,7 @@ def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701
     )
-    environment.filters["json"] = json.dumps
+    environment.filters["quoted"] = quoted
     return environment.from_string(text).render(**known).encode()
 
 
