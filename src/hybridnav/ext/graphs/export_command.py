@@ -135,6 +135,7 @@ def export(
     }
     check_homes(of_graphs, [each for each in _ENDINGS if each not in _PARTS], f"--format {kind}")
     check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
+    named, lifts = read_points(points) if points else ({}, ())
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -149,8 +150,7 @@ def export(
         return
     own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
-    for_lanes: dict[str, Any] = {"keep": before} if before else {}
-    for_lanes |= {"points": read_points(points)} if points else {}
+    for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
     began = time.perf_counter()
     build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with progress_bar("building the graph") as advance:
@@ -159,7 +159,8 @@ def export(
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        left_out = _write_graph(topology, graph, fleet or robot, out, frame)
+        aim = fleet or (robot and robot._replace(lifts=lifts))
+        left_out = _write_graph(topology, graph, aim, out, frame)
     is_few = fleet is not None or nodes is not None
     pairs = LOSS_PAIRS if report is None and is_few else report
     judged = None

@@ -49,7 +49,7 @@ PointsOption = Annotated[
         "--points",
         metavar="FILE",
         help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
-        "get a node with the name at each.",
+        "get a node with the name at each. Its section lifts: has those of lifts.",
     ),
 ]
 NodesOption = Annotated[
@@ -115,16 +115,17 @@ BundleOption = Annotated[
 OperationsOption = Annotated[
     bool,
     typer.Option(
-        "--operations", help="With --bundle: edges through doors call a service to open them."
+        "--operations", help="With --bundle: edges through doors and to lifts call a service."
     ),
 ]
 
 
 class Bundle(NamedTuple):
-    """The options of a bundle: masks as `costs`, and whether edges have `operations`."""
+    """The options of a bundle: masks as `costs`, whether edges have `operations`, and `lifts`."""
 
     costs: tuple[str, ...]
     operations: bool
+    lifts: tuple[str, ...] = ()
 
     @classmethod
     def checked(cls, folder: Path | None, given: Bundle, others: dict[str, Any]) -> Bundle | None:
@@ -207,28 +208,37 @@ class Fleet:
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
 
 
-def read_points(path: Path) -> dict[str, tuple[float, float]]:
-    """Return the named points of a YAML file, in metres.
+def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
+    """Return the named points of a YAML file, in metres, and which of them are lifts.
 
     Raises
     ------
     UsageError
-        When it is no mapping of names to points or poses.
+        When it is no mapping of names to points or poses, or has a name twice.
     """
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
-    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415
 
-    found = {}
-    for name, value in read_yaml(path, what="points", error=MapError).items():
-        pose = value.get("pose", value) if isinstance(value, dict) else value
-        at = pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
-        if at is None:
+    given, lifts = read_yaml(path, what="points", error=MapError), {}
+    if isinstance(given.get("lifts"), dict) and _pair(given["lifts"]) is None:
+        lifts = given.pop("lifts")
+    found: dict[str, tuple[float, float]] = {}
+    for name, value in (*given.items(), *lifts.items()):
+        at = _pair(value)
+        if at is None or str(name) in found:
             raise UsageError(
                 f"points {printable(path)}: {brief(name)} must be [x, y] in metres or a pose with "
-                f"a position, got {brief(value)}"
+                f"a position, and be there once, got {brief(value)}"
             )
         found[str(name)] = at
-    return found
+    return found, tuple(map(str, lifts))
+
+
+def _pair(value: Any) -> tuple[float, float] | None:
+    """Return the point of a pair or pose, None for no such thing."""
+    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415 - on demand
+
+    pose = value.get("pose", value) if isinstance(value, dict) else value
+    return pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
 
 
 def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
