@@ -145,8 +145,8 @@ def export(
     )
     if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
-            _write_parts(topology, kind, out, frame)
-        _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
+            parts = _write_parts(topology, kind, (out, map_file), frame)
+        _respond(*parts, seconds, as_json=as_json)
         return
     own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
@@ -309,22 +309,18 @@ def _write_graph(
     return ()
 
 
-def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:
+def _write_parts(
+    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path], frame: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Write rooms or places, and return the figures and lines that are printed of them."""
+    out, map_file = files
     if kind == "rooms":
-        hn.export_rooms(topology.rooms, out, frame=frame)
+        rooms = topology.rooms
+        hn.export_rooms(rooms, out, frame=frame)
+        counts = {"rooms": int(rooms.is_listed.sum()), "doors": len(rooms.listed_doors)}
     else:
         hn.export_places(topology, out, frame=frame)
-
-
-def _parts_answer(
-    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path]
-) -> tuple[dict[str, Any], list[str]]:
-    """Return the figures and lines that are printed of rooms or places that were written."""
-    out, map_file = files
-    counts = {"places": topology.n_places, "arcs": topology.n_arcs}
-    if kind == "rooms":
-        doors = len(topology.rooms.listed_doors)
-        counts = {"rooms": int(topology.rooms.is_listed.sum()), "doors": doors}
+        counts = {"places": topology.n_places, "arcs": topology.n_arcs}
     grid = topology.grid
     counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     lines = [
