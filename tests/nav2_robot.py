@@ -6,6 +6,7 @@ and operations of nav2_route: what these refuse, or stop at, fails here.
 
 import json
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -144,6 +145,8 @@ def called(parameters: dict[str, Any], operations: list[dict[str, Any]], trigger
             assert isinstance(name, str)
             name = name or known[operation["type"]].get("service_name", "")
             assert name, "needs a service"
+            assert re.fullmatch(r"(/[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*)+", name), "no name in ROS"
+            assert len(name) <= 255 - 8, "longer than RMW_TOPIC_MAX_NAME_LENGTH"
             found.append(name)
     return found
 

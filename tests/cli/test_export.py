@@ -10,6 +10,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 import hybridnav as hn
+from hybridnav.ext.graphs.fleet_options import read_points
 from tests.nav2_reader import read_nav2
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
@@ -114,8 +115,28 @@ def test_named_points_come_from_a_file(cli, tmp_path):
     for text in ("dock: [1.5]\n", "dock: here\n", "dock: {x: a, y: 1}\n"):
         (tmp_path / "points.yaml").write_text(text)
         assert cli(*given, "-o", out, "--force").refuses(2, "'dock' must be [x, y] in metres")
+    for text in ("a: [1, 2]\nlifts: {a: [1.5, 2.5]}\n", "lifts: {1: [1, 2], '1': [1.5, 2.5]}\n"):
+        (tmp_path / "points.yaml").write_text(text)
+        assert cli(*given, "-o", out, "--force").refuses(2, "must be", "there once")
     refused = cli(*given, "-o", out, "--force", "--style", "roadmap")
     assert refused.refuses(2, "--points is for --style lanes")
+
+
+@pytest.mark.parametrize(
+    ("text", "points", "lifts"),
+    [
+        ("a: [1, 2]\nlifts: {b: [3, 4], 5: {x: 6, y: 7}}", "a b 5", "b 5"),
+        ("lifts: {}\na: [1, 2]", "a", ""),
+        # A point or pose of that name, as of a room, is none.
+        ("lifts: [1, 2]", "lifts", ""),
+        ("lifts: {position: {x: 1, y: 2}, orientation: {x: 0, y: 0}}", "lifts", ""),
+        ("lifts: {pose: {position: {x: 1, y: 2}}}", "lifts", ""),
+    ],
+)
+def test_lifts_have_a_section_of_the_points(tmp_path, text, points, lifts):
+    (tmp_path / "points.yaml").write_text(text)
+    found = read_points(tmp_path / "points.yaml")
+    assert ([*found[0]], [*found[1]]) == (points.split(), lifts.split())
 
 
 def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
@@ -130,6 +151,10 @@ def test_a_bundle_holds_the_graph_masks_and_parameters(cli, tmp_path):
     done = cli(*given, "--operations", "--keep", folder / "graph.geojson")
     assert (done.code, "changed    nothing" in done.out.splitlines()) == (0, True)
     assert read_nav2(folder / "graph.geojson").edges == graph.edges
+    (tmp_path / "points.yaml").write_text("lifts: {north: [0.35, 1.5]}")
+    lift = ("--points", tmp_path / "points.yaml", "--operations", "--bundle", tmp_path / "lift")
+    assert cli(*given[:4], *lift).code == 0
+    assert "/lift_north/call" in (tmp_path / "lift" / "graph.geojson").read_text()
     # Edges in a keepout zone are gone, and at the next time nothing has changed.
     (x, y), (u, v) = next(iter(graph.lines.values()))
     corner = [(x + u) / 2 - 0.05, (y + v) / 2 - 0.05, 0]

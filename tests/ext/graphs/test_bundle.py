@@ -217,6 +217,65 @@ def test_doors_are_opened_by_services_that_the_server_knows(tmp_path):
     assert any("operations" in edge for edge in edges)
 
 
+# Names that YAML, JSON or ROS would take for something else, and one that a room has, too.
+LIFTS = {
+    "\u5317 \U0001f6d7": "/lift_u5317_U0001f6d7/call",
+    '"}, \\: [#\n- {{ ../..': "/lift/call",
+    "1": "/lift_1/call",
+    "kitchen": "/lift_kitchen/call",
+    "x" * 300: f"/lift_{'x' * 195}/call",
+}
+SPOTS = ((3.3, 5.3), (15.8, 2.9), (20.26, 5.7), (2.6, 3.7), (6.0, 3.5))  # the fourth in a door
+
+
+@pytest.mark.parametrize("is_one_way", [False, True])
+def test_edges_that_end_at_a_lift_call_it_after_doors(tmp_path, is_one_way):
+    here = topology_of(HOUSE, robot_radius_m=0.3)
+    points = dict(zip(LIFTS, SPOTS, strict=True))
+    graph = build_lane_graph(here, points=points | {"dock": (11.0, 5.3)})
+    if is_one_way:
+        graph = hn.ext.graphs.keep_right(here, graph, apart_m=0.8)
+    folder, counts = tmp_path / "robot", set()
+    for operations in (False, True):
+        export_bundle(here, graph, folder, operations=operations, lifts=iter(LIFTS))
+        parameters, edges, nodes = read_bundle(folder)
+        server = parameters["route_server"]["ros__parameters"]
+        for edge in edges:
+            name, doors = nodes[edge["endid"]][1].get("name"), edge["metadata"].get("doors", [])
+            expected = [f"/door_{n}/open" for n in doors if not here.rooms.door(n).is_opening]
+            expected += [LIFTS[name]] if name in LIFTS else []
+            listed = edge.get("operations", [])
+            assert called(server, listed, "ON_ENTER") == (expected if operations else [])
+            asked = [each["metadata"]["lift"] for each in listed if each["type"] == "CallLift"]
+            assert asked == ([name] if operations and name in LIFTS else [])
+            counts.add((len(expected), bool(name in LIFTS)))
+        assert ("CallLift" in (folder / "README.md").read_text()) == operations
+        poses = yaml.safe_load((folder / "poses.yaml").read_text())
+        for name, spot in points.items():
+            at = poses[name]["position"]
+            assert (at["x"], at["y"]) == pytest.approx(spot, abs=0.5 / 16)
+    assert {(0, False), (1, False), (1, True), (2, True)} <= counts
+    read_nav2(folder / "graph.geojson")
+    export_bundle(here, graph, folder, operations=True)
+    assert not any("CallLift" in path.read_text("latin-1") for path in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("lifts", "words"),
+    [
+        (["c"], "lift 'c' must be a named point"),
+        ([None], "must be a named point"),
+        (["a b", "a-b"], "'a-b' must be .* a service that no other lift has, got /lift_a_b/call"),
+    ],
+)
+def test_lifts_that_are_none_or_called_alike_are_refused(tmp_path, lifts, words):
+    here = topology_of(HOUSE)
+    graph = build_lane_graph(here, points={"a b": (3.3, 5.3), "a-b": (15.8, 2.9)})
+    with pytest.raises(hn.errors.InvalidValueError, match=words):
+        export_bundle(here, graph, tmp_path / "robot", lifts=lifts)
+    assert not (tmp_path / "robot").exists()
+
+
 def test_servers_and_filters_of_masks_speak_of_the_same_topics(tmp_path):
     here = topology_of(HOUSE)
     masks = {
@@ -308,6 +367,16 @@ def test_rooms_keep_their_numbers_when_a_bundle_is_replaced(tmp_path):
     assert {number: name for number, name in after.items() if name != "bath"} == old
     (bath,) = set(after) - set(old)
     assert bath == 1
+
+
+def test_names_beyond_sixteen_bits_are_those_of_the_rooms(tmp_path):
+    here = topology_of(HOUSE)
+    names = tuple(f"{name} \U0001f6d7" for name in here.rooms.names)
+    rooms = hn.RoomLabels(names, here.rooms.labels.label_of)
+    bundle_of(hn.TopologicalMap(hn.DualGraphPyramid.build(here.grid, rooms=rooms)), tmp_path / "a")
+    known = yaml.safe_load((tmp_path / "a" / "room_names.yaml").read_text())["rooms"]
+    assert set(known.values()) == set(names)
+    assert set(names) <= set(yaml.safe_load((tmp_path / "a" / "poses.yaml").read_text()))
 
 
 def test_what_is_no_mask_of_a_bundle_is_refused(tmp_path):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+import re
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -15,8 +15,9 @@ import numpy as np
 from hybridnav._base.files import printable
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav._base.yaml_file import read_yaml
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.graphs.files.nav2 import nav2_bytes, nav2_features
+from hybridnav.ext.graphs.files.rmf_write import quoted
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
@@ -27,7 +28,7 @@ from hybridnav.planner.speed import SpeedMap
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,13 +81,14 @@ class _Mask:
         return {f"{self.kind}_mask.pgm": image, f"{self.kind}_mask.yaml": described}
 
 
-def export_bundle(  # noqa: PLR0913 - the last three have defaults
+def export_bundle(  # noqa: PLR0913 - the last four have defaults
     topology: TopologicalMap,
     graph: RouteGraph,
     folder: PathLike,
     *,
     costs: Sequence[str] = (),
     operations: bool = False,
+    lifts: Iterable[str] = (),
     frame: str = "map",
 ) -> tuple[str, ...]:
     """Write all that Nav2 needs of a map into one folder, or nothing.
@@ -94,8 +96,8 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
     The folder holds `graph.geojson`, whose edges have metadata for the scorers of the route server;
     `rooms_mask.yaml`, in which the value of a cell is the number of its room, and `room_names.yaml`
     with these numbers; `keepout_mask.yaml` and `speed_mask.yaml`, if they are given; `poses.yaml`,
-    goals in rooms and doors; `nav2_params.yaml`, to be merged into the parameters of the robot; and
-    a `README.md`.
+    goals in rooms, doors and lifts; `nav2_params.yaml`, to be merged into the parameters of the
+    robot; and a `README.md`.
 
     Parameters
     ----------
@@ -111,7 +113,10 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
         at most. Edges through keepout zones are left out, speed limits become metadata of edges.
     operations
         Whether edges through doors ask to open them: an operation `OpenDoor` at the entry of the
-        edge, with the door's own service. Without a server for it, Nav2 ends the route there.
+        edge, with the door's own service. Without a server for it, Nav2 ends the route there. Edges
+        that end at a lift call it likewise, by `CallLift`.
+    lifts
+        Named points of the graph at which lifts are, each a goal.
     frame
         Name of the map frame.
 
@@ -124,7 +129,8 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
     ------
     InvalidValueError
         When the map has no rooms, the graph is one of another map or keeps no edge, a mask has
-        another form, or the folder holds other files.
+        another form, a lift is no named point or has the service of another one, or the folder
+        holds other files.
     MapError
         When a mask cannot be read, or the folder cannot be written.
 
@@ -160,8 +166,9 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
     for edge, known in zip(edges, _edge_facts(topology.rooms, graph, specs), strict=True):
         edge["properties"]["metadata"] |= known
     doors = {door.number: door for door in topology.rooms.doors}
+    services = _services(graph, lifts)
     if operations:
-        _add_operations(edges, graph, doors)
+        _add_operations(edges, graph, doors, services)
     kept = [edge for edge, is_open in zip(edges, _open(graph, specs), strict=True) if is_open]
     if not kept:
         raise InvalidValueError("keepout zones leave the graph no edge: give another mask")
@@ -174,9 +181,9 @@ def export_bundle(  # noqa: PLR0913 - the last three have defaults
         "rooms": sorted((number, name) for name, number in numbers.items()),
         "left_out": left_out,
         "masks": masks,
-        "operations": operations,
+        "operations": ["OpenDoor", *["CallLift"] * bool(services)] * operations,
         "classes": _CLASSES,
-        "poses": _poses(topology.rooms, graph, doors),
+        "poses": _poses(topology.rooms, graph, doors, services),
     }
     files = {_GRAPH: nav2_bytes(grid.name, nodes + kept)}
     for mask in masks:
@@ -302,20 +309,45 @@ def _open(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> list[bool]:
     return [least == 1 for least in _least(graph, np.where(shut, 0.5, 1.0)).tolist()]
 
 
+def _services(graph: RouteGraph, lifts: Iterable[str]) -> dict[str, str]:
+    """Return the service that calls each lift."""
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(lifts):
+        # Names in ROS have 247 letters of ASCII at most: others become their codes.
+        text = f"lift {name}".encode("ascii", "backslashreplace").decode()
+        service = f"/{re.sub('[^0-9A-Za-z]+', '_', text)[:200].strip('_')}/call"
+        if name is None or name not in graph.names or service in found.values():
+            raise InvalidValueError(
+                f"lift {brief(name)} must be a named point of the graph, with a service that no "
+                f"other lift has, got {service}: rename it"
+            )
+        found[name] = service
+    return found
+
+
 def _add_operations(
-    edges: Sequence[dict[str, Any]], graph: RouteGraph, doors: Mapping[int, Door]
+    edges: Sequence[dict[str, Any]],
+    graph: RouteGraph,
+    doors: Mapping[int, Door],
+    services: Mapping[str, str],
 ) -> None:
-    """Let each edge ask for its doors, at its entry; openings have nothing to open."""
-    asks = {"type": "OpenDoor", "trigger": "ON_ENTER"}
-    for edge, passed in zip(edges, graph.edge_doors, strict=True):
+    """Let each edge ask for its doors, and for the lift where it ends, at its entry; openings have
+    nothing to open."""
+    for edge, passed, head in zip(edges, graph.edge_doors, graph.edges[:, 1].tolist(), strict=True):
         shut = [number for number in passed if not doors[number].is_opening]
         known = [{"door": number, "service_name": f"/door_{number}/open"} for number in shut]
+        name = graph.names[head]
+        known += [{"lift": name, "service_name": services[name]}] if name in services else []
         if known:
-            edge["properties"]["operations"] = [asks | {"metadata": each} for each in known]
+            edge["properties"]["operations"] = [
+                {"type": "OpenDoor" if "door" in each else "CallLift", "trigger": "ON_ENTER"}
+                | {"metadata": each}
+                for each in known
+            ]
 
 
 def _poses(
-    rooms: Rooms, graph: RouteGraph, doors: Mapping[int, Door]
+    rooms: Rooms, graph: RouteGraph, doors: Mapping[int, Door], lifts: Iterable[str]
 ) -> list[tuple[str, tuple[float, ...]]]:
     """Return goals by name: x and y in metres, and z and w of the heading's quaternion."""
     names = np.array(rooms.names)[rooms.is_listed & rooms.fits].tolist()
@@ -335,7 +367,9 @@ def _poses(
             half = atan2(sign * ahead[1], sign * ahead[0]) / 2
             name = f"door {number} into {'no room' if room is None else room}"
             found.append((name, (*at.tolist(), sin(half), cos(half))))
-    return [(name, tuple(round(value, 4) for value in values)) for name, values in found]
+    of_lifts = {name: (*graph.points[graph.names.index(name)].tolist(), 0.0, 1.0) for name in lifts}
+    by_name = dict(found) | of_lifts  # a room of that name is left for the lift
+    return [(name, tuple(round(value, 4) for value in at)) for name, at in by_name.items()]
 
 
 def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
@@ -343,7 +377,7 @@ def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - on demand
 
     text = resources.files("hybridnav.ext.graphs").joinpath(template).read_text(encoding="utf-8")
-    # Names are written as JSON, which YAML is, too; nothing of it is HTML.
+    # Names are quoted as YAML; nothing of it is HTML.
     environment = Environment(
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -351,7 +385,7 @@ def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701
     )
-    environment.filters["json"] = json.dumps
+    environment.filters["quoted"] = quoted
     return environment.from_string(text).render(**known).encode()
 
 

@@ -42,6 +42,7 @@ from hybridnav.ext.graphs.fleet_options import (
     ReportOption,
     StyleOption,
     VehiclesOption,
+    check_homes,
     check_style,
     read_points,
     warn_of_loss,
@@ -119,25 +120,22 @@ def export(
     """
     others = {"--out": out, f"--format {kind}": kind != "nav2"}
     robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
-    out = bundle or _checked_out(kind, out)
+    out = bundle or _checked_out(kind, out, force=force)
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
-    if kind in _PARTS:
-        _check_plain(
-            kind,
-            {
-                "--style": style != STYLES[0],
-                "--points": points is not None,
-                "--keep": keep is not None,
-                "--nodes": nodes is not None,
-                "--spacing": spacing_m is not None,
-                "--lanes": lanes_m is not None,
-                "--report": report is not None,
-                "--plot": plot is not None,
-            },
-        )
+    of_graphs = {
+        "--style": None if style == STYLES[0] else style,
+        "--points": points,
+        "--keep": keep,
+        "--nodes": nodes,
+        "--spacing": spacing_m,
+        "--lanes": lanes_m,
+        "--report": report,
+        "--plot": plot,
+    }
+    check_homes(of_graphs, [each for each in _ENDINGS if each not in _PARTS], f"--format {kind}")
     check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
-    _check_taken(out, force=force)
+    named, lifts = read_points(points) if points else ({}, ())
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -147,13 +145,12 @@ def export(
     )
     if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
-            _write_parts(topology, kind, out, frame)
-        _respond(*_parts_answer(topology, kind, (out, map_file)), seconds, as_json=as_json)
+            parts = _write_parts(topology, kind, (out, map_file), frame)
+        _respond(*parts, seconds, as_json=as_json)
         return
     own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
-    for_lanes: dict[str, Any] = {"keep": before} if before else {}
-    for_lanes |= {"points": read_points(points)} if points else {}
+    for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
     began = time.perf_counter()
     build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with progress_bar("building the graph") as advance:
@@ -162,7 +159,8 @@ def export(
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        left_out = _write_graph(topology, graph, fleet or robot, out, frame)
+        aim = fleet or (robot and robot._replace(lifts=lifts))
+        left_out = _write_graph(topology, graph, aim, out, frame)
     is_few = fleet is not None or nodes is not None
     pairs = LOSS_PAIRS if report is None and is_few else report
     judged = None
@@ -211,14 +209,13 @@ def _export_over_floors(
     reading: MapOptions,
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    out = _checked_out(kind, out)
+    out = _checked_out(kind, out, force=force)
     check_style(style, {"--nodes": nodes}, {})
     fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
         raise UsageError(
             f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
         )
-    _check_taken(out, force=force)
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
 
     seconds: dict[str, float] = {}
@@ -284,28 +281,16 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _checked_out(kind: str, out: Path | None) -> Path:
-    """Refuse formats that are none, and files of other ones."""
+def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
+    """Refuse formats that are none, files of other ones, and to write over a file."""
     if out is None:
         raise UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     check_output(out, "--out", _ENDINGS[kind])
-    return out
-
-
-def _check_taken(out: Path, *, force: bool) -> None:
-    """Refuse to write over a file."""
     if out.is_file() and not force:
         raise UsageError(f"{printable(out)} exists: add --force to write over it")
-
-
-def _check_plain(kind: str, given: dict[str, bool]) -> None:
-    """Refuse options of graphs for a format that has none."""
-    for option, is_given in given.items():
-        if is_given:
-            known = ", ".join(each for each in _ENDINGS if each not in _PARTS)
-            raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+    return out
 
 
 def _write_graph(
@@ -324,22 +309,18 @@ def _write_graph(
     return ()
 
 
-def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:
+def _write_parts(
+    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path], frame: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Write rooms or places, and return the figures and lines that are printed of them."""
+    out, map_file = files
     if kind == "rooms":
-        hn.export_rooms(topology.rooms, out, frame=frame)
+        rooms = topology.rooms
+        hn.export_rooms(rooms, out, frame=frame)
+        counts = {"rooms": int(rooms.is_listed.sum()), "doors": len(rooms.listed_doors)}
     else:
         hn.export_places(topology, out, frame=frame)
-
-
-def _parts_answer(
-    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path]
-) -> tuple[dict[str, Any], list[str]]:
-    """Return the figures and lines that are printed of rooms or places that were written."""
-    out, map_file = files
-    counts = {"places": topology.n_places, "arcs": topology.n_arcs}
-    if kind == "rooms":
-        doors = len(topology.rooms.listed_doors)
-        counts = {"rooms": int(topology.rooms.is_listed.sum()), "doors": doors}
+        counts = {"places": topology.n_places, "arcs": topology.n_arcs}
     grid = topology.grid
     counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     lines = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -15,15 +14,14 @@ from hybridnav.cli.common import UsageError, complain
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import GraphReport, RouteGraph
 
 STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
-_FEWEST, _MOST = 2, 3
-"""Numbers of an anchor: latitude, longitude, and the heading if there is one."""
-
 _MOST_PAIRS = 1_000_000
 LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 """Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
@@ -51,7 +49,7 @@ PointsOption = Annotated[
         "--points",
         metavar="FILE",
         help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
-        "get a node with the name at each.",
+        "get a node with the name at each. Its section lifts: has those of lifts.",
     ),
 ]
 NodesOption = Annotated[
@@ -117,16 +115,17 @@ BundleOption = Annotated[
 OperationsOption = Annotated[
     bool,
     typer.Option(
-        "--operations", help="With --bundle: edges through doors call a service to open them."
+        "--operations", help="With --bundle: edges through doors and to lifts call a service."
     ),
 ]
 
 
 class Bundle(NamedTuple):
-    """The options of a bundle: masks as `costs`, and whether edges have `operations`."""
+    """The options of a bundle: masks as `costs`, whether edges have `operations`, and `lifts`."""
 
     costs: tuple[str, ...]
     operations: bool
+    lifts: tuple[str, ...] = ()
 
     @classmethod
     def checked(cls, folder: Path | None, given: Bundle, others: dict[str, Any]) -> Bundle | None:
@@ -178,16 +177,10 @@ class Fleet:
         UsageError
             When an option is for another format, or one that the format needs is missing.
         """
-        homes = {
-            "--floor": (floor is not None, tuple(ENDINGS)),
-            "--anchor": (anchor is not None, ("osm",)),
-            "--vehicle": (bool(vehicles), ("lif",)),
-            "--no-doors": (no_doors, ("rmf",)),
-        }
-        for option, (is_given, kinds) in homes.items():
-            if is_given and kind not in kinds:
-                known = ", ".join(kinds)
-                raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+        check_homes({"--floor": floor}, ENDINGS, f"--format {kind}")
+        check_homes({"--anchor": anchor}, ("osm",), f"--format {kind}")
+        check_homes({"--vehicle": vehicles or None}, ("lif",), f"--format {kind}")
+        check_homes({"--no-doors": no_doors or None}, ("rmf",), f"--format {kind}")
         if kind not in ENDINGS:
             return None
         if kind == "osm" and anchor is None:
@@ -215,38 +208,53 @@ class Fleet:
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
 
 
-def read_points(path: Path) -> dict[str, tuple[float, float]]:
-    """Return the named points of a YAML file, in metres.
+def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
+    """Return the named points of a YAML file, in metres, and which of them are lifts.
 
     Raises
     ------
     UsageError
-        When it is no mapping of names to points or poses.
+        When it is no mapping of names to points or poses, or has a name twice.
     """
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
-    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415
 
-    found = {}
-    for name, value in read_yaml(path, what="points", error=MapError).items():
-        pose = value.get("pose", value) if isinstance(value, dict) else value
-        at = pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
-        if at is None:
+    given, lifts = read_yaml(path, what="points", error=MapError), {}
+    if isinstance(given.get("lifts"), dict) and _pair(given["lifts"]) is None:
+        lifts = given.pop("lifts")
+    found: dict[str, tuple[float, float]] = {}
+    for name, value in (*given.items(), *lifts.items()):
+        at = _pair(value)
+        if at is None or str(name) in found:
             raise UsageError(
                 f"points {printable(path)}: {brief(name)} must be [x, y] in metres or a pose with "
-                f"a position, got {brief(value)}"
+                f"a position, and be there once, got {brief(value)}"
             )
         found[str(name)] = at
-    return found
+    return found, tuple(map(str, lifts))
+
+
+def _pair(value: Any) -> tuple[float, float] | None:
+    """Return the point of a pair or pose, None for no such thing."""
+    from hybridnav.ext.graphs.gather import pair_of  # noqa: PLC0415 - on demand
+
+    pose = value.get("pose", value) if isinstance(value, dict) else value
+    return pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
 
 
 def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
     """Refuse styles that are none, and options of the other one."""
     if style not in STYLES:
         raise UsageError(f"--style must be one of {', '.join(STYLES)}, got {style!r:.80}")
-    other = STYLES[style == "lanes"]
-    for option, given in (of_roadmaps if style == "lanes" else of_lanes).items():
-        if given is not None:
-            raise UsageError(f"{option} is for --style {other}, got {style}: leave it out")
+    check_homes(of_roadmaps, ("roadmap",), f"--style {style}")
+    check_homes(of_lanes, ("lanes",), f"--style {style}")
+
+
+def check_homes(given: dict[str, Any], homes: Iterable[str], chosen: str) -> None:
+    """Refuse options that are not None where what is chosen, as `--format rmf`, is no home."""
+    what, _, got = chosen.partition(" ")
+    for option, value in given.items():
+        if value is not None and got not in homes:
+            raise UsageError(f"{option} is for {what} {', '.join(homes)}, got {got}: leave it out")
 
 
 def warn_of_loss(judged: dict[str, GraphReport]) -> None:
@@ -262,12 +270,8 @@ def warn_of_loss(judged: dict[str, GraphReport]) -> None:
 
 def _anchor(text: str) -> hn.ext.graphs.Anchor:
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not _FEWEST <= len(numbers) <= _MOST or not all(map(math.isfinite, numbers)):
-        raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}")
-    try:
-        return hn.ext.graphs.Anchor(*numbers)
+        return hn.ext.graphs.Anchor(*map(float, text.split(",")))
     except hn.errors.InvalidValueError as error:
         raise UsageError(f"--anchor: {error}") from None
+    except (TypeError, ValueError):  # other than two or three, or no numbers
+        raise UsageError(f"--anchor must be LAT,LON or LAT,LON,DEG, got {text!r:.80}") from None
