@@ -123,11 +123,11 @@ def main(given: Namespace) -> int:
     plan = replace(PLANS[given.study], **{key: n for key, n in own.items() if n is not None})
     data = given.data.resolve()
     lost = lost_of(data)
-    sys.stderr.writelines(f"not in {data}, left out: {name}\n" for name in lost)
     is_whole = plan == PLANS[given.study] and not given.map and not given.part and not lost
     plan = plan if is_whole else replace(plan, name=PART)
     try:
         maps = maps_of(data, given.map)
+        sys.stderr.writelines(f"not in {data}, left out: {name}\n" for name in lost)
         parts = [part for part in parts_of(plan) if given.part in {None, part.name}]
         run(maps, given.out, plan, parts, workers=given.workers, scheduler=given.scheduler)
         kinds = {one.path.relative_to(data).with_suffix("").as_posix(): one.kind for one in maps}

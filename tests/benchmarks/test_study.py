@@ -397,8 +397,8 @@ def test_a_quarter_asks_a_quarter_of_the_pairs():
     ("arguments", "code", "words"),
     [
         ((), 2, "HYBRIDNAV_DATA"),
-        (("--data", "nowhere"), 1, "is not in"),
-        (("--data", str(MAPS)), 1, "of the study is not in"),
+        (("--data", "nowhere"), 1, "no map of the study is in"),
+        (("--data", str(MAPS)), 1, "no map of the study is in"),
     ],
 )
 def test_what_cannot_be_run_is_said_in_one_line(arguments, code, words, monkeypatch, capsys):

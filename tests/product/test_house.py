@@ -5,11 +5,11 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_867,
-    "lines": 99_026,
+    "code": 59_885,
+    "lines": 99_051,
     "files": 399,
-    "code outside ext": 41_809,
-    "lines of a file, median": 274,
+    "code outside ext": 41_815,
+    "lines of a file, median": 275,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_014,
+    "lines of tests": 61_117,
 }
 
 

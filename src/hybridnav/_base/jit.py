@@ -154,7 +154,7 @@ class _Cache(FunctionCache):
             return kept
         key: Any = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
         _, (triple, *_), code = key
-        for level in _levels():
+        for level in levels():
             entry = self._shipped(level).load((sig, (triple, level, ""), code))
             if entry is not None:
                 return self._impl.rebuild(target_context, entry)
@@ -168,7 +168,7 @@ class _Cache(FunctionCache):
 
     def is_warm(self) -> bool:
         """Return whether a version of the kernel is kept, or none can be."""
-        places = [self._cache_file, *map(self._shipped, _levels())]
+        places = [self._cache_file, *map(self._shipped, levels())]
         return self.cache_path is None or any(Path(one._index_path).exists() for one in places)  # noqa: SLF001
 
     def _save_overload(self, sig: Any, data: Any) -> None:
@@ -199,7 +199,7 @@ def is_for_another_numba() -> bool:
 
 
 @cache
-def _levels() -> list[str]:
+def levels() -> list[str]:
     """Return the levels of `LEVELS` that this processor has."""
     has = llvm.get_host_cpu_features()
     return [level for level, features in LEVELS.items() if all(map(has.get, features))]

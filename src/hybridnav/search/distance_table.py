@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from hybridnav._base.kernels.moves import legal_moves
-from hybridnav._base.moves import FAR, STRAIGHT
+from hybridnav._base.moves import FAR, STRAIGHT, length_in_cells
 from hybridnav._base.threads import SHARES, cores
 from hybridnav.maps.costs import UNIT_BITS
 from hybridnav.search.kernels.labels import costs_to_cells, meet
@@ -151,7 +151,7 @@ class GridLabels:
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
         one = np.broadcast_to(np.int32(1 << UNIT_BITS), enterable.shape)
         factors = np.ascontiguousarray(one if units is None else units).ravel()
-        self._grid = moves, factors, enterable.shape[1]
+        self._grid, self._is_plain = (moves, factors, enterable.shape[1]), units is None
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells."""
@@ -177,5 +177,11 @@ class GridLabels:
             row[:] = best[goals]
 
     def lengths(self, table: LongArray) -> FloatArray:
-        """Return costs in cells, within 1e-10 of them, infinite for `FAR`."""
-        return np.where(table < FAR, table / ((2 << UNIT_BITS) * STRAIGHT), np.inf)
+        """Return costs in cells, infinite for `FAR`: lengths exact, others within 1e-10."""
+        found, reached = np.full(table.shape, np.inf), table < FAR
+        unit = 2 << UNIT_BITS
+        costs = table[reached]
+        found[reached] = (
+            length_in_cells(costs // unit) if self._is_plain else costs / (unit * STRAIGHT)
+        )
+        return found

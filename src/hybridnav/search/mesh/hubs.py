@@ -53,7 +53,7 @@ class HubLabels:
     True
     >>> len(search.labels.entries), round(search.path(((0, 0), (0, 2)),
     ...     ((0.5, 0.5), (0.5, 2.5))).length_cells, 3)
-    (6, 2.414)
+    (5, 2.414)
     """
 
     entries: LongArray
