@@ -185,4 +185,4 @@ def test_every_turn_behind_the_doors_of_the_office_is_told() -> None:
 )
 def test_every_turn_behind_the_doors_of_real_floors_is_told(data: FilePath, name: str) -> None:
     topology = found_rooms(data / name)
-    check(until(topology, 15, 60), least_turns=15)
+    check(until(topology, 5, 60), least_turns=5)
