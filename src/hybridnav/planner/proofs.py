@@ -135,11 +135,10 @@ class _Problem:
 
 def _no_path(problem: _Problem) -> dict[str, Any]:
     start, goal = np.floor(problem.ends + 1e-9).astype(np.int64).tolist()
-    chains = [parting_chain(problem.free, *ends) for ends in ((start, goal), (goal, start))]
-    first, second = chains
-    if first is None or second is None:
+    chain = parting_chain(problem.free, start, goal)
+    if chain is None:
         raise PlanError("the two ends are connected: there is no proof that there is no path")
-    return {"kind": "no path", "chain": _walk(min(first, second, key=len))}
+    return {"kind": "no path", "chain": _walk(chain)}
 
 
 def _cells(problem: _Problem) -> dict[str, Any]:

@@ -158,19 +158,13 @@ class Case:
         )
 
     def _cut(self) -> FloatArray | None:
-        """Return the shorter of the chains round the two ends."""
+        """Return the chain of walls that parts the two ends."""
         from hybridnav.search.proofs import parting_chain  # noqa: PLC0415 - loads kernels
 
         if self.grid.corner_cutting:
             return None
-        free, (start, goal) = self._enterable & ~self._shut, self._cells
-        chain = parting_chain(free, start, goal)
-        other = None if chain is None else parting_chain(free, goal, start)
-        if chain is None or other is None:
-            return None
-        shorter = min(chain, other, key=len)
-        points: FloatArray = self.grid.frame.points_of(shorter)
-        return points
+        chain = parting_chain(self._open, *self._cells)
+        return None if chain is None else self.grid.frame.points_of(chain)
 
     # What is closed: cells and moves, and by what.
 
@@ -183,6 +177,11 @@ class Case:
     @cached_property
     def _enterable(self) -> BoolArray:
         return self.grid.enterable(allow_unexplored=self.allow_unexplored)
+
+    @cached_property
+    def _open(self) -> BoolArray:
+        """The cells that may be entered and are not closed."""
+        return self._enterable & ~self._shut
 
     @cached_property
     def _closures(self) -> dict[Closure, LongArray]:
@@ -258,7 +257,7 @@ class Case:
 
     def _nearest(self, point: FloatArray) -> tuple[tuple[float, float] | None, float]:
         """Return the centre of the nearest cell that the robot can stand on, and how far it is."""
-        cells = np.argwhere(self._enterable & ~self._shut)
+        cells = np.argwhere(self._open)
         if not len(cells):
             return None, math.inf
         at = self.grid.frame.position_of(*point[:2].tolist())
@@ -303,7 +302,7 @@ class Case:
         return bool(labels[one] == labels[other] != 0)
 
     def _reached_m2(self) -> tuple[float, float]:
-        labels = self._regions(self._enterable & ~self._shut)
+        labels = self._regions(self._open)
         areas = np.bincount(labels.ravel())
         areas[0] = 0
         rows, cols = self.grid.shape

@@ -161,13 +161,19 @@ def parting_chain(
     LongArray | None
         int64 (n, 2), (row, col), the last one equal to the first one; each is an 8-neighbour of
         the next one. Cells outside the map, from -1 to rows or columns, are its rim. It is the
-        border of all that can be reached from the start, on the side of the goal. None where the
-        two are connected.
+        border of all that can be reached from the one, on the side of the other: the shorter of
+        the two. None where these are connected.
     """
     parts, _ = ndimage.label(np.pad(free, 2))
-    area = parts == parts[start[0] + 2, start[1] + 2]
-    if area[goal[0] + 2, goal[1] + 2]:
+    one, other = (parts[row + 2, col + 2] for row, col in (start, goal))
+    if one == other:
         return None
+    chains = _chain_round(parts == one, goal), _chain_round(parts == other, start)
+    return min(chains, key=len)
+
+
+def _chain_round(area: BoolArray, goal: tuple[int, int]) -> LongArray:
+    """Return the walls round an area of cells, framed by two, on the side of a cell."""
     others, _ = ndimage.label(~area, np.ones((3, 3)))
     side = others == others[goal[0] + 2, goal[1] + 2]
     row, col = divmod(int(np.argmax(area[1:] & side[:-1])), area.shape[1])

@@ -320,7 +320,7 @@ def _read_room(read: Read, entry: dict[str, Any], line: int, grid: OccupancyGrid
 
 
 def _use(entry: dict[str, Any], at: str) -> RoomUse:
-    """Return what an entry says of the use of its room."""
+    """Return the use of a room from its entry in the file."""
     for key, word in (("use", "private"), ("prefer", "corridor")):
         if entry.get(key, word) != word:
             raise RoomsError(f"{at}: {key} must be {word}, got {brief(entry[key])}")
