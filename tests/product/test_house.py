@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_884,
-    "lines": 99_055,
+    "code": 59_881,
+    "lines": 99_051,
     "files": 399,
-    "code outside ext": 41_814,
+    "code outside ext": 41_811,
     "lines of a file, median": 275,
     "lines of a file, most": 450,
     "packages": 12,

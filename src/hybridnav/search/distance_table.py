@@ -166,10 +166,8 @@ class GridLabels:
 
     def direct(self, starts: LongArray, goals: LongArray, table: LongArray) -> None:
         """Set all entries."""
-        is_goal, best = (
-            np.zeros(self._grid[0].size, np.bool_),
-            np.empty(self._grid[0].size, np.int64),
-        )
+        size = self._grid[0].size
+        is_goal, best = np.zeros(size, np.bool_), np.empty(size, np.int64)
         is_goal[goals] = True
         count = int(np.count_nonzero(is_goal))
         for row, start in zip(table, starts.tolist(), strict=True):
@@ -179,9 +177,8 @@ class GridLabels:
     def lengths(self, table: LongArray) -> FloatArray:
         """Return costs in cells, infinite for `FAR`: lengths exact, others within 1e-10."""
         found, reached = np.full(table.shape, np.inf), table < FAR
-        unit = 2 << UNIT_BITS
-        costs = table[reached]
+        unit, cost = 2 << UNIT_BITS, table[reached]
         found[reached] = (
-            length_in_cells(costs // unit) if self._is_plain else costs / (unit * STRAIGHT)
+            length_in_cells(cost // unit) if self._is_plain else cost / (unit * STRAIGHT)
         )
         return found

@@ -161,8 +161,7 @@ def parting_chain(
     LongArray | None
         int64 (n, 2), (row, col), the last one equal to the first one; each is an 8-neighbour of
         the next one. Cells outside the map, from -1 to rows or columns, are its rim. It is the
-        border of all that can be reached from the one, on the side of the other: the shorter of
-        the two. None where these are connected.
+        shorter border of all that one of both reaches, beside the other. None if they are joined.
     """
     parts, _ = ndimage.label(np.pad(free, 2))
     one, other = (parts[row + 2, col + 2] for row, col in (start, goal))
