@@ -14,6 +14,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from hybridnav._base.moves import STEPS, legal_moves, moves_along
 from hybridnav.errors import InvalidValueError, UnsuitableMapError
@@ -161,12 +163,15 @@ class Pyastar2d(Rival):
 
     def between(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two different free cells."""
-        cells = self._find(self._costs, start, goal, allow_diagonal=True)
+        cells = self._cells(start, goal)
         if cells is None:
             return MethodResult(None)
         legal = self._round_corners(np.asarray(cells, dtype=np.int64))
         gave_up = "its path passes between two blocked cells" if legal is None else ""
         return MethodResult(legal, gave_up=gave_up)
+
+    def _cells(self, start: Cell, goal: Cell) -> Any:
+        return self._find(self._costs, start, goal, allow_diagonal=True)
 
     def _round_corners(self, cells: LongArray) -> LongArray | None:
         """Return the path with two straight steps for each diagonal past one blocked cell, None if
@@ -185,17 +190,70 @@ class Pyastar2d(Rival):
         return np.array(round_, dtype=np.int64)
 
 
+class ScikitImage(Pyastar2d):
+    """Dijkstra of scikit-image (`MCP_Geometric`) until the goal is reached, which cuts corners.
+
+    Its paths are made legal as those of `Pyastar2d`.
+    """
+
+    name = package = "scikit-image"
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self._graph = needed_package("skimage").graph
+        Rival.__init__(self, grid, "MCP_Geometric")
+        self._costs = np.where(self.free, 1.0, -1.0)  # below zero is blocked
+        self.memory_bytes = self._costs.nbytes
+
+    def _cells(self, start: Cell, goal: Cell) -> Any:
+        finder = self._graph.MCP_Geometric(self._costs)
+        try:
+            finder.find_costs([start], [goal])
+            return finder.traceback(goal)
+        except ValueError:
+            return None
+
+
+class Scipy(Rival):
+    """Dijkstra of scipy (`csgraph.dijkstra`) over the legal moves, from the start to all cells."""
+
+    name = package = "scipy"
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid, "csgraph.dijkstra")
+        moves, n_cells = legal_moves(self.free, grid.corner_cutting).ravel(), self.free.size
+        parts = []
+        for direction, step in enumerate(STEPS.tolist()):
+            tails, heads = moves_along(moves, grid.shape[1], direction)
+            parts.append((np.full(len(tails), math.hypot(*step)), tails, heads))
+        lengths, tails, heads = (np.concatenate(part) for part in zip(*parts, strict=True))
+        self._moves = csr_array((lengths, (tails, heads)), shape=(n_cells, n_cells))
+        self.n_edges = len(lengths) // 2
+        self.memory_bytes = self._moves.data.nbytes + self._moves.indices.nbytes
+
+    def between(self, start: Cell, goal: Cell) -> MethodResult:
+        """Plan between two different free cells."""
+        first, last = (int(np.ravel_multi_index(cell, self.free.shape)) for cell in (start, goal))
+        _, before = dijkstra(self._moves, indices=[first], return_predecessors=True)
+        if before[0, last] < 0:
+            return MethodResult(None)
+        cells = [last]
+        while cells[-1] != first:
+            cells.append(int(before[0, cells[-1]]))
+        path = np.column_stack(np.unravel_index(cells[::-1], self.free.shape))
+        return MethodResult(path.astype(np.int64), bound=1 + 1e-9)
+
+
 class Networkx(Rival):
     """A* of networkx over a graph of the legal moves."""
 
     name = package = "networkx"
 
-    def __init__(self, grid: OccupancyGrid) -> None:
+    def __init__(self, grid: OccupancyGrid, *, most_cells: int = MAX_NETWORKX_CELLS) -> None:
         super().__init__(grid, "A*, octile heuristic")
-        if self.n_nodes > MAX_NETWORKX_CELLS:
+        if self.n_nodes > most_cells:
             raise UnsuitableMapError(
-                f"a graph of networkx is made of up to {MAX_NETWORKX_CELLS:,} free cells, this map "
-                f"has {self.n_nodes:,}"
+                f"a graph of networkx is made of up to {most_cells:,} free cells, this map has "
+                f"{self.n_nodes:,}"
             )
         self._networkx = needed_package("networkx")
         self._graph = self._networkx.Graph()
