@@ -42,6 +42,8 @@ class Sound(GridAstar):
 class SoundPlaces(HybridMethod):
     """A method without a fault, for the others to derive from: the pyramid's places."""
 
+    ask = None  # type: ignore[assignment]  # `solve` of the others is asked
+
     def __init__(self, grid: OccupancyGrid) -> None:
         pyramid = DualGraphPyramid.build(grid, merge_distance_m=MERGE_DISTANCE_M)
         super().__init__(TopologicalMap(pyramid), Preset())

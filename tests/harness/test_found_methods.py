@@ -99,7 +99,7 @@ def test_a_search_method_is_closed_at_the_end(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(ByCells, "close", close, raising=False)
     grid = hn.OccupancyGrid(np.zeros((3, 4), np.float32), robot_radius_m=0)
     method = prepare(baseline_spec(name_of(ByCells)), grid)
-    assert method.solve((0, 0), (2, 3)).is_path
+    assert method.ask((0, 0), (2, 3))().is_path
     assert not closed
     method.close()
     assert len(closed) == 1

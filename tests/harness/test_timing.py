@@ -87,7 +87,7 @@ def test_the_order_of_methods_is_shuffled_by_a_seed(settings, monkeypatch):
 
     class Made:
         def __init__(self, spec):
-            self.solve = Spy(spec.name).solve
+            self.ask = Spy(spec.name).solve
 
         def close(self):
             asked.append("closed")

@@ -100,8 +100,8 @@ EFFICIENCY_COLUMNS = {
     "work in cells": "expansions times that price: the mean time of a query in the unit in which "
     "the reference expands one cell. Work of different methods can be compared, their expansions "
     "cannot",
-    "query ms, median": "median wall-clock time of one query over these pairs, kernels warm; with "
-    "repeats the time of a pair is their median",
+    "query ms, median": "median wall-clock time of one query over these pairs, from two ends to "
+    "the path, kernels warm; with repeats the time of a pair is their median",
     "query ms, p95": "95th percentile of these times",
     "spread %": "longest minus shortest time of the repeats of a pair, over their median: the "
     "median of this over these pairs",

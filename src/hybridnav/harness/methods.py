@@ -9,7 +9,7 @@ import os
 import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
@@ -20,6 +20,8 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav.harness.baselines import MethodResult, Solver
     from hybridnav.harness.names import NamedMethod
     from hybridnav.maps import OccupancyGrid
@@ -247,11 +249,17 @@ class Prepared:
     is_named: bool = True
     """Whether its name in tables is that of its specification: a class of others names itself."""
 
-    def solve(self, start: tuple[int, int], goal: tuple[int, int]) -> MethodResult:
-        """Return the method's answer; a process that it forked goes no further than this."""
+    def ask(self, start: tuple[int, int], goal: tuple[int, int]) -> Callable[[], MethodResult]:
+        """Ask the method for a path; return what tells the answer whole.
+
+        A process that the method forked goes no further than this.
+        """
         own = os.getpid()
         try:
-            return self.method.solve(start, goal)
+            if ask := getattr(self.method, "ask", None):
+                return cast("Callable[[], MethodResult]", ask(start, goal))
+            answer = self.method.solve(start, goal)
+            return lambda: answer
         finally:
             _end_fork_of(own)
 

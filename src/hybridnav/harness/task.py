@@ -273,7 +273,9 @@ def _of_pair(name: str, pair: Pair, common: Record) -> Record:
 def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     began = time.perf_counter()
     try:
-        answer = prepared.solve(pair.start, pair.goal)
+        tell = prepared.ask(pair.start, pair.goal)
+        seconds = time.perf_counter() - began
+        answer = tell()
     except Exception as error:  # noqa: BLE001 - a failing method is a result
         return {
             "status": "error",
@@ -281,7 +283,6 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
             "traceback": _traceback_of(error),
             "faults": [],
         }
-    seconds = time.perf_counter() - began
     try:
         return _judged(answer, judge, pair, seconds)
     except (
@@ -367,7 +368,7 @@ def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
         Judge(grid, prepared, reference=False, costs=layer)
         for goal in ((2, 2), (grid.shape[0] - 3, 12)):
-            prepared.solve((2, 2), goal)
+            prepared.ask((2, 2), goal)()
     _WARM.add((spec.digest, by_costs))
 
 
