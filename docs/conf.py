@@ -23,6 +23,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "command_help",
     "notebook_pages",
+    "constants",
 ]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 exclude_patterns = ["images", "extensions", "static"]

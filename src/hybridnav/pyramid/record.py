@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 Linkage = Literal["throats", "survivor", "radius", "diameter"]
+"""Rules for the distance that must be below U_d where two fields merge."""
 
 SURVIVES = 255
 """End of a vertex or edge that still exists at the apex."""

@@ -279,6 +279,7 @@ class Tool(NamedTuple):
     """
 
     name: str
+    """Name by which programs call it."""
     asks: type[BaseModel]
     """The model of its arguments. The docstring of the model describes the tool to its callers."""
     gives: type[Answer]

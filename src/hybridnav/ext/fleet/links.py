@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
 
 LinkKind = Literal["lift", "stairs", "ramp"]
+"""Kinds of links between floors."""
 
 
 @dataclass(frozen=True)
