@@ -10,6 +10,8 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sphinx.util import logging as sphinx_logging
+
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
@@ -21,6 +23,7 @@ CACHES = ROOT / "out" / "notebooks"
 _RUN_ON = ("src/**/*.py", "planners/*", "maps/**/*", "requirements.lock")
 _UP_TO_NOTEBOOKS = re.compile(r"\]\(\.\./((?:\.\./)*notebooks/)")
 _FETCHED = re.compile(r'<link rel="stylesheet"\s+href="https://[^"]+/font-awesome[^"]*">')
+_ELSEWHERE = re.compile(r'(?:src|<link[^>]+href)="(?:https?:)?//[^"]+"')
 _QUIET_KERNEL = "c.IPKernelApp.log_level = 'ERROR'  # not that it listens on a local port\n"
 
 
@@ -59,18 +62,24 @@ def mend_links(_app: Sphinx | None, docname: str, source: list[str]) -> None:
 
 
 def fetch_nothing(
-    _app: Sphinx, _page: str, _template: str, context: dict[str, Any], _doctree: object
+    _app: Sphinx, page: str, _template: str, context: dict[str, Any], _doctree: object
 ) -> None:
-    """Remove the link of matplotlib's player to icons on another site; wide.css has them here."""
+    """Remove the link of matplotlib's player to icons on another site; wide.css has them here.
+
+    Whatever else a page would fetch from another site is a warning, which fails the build.
+    """
     if "body" in context:
         context["body"] = _FETCHED.sub("", context["body"])
+        for link in _ELSEWHERE.findall(context["body"]):
+            sphinx_logging.getLogger(__name__).warning("%s fetches %s", page, link)
 
 
 def start_kernels_clean() -> None:
     """Keep kernels from reading the user's start-up files; let both sides report errors only."""
     profile = ROOT / "out" / "ipython" / "profile_default"
     profile.mkdir(parents=True, exist_ok=True)
-    (profile / "ipython_kernel_config.py").write_text(_QUIET_KERNEL, encoding="utf-8")
+    (profile / "ipython_kernel_config.py").write_text(_ELSEWHERE = re.compile(r'(?:src|<link[^>]+href)="(?:https?:)?//[^"]+"')
+_QUIET_KERNEL, encoding="utf-8")
     os.environ["IPYTHONDIR"] = str(profile.parent)
     logging.getLogger("traitlets").setLevel(logging.ERROR)
 

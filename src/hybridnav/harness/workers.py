@@ -214,7 +214,7 @@ def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Reco
     tasks
         In any order.
     address
-        Address of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package and
+        Address of the scheduler, such as `tcp://10.0.0.1:8786`. Its workers need this package and
         the map files under the same paths.
 
     Yields
@@ -321,7 +321,7 @@ def distances_on_cluster(
     ends
         Starts and goals, `(x, y)` in metres, map frame, shape (n, 2) and (m, 2).
     address
-        Address of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package.
+        Address of the scheduler, such as `tcp://10.0.0.1:8786`. Its workers need this package.
     progress
         Called after each task with the number of pairs done and of all pairs.
     asked
