@@ -159,9 +159,9 @@ QUOTES = (
     ),
     Quote(
         "docs/peers.md",
-        _SOBERING + "on the study's maps, {paper_any} % longer than the any-angle one (the octile "
-        "optimum itself is {grid_any} % longer), and {paper_means} times as fast as our A\\* by "
-        "mean times",
+        _SOBERING + "on the study's maps. It is {paper_any} % longer than the any-angle one (the "
+        "octile optimum itself is {grid_any} % longer), and {paper_means} times as fast as our "
+        "A\\* by mean times",
     ),
     Quote("docs/harness.md", "asks all methods on {maps} public maps"),
     Quote(
