@@ -69,7 +69,7 @@ def page(data: Data) -> str:
 
 Thrun's three questions, asked of every method on {_maps_in_words(data)}.
 `make study` asks them anew and writes this page, its charts, a PDF, an HTML report and an archive
-of all records; this is {_how_much(data)}. Every number below comes from
+of all records. This is {_how_much(data)}. Every number below comes from
 `docs/data/study.json`, which a script fills from the records. [The harness](harness.md) describes
 the checks and the columns.
 
@@ -145,7 +145,7 @@ def _how_much(data: Data) -> str:
 
 
 def about(data: Data, name: str) -> str:
-    """Return what a reader of a part must know."""
+    """Return the introduction of a part."""
     part = data["parts"][name]
     counted = (
         f"{part['pairs']:,} pairs of joined cells; {part['checks']:,} answers checked, "
@@ -165,7 +165,7 @@ _ABOUT = {
     "costs": "Cheapest paths: each cell costs more the nearer it is to an obstacle, as Nav2's "
     "inflation has it (0.70 m, 3.0). `shortest` and `octile` know nothing of costs.",
     "ompl": "Presets with OMPL, 1 s a query, on fewer pairs of the same maps. Times are those of "
-    "single queries and include what it takes to send a query to OMPL's process. The coarse route "
+    "single queries and include the time to send a query to OMPL's process. The coarse route "
     "by max-distances is refined by grid A* in `paper`, by RRTConnect in `paper+ompl`; "
     "`ompl-whole` knows no places, and the reference is A* on the whole map.",
 }
@@ -178,7 +178,7 @@ def rules(data: Data) -> str:
         "A method is compared over the pairs in common if it solved 99 % of all pairs or more; the "
         "others have a table of their own. A method that takes more than "
         f"{plan['limit_s']:g} s on a map, preparation and all answers, is not asked further "
-        "there, and listed with what it took."
+        "there, and listed with its time."
     )
 
 
@@ -186,9 +186,10 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     """Return the circumstances of the study: what was asked, where, and when."""
     plan, machine = data["plan"], data["machine"]
     pairs = (
-        f"{plan['pairs']} a map ({plan['ompl_pairs']} for OMPL): on ROS and SLAM maps sampled and "
-        "as many in each of five classes of distance, robot radius 0.25 m, merge distance 4 m; on "
-        "MovingAI maps spread evenly over the scenario files, a point robot, merge distance 40 m"
+        f"{plan['pairs']} a map ({plan['ompl_pairs']} for OMPL). On ROS and SLAM maps they are sampled, "
+        "as many in each of five classes of distance; robot radius 0.25 m, merge distance 4 m. On "
+        "MovingAI maps they are spread evenly over the scenario files; a point robot, merge "
+        "distance 40 m"
     )
     lengths = next(iter(data["parts"].values()))
     facts = [
@@ -206,8 +207,8 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
         start, end, most = lengths["loads"]
         # The first reading remembers the answers before the pass, if they took more processes.
         what = " (left by earlier work)" if start > most else ""
-        text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
-        facts.append(("load in the timing pass", f"{text} 1 was the study's"))
+        text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most"
+        facts.append(("load in the timing pass", f"{text}; the study itself makes 1"))
     checked = [
         f"{TITLES[name]} {part['checked any-angle']}"
         for name, part in data["parts"].items()
@@ -266,7 +267,7 @@ _FINDINGS = tuple(
     for line in (
         (
             "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile "
-            "optimum in the mean and {paper_any} % longer than the any-angle optimum; the octile "
+            "optimum in the mean and {paper_any} % longer than the any-angle optimum. The octile "
             "optimum itself is {grid_any} % longer."
         ),
         (

@@ -132,11 +132,11 @@ _NOTES = {
     "`simple-graph` also search places beside the route.",
     "time": "Medians over the pairs in common; a speed-up is the reference's time over the "
     "method's: the median of the ratios, and the ratio of the means.",
-    "work": "Backups are Thrun's count, nodes times mean steps of a plan (of the grid: cells times "
-    "mean steps of a path), a mean over the maps; the next column is the median of the grid's over "
+    "work": "Backups are Thrun's count, nodes times mean steps of a plan (for the grid cells times "
+    "mean steps of a path), a mean over the maps. The next column is the median of the grid's over "
     "it. They leave out the search of cells inside the plan, which expansions hold. An expansion "
-    "is a thing taken from the queue of a search; its price is the time of all queries over all "
-    "expansions, in the unit in which the reference expands a cell.",
+    "is an entry taken from the queue of a search. Its price is the time of all queries over all "
+    "expansions, in the time in which the reference expands a cell.",
     "graphs": "Nodes of all maps in the mean, and each passage as one edge; routes join a graph at "
     "the nearest node in sight. The figures of each over the pairs that it and all methods of the "
     "tables of losses solved.",

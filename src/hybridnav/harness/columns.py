@@ -134,8 +134,8 @@ MEANINGS = {
 DEFINITION = (
     "Two layers are consistent when each path of one has its counterpart in the other (S. Thrun: "
     "Learning metric-topological maps for indoor mobile robot navigation, Artificial Intelligence "
-    "99(1), 1998, pages 21-71): every plan over regions has a metric path inside them, every "
-    "metric path maps to a walk over regions, and both agree on whether there is a path. "
+    "99(1), 1998, pages 21-71). Every plan over regions has a metric path inside them, and every "
+    "metric path maps to a walk over regions. Both agree on whether there is a path. "
     "Connectivity is computed by scipy, not by the planners. Beside these the harness checks that "
     "paths are paths and that bounds hold. A cell reads: contradictions of checks; it is empty "
     "if that check had no case. A plan that is read off a path is consistent with it by "
