@@ -94,7 +94,7 @@ the checks and the columns.
 
 
 _FIRST = {
-    "lengths": "What is lost, and what it buys in time:",
+    "lengths": "Losses, and the time that they save:",
     "costs": "The same where a path costs more near obstacles:",
 }
 """Parts whose charts stand on the page of answers, and what leads to them."""

@@ -32,7 +32,7 @@ OPTIONS = (
     option("--mb", type=float, default=100.0, help="memory that is allowed"),
     option("--pairs", type=int, default=3000, help="pairs of ends, anywhere in free cells"),
     option("--only", default="", help="part of the path of the maps to measure"),
-    option("--runs", type=int, default=7, help="runs, of which the fastest counts"),
+    option("--runs", type=int, default=7, help="runs; the fastest counts"),
 )
 
 

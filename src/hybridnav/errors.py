@@ -35,8 +35,8 @@ class UnsuitableMapError(InvalidValueError):
 
 
 class MapError(HybridNavError, ValueError):
-    """A map file, or the image that it names, cannot be read as an occupancy grid; or a file of
-    closed areas cannot be read, or does not fit the map."""
+    """A map file, or its image, cannot be read as an occupancy grid; or a file of closed areas
+    cannot be read or does not fit the map."""
 
 
 class MapNotFoundError(MapError, FileNotFoundError):

@@ -1,4 +1,4 @@
-"""Search methods, of which presets can be made too, as methods of the harness."""
+"""Search methods that presets could name too, as methods of the harness."""
 
 from __future__ import annotations
 

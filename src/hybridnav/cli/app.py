@@ -41,7 +41,7 @@ _WrongUsage: Any = typer.BadParameter.__base__
 
 
 class _Commands(TyperGroup):
-    """The commands, of which only the one that is called is loaded."""
+    """The commands; only the called one is loaded."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""

@@ -94,7 +94,7 @@ class HybridMethod:
 
 
 class FoundMethod:
-    """A search method, of which a preset can be made too, as a method of the harness.
+    """A search method that a preset could name too, as a method of the harness.
 
     Parameters
     ----------

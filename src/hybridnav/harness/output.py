@@ -236,7 +236,7 @@ def failures_of(study: Study) -> list[tuple[str, str]]:
 def _pairs_text(study: Study) -> str:
     """Return the number of pairs, and how many of them all methods solved."""
     asked = sum(len(outcome.references) for outcome in study.of_method(REFERENCE))
-    text = f"{asked:,} of joined cells, of which all methods solved {len(study.common):,}"
+    text = f"{asked:,} of joined cells; all methods solved {len(study.common):,} of them"
     shares = {
         label: sum(len(outcome.solved_keys) for outcome in study.of_method(label))
         for label in study.labels

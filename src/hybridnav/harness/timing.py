@@ -228,8 +228,8 @@ class Circumstances:
         found = []
         if self.is_busy:
             found.append(
-                f"The machine was busy: a load of up to {self.most_load:.2f}, of which this run "
-                "made 1. Measure again on a quiet machine."
+                f"The machine was busy: a load of up to {self.most_load:.2f}; this run made 1 "
+                "of it. Measure again on a quiet machine."
             )
         if self.apart:
             found.append(

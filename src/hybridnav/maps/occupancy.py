@@ -181,8 +181,8 @@ class OccupancyGrid:
         ------
         InvalidValueError
             When a field is missing, not finite or out of range, `data` has not width x height
-            values, a value is not within -1 to 100, or the orientation of the origin is no unit
-            quaternion or tilted by more than 0.02 radians.
+            values, or a value is not within -1 to 100. When the orientation of the origin is no
+            unit quaternion or tilted by more than 0.02 radians.
 
         Examples
         --------

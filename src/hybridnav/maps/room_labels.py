@@ -86,7 +86,7 @@ class RoomLabels:
     ------
     InvalidValueError
         When a name is given twice, empty, too long, not one printable line or reads as a point
-        (`1,2`), a label has no name, a point is not finite, the number of a door is not a
+        (`1,2`). When a label has no name, a point is not finite, the number of a door is not a
         positive whole one, or a use is that of no room.
 
     Examples

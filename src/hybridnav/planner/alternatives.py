@@ -61,7 +61,7 @@ class Alternative:
 
     tour: Tour
     """The plan. Its lower bound holds for every path between its endpoints, not only for those by
-    the same doors: the gap states by how much the alternative can be longer than the optimum."""
+    the same doors. The gap states by how much the alternative can be longer than the optimum."""
     overlap: float = 0.0
     """Share of its length, or of its cost with a planner by costs, in common with one before it,
     the greatest one; 0 for the first."""
@@ -146,15 +146,14 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
 ) -> Alternatives:
     """Plan paths between the same two points that pass other sequences of doors.
 
-    The first is the plain plan.
-    Then sequences are tried in the order of their length on the graph of doors, which measures the
-    paths inside rooms: for each pair of doors of a room, the shortest sequence that passes both in
-    turn, unless it passes a room twice. Each that keeps to the limits is planned by the preset of
-    the planner while the doors that lead off it are closed, by the cells along one side of each,
-    and the path has to keep to the limits too. At most four sequences for each requested
-    alternative are planned.
+    The first is the plain plan. Then sequences are tried in the order of their length on the graph
+    of doors, which measures the paths inside rooms. For each pair of doors of a room that is the
+    shortest sequence that passes both in turn, unless it passes a room twice. Sequences within the
+    limits are planned by the preset of the planner while the doors that lead off them are closed,
+    by the cells along one side of each. The path has to keep to the limits too. At most four
+    sequences for each requested alternative are planned.
 
-    With a planner by costs the cheapest paths take the place of the shortest: sequences are tried
+    With a planner by costs the cheapest paths take the place of the shortest. Sequences are tried
     in the order of their cost, and overlap and stretch are measured in cost.
 
     Parameters
@@ -167,9 +166,9 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     count
         Most alternatives, the first included, from 1 to 20.
     max_overlap
-        Greatest share of its length, or of its cost, from 0 to 1, that an alternative has in
-        common with a shorter one: what lies within a robot's diameter (at least a cell) of the
-        other path, and all between the same two doors of one room. None is 0.8.
+        Greatest share of its length, or of its cost, from 0 to 1, that an alternative has in common
+        with a shorter one. Parts within a robot's diameter (at least a cell) of the other path
+        count, and all between the same two doors of one room. None is 0.8.
     max_stretch
         Greatest length, or cost, of an alternative over that of the first, at least 1.
         None is 2.

@@ -42,10 +42,10 @@ class Blocked:
     arcs
         Ids of arcs of the places, or a `LevelArc` for an arc of any level. No move crosses the
         boundary of a closed arc: one of each two cells that face each other across it is closed.
-        The choice first keeps other arcs open (a second door between the same places), then loses
-        few free cells, closed or cut off from the rest of their place; only a cell that two doors
-        share may close both. Moves past a point where four places meet lie on no boundary. A
-        self-loop joins a place to itself and cannot be closed.
+        The choice first keeps other arcs open, such as a second door between the same places. Then
+        it loses few free cells, closed or cut off from the rest of their place. Only a cell that
+        two doors share may close both. Moves past a point where four places meet lie on no
+        boundary. A self-loop joins a place to itself and cannot be closed.
     places
         Ids of places; all the cells of their receptive fields are closed.
     cells
@@ -54,9 +54,9 @@ class Blocked:
         Each a shapely `Polygon`, `MultiPolygon`, `LineString` or `MultiLineString`, or the corners
         of a polygon as `(x, y)`, shape (n, 2); metres, map frame. Holes stay open. A cell is closed
         when the inside of its square lies nearer than the robot's radius to the area, or, with a
-        radius of 0, meets it. A line has no inside: with a radius of 0, a line along a side between
-        two cells closes the cell with the higher index (as in `Frame.cells_of`), so that no path
-        passes a line at any position.
+        radius of 0, meets it. A line has no inside. With a radius of 0, a line along a side between
+        two cells closes the cell with the higher index (as in `Frame.cells_of`). So no path passes
+        a line.
     keepout
         Areas as in `polygons` that the *centre* of the robot does not enter: their cells are those
         of a robot of radius 0.
@@ -71,8 +71,9 @@ class Blocked:
     Raises
     ------
     InvalidValueError
-        When ids are not integers, cells are not integers of shape (n, 2), names are not text, or an
-        area has fewer than three points, is not finite, intersects itself or is of another kind.
+        When ids are not integers, cells are not integers of shape (n, 2), or names are not text.
+        When an area has fewer than three points, is not finite, intersects itself or is of another
+        kind.
 
     Examples
     --------
@@ -140,8 +141,8 @@ class Blocked:
         Raises
         ------
         InvalidValueError
-            When the map has no such door, room, arc, place or cell, a door is one of another map,
-            an arc is a self-loop, or an area closes no cell of the map.
+            When the map has no such door, room, arc, place or cell, or a door is one of another
+            map. When an arc is a self-loop, or an area closes no cell of the map.
         """
         return self.cells_on(topology.grid, topology)
 

@@ -77,7 +77,7 @@ class PlannerCosts:
         Parameters
         ----------
         given
-            A layer of the map, of which nothing is read outside the box.
+            A layer of the map; it is read inside the box only.
         box
             First row, last row + 1, first column, last column + 1 of its cells.
 

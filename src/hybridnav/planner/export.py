@@ -44,12 +44,12 @@ def export_path(
     """Write the path of a plan, or of all plans of a tour one after the other.
 
     CSV has a line of names and a line for each pose: x, y in metres, yaw in radians, and the
-    direction in which the robot leaves it, 1 for ahead, -1 for backwards. No pose occurs twice in a
-    row; a turn on the spot, and nothing else, is two poses at one point. JSON is one object, with
-    a list of the same four numbers for each pose. GeoJSON has a `LineString` for each plan, through
-    the points of the path, or through the poses where the path is curved, with `headings_rad`,
-    `length_m`, `cost`, `metric`, `start`, `goal` and `preset`. Without a path there are no poses
-    and no lines.
+    direction. The direction is that in which the robot leaves it, 1 for ahead, -1 for backwards. No
+    pose occurs twice in a row; a turn on the spot, and nothing else, is two poses at one point.
+    JSON is one object, with a list of the same four numbers for each pose. GeoJSON has a
+    `LineString` for each plan, through the points of the path, or through the poses where the path
+    is curved. Its properties are `headings_rad`, `length_m`, `cost`, `metric`, `start`, `goal` and
+    `preset`. Without a path there are no poses and no lines.
 
     Parameters
     ----------
@@ -105,11 +105,11 @@ def export_rooms(
 ) -> None:
     """Write the rooms of a map, and their doors.
 
-    CSV has a line for each room: its name, x and y of the point that stands for it, the area of its
-    free cells in m², whether the robot fits, and the numbers of its doors. GeoJSON has a `Polygon`
-    or `MultiPolygon` for each room with the same properties, and a `Point` in each door, with its
-    `number`, `rooms`, `kind`, `width_m`, `passage_m` and `passable`. Narrow rooms that the
-    robot cannot enter, doors to them, and gaps are left out, as in lists.
+    CSV has a line for each room: its name, x and y of its point, the area of its free cells in m²,
+    whether the robot fits, and the numbers of its doors. GeoJSON has a `Polygon` or `MultiPolygon`
+    for each room with the same properties, and a `Point` in each door, with its `number`, `rooms`,
+    `kind`, `width_m`, `passage_m` and `passable`. Narrow rooms that the robot cannot enter, doors
+    to them, and gaps are left out, as in lists.
 
     Parameters
     ----------
@@ -172,10 +172,10 @@ def export_rooms(
 def export_places(topology: TopologicalMap, path: PathLike, *, frame: str = "map") -> None:
     """Write the places of a topological map, and its arcs.
 
-    CSV has a line for each place: its id, x and y of its surviving cell, its class, its area in m²,
-    and its room, if the map was grown with rooms and it lies in one. GeoJSON has a `Point` for each
-    place with the same properties, and one in the middle of the boundary of each arc, with its id
-    as `arc`, its `places`, `max_distance_m` and `through_m`.
+    CSV has a line for each place: its id, x and y of its surviving cell, its class, and its area in
+    m². If the map was grown with rooms, its room follows. GeoJSON has a `Point` for each place with
+    the same properties, and one in the middle of the boundary of each arc. An arc has its id as
+    `arc`, its `places`, `max_distance_m` and `through_m`.
 
     Parameters
     ----------

@@ -114,8 +114,8 @@ class Journal:
     """What is out of order in a building or on a map, in `NAME.closed.yaml` beside its file.
 
     Programs and threads may share it: each change reads the file anew under a lock and writes it
-    whole, so that two that change different things lose nothing, and of two that change one thing
-    the last one wins.
+    whole. Two that change different things lose nothing. Of two that change one thing the last one
+    wins.
 
     Parameters
     ----------

@@ -208,9 +208,9 @@ class Path:
 
     @property
     def spot_turns(self) -> LongArray:
-        """int64, indices of points at which the robot turns on the spot: bends of straight lines,
-        points that differ from the next one in heading alone, and endpoints with another heading
-        than the path."""
+        """int64, indices of points at which the robot turns on the spot. They are bends of straight
+        lines, points that differ from the next one in heading alone, and endpoints with another
+        heading than the path."""
         return self._motion.spot_turns
 
     @property

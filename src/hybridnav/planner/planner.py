@@ -75,8 +75,8 @@ class HybridPlanner(Questions):
     PresetError
         When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
-        When the map has the default radius, not chosen by the caller, and the preset names another;
-        when the costs are those of another map, or the preset cannot plan by costs; when the map
+        When the map has the default radius, not chosen by the caller, and the preset names another.
+        When the costs are those of another map, or the preset cannot plan by costs. When the map
         allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl`).
 
     Examples
@@ -196,8 +196,8 @@ class HybridPlanner(Questions):
 
     @property
     def prepared(self) -> Prepared | None:
-        """The structure built for queries: a mesh or a jump-point graph; None before that, and
-        with presets that build none, or one that changes with the costs, as the lattice does."""
+        """The structure built for queries: a mesh or a jump-point graph. None before that, with
+        presets that build none, and for the lattice, which changes with the costs."""
         return self._now.method.prepared
 
     @property
@@ -228,12 +228,12 @@ class HybridPlanner(Questions):
             `(x, y)` in metres, map frame. The path runs between the centres of their cells, an
             any-angle one between the points; nothing is snapped to free space. On a map with rooms
             also the name of a room or of a named point. Or `(x, y, yaw)`, radians counter-clockwise
-            from the x axis: the robot turns on the spot, at the start from its yaw into the path,
+            from the x axis. The robot turns on the spot: at the start from its yaw into the path,
             at the goal to that of the goal. OMPL in a space with headings needs the yaw, and plans
             with it; there named endpoints face along the path.
         smooth
-            `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them;
-            `"arcs"`, for planners by costs, rounds the bends of such a path too; None as in the
+            `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them.
+            `"arcs"`, for planners by costs, rounds the bends of such a path too. None as in the
             preset. `"line-of-sight"` has no effect with `shortest` and OMPL, whose paths are
             any-angle ones.
         blocked
@@ -256,9 +256,9 @@ class HybridPlanner(Questions):
         Raises
         ------
         InvalidValueError
-            When a point is not two or three finite numbers, a name is not known, a closed item is
-            not on the map, `smooth` is `"arcs"` and the planner plans by lengths, or `keep` is
-            given to another method than `cheapest`.
+            When a point is not two or three finite numbers, a name is not known, or a closed item
+            is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or `keep`
+            is given to another method than `cheapest`.
         """
         with self._query():
             now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
@@ -378,17 +378,17 @@ class HybridPlanner(Questions):
         topology
             The places of the map now; its grid is taken if no `grid` is given.
         changed
-            The area outside of which nothing has changed: a shapely geometry in metres, map frame,
-            whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a mask, bool (rows, cols);
-            None for the whole map. Costs outside of it stay as they were. For a grid it holds the
-            changed measurements; the robot's radius is added.
+            The area of all changes. It is a shapely geometry in metres, map frame, whose bounds are
+            taken, or `(x_min, y_min, x_max, y_max)`, or a mask, bool (rows, cols). None for the
+            whole map. Costs outside of it stay as they were. For a grid it holds the changed
+            measurements; the robot's radius is added.
 
         Raises
         ------
         InvalidValueError
-            When nothing is given, the preset cannot plan by costs, costs or grid are those of
-            another map, the preset needs places, cells of the grid changed outside the area, or the
-            area is not described like that; then nothing has changed.
+            When nothing is given, the preset cannot plan by costs, or it needs places. When costs
+            or grid are those of another map, cells of the grid changed outside the area, or the
+            area is not described like that. Then nothing has changed.
 
         Examples
         --------

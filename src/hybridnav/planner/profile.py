@@ -71,8 +71,8 @@ class Profile:
     """Width in metres for which there must be room everywhere, also in doors; None for that of the
     robot that the map is for."""
     turn_m: float | None = None
-    """Diameter in metres of the circle in which it turns: in the room of the goal there must be one
-    that it reaches; None for a robot that turns on the spot."""
+    """Diameter in metres of the circle in which it turns. In the room of the goal there must be one
+    that it reaches. None for a robot that turns on the spot."""
 
     def __post_init__(self) -> None:
         """Refuse what no route could keep to."""

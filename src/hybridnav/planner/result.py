@@ -107,9 +107,10 @@ class Refinement:
     steps: tuple[str, ...]
     """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
     by: Answer
-    """What answered: `circumscribed disc`, whose path is valid with every heading; `inscribed
-    disc`, which proves that there is no path, or whose cheapest path the robot can drive; `OMPL`;
-    or `grid`, whose path, shortened by line of sight, counts where all else failed."""
+    """The source of the answer. The path of the `circumscribed disc` is valid with every heading.
+    The `inscribed disc` proves that there is no path, or the robot can drive its cheapest one.
+    `OMPL` sampled it. The path of the `grid`, shortened by line of sight, counts where all else
+    failed."""
     trace: tuple[tuple[float, float], ...] = ()
     """Seconds and cost of each better path."""
     iterations: int = 0
@@ -286,8 +287,8 @@ class PlanResult:
         return self
 
     def proof(self) -> dict[str, Any]:
-        """Return a proof of the answer, plain values for strict JSON: that its path is free, has
-        its cost, and that none costs less than its bound; or that there is no path.
+        """Return a proof of the answer, plain values for strict JSON. It proves that the path is
+        free and has its cost, and that none costs less than its bound; or that there is no path.
 
         `check_proof.py`, which needs nothing of this package, accepts or rejects it: see
         :doc:`/explanation/what-a-proof-is`.
@@ -295,8 +296,8 @@ class PlanResult:
         Raises
         ------
         PlanError
-            When no proof is known of such an answer: where corners may be cut, with costs other
-            than those of clearance, for paths of OMPL, and for copies of a result.
+            When no proof is known of such an answer: if corners may be cut, for paths of OMPL, for
+            copies of a result, and with costs other than those of clearance.
 
         Examples
         --------

@@ -115,7 +115,7 @@ class Tour:
         `words` for a person in English.
 
         Points and headings, places and arcs are those of all plans in order, with the place of a
-        waypoint once; if the robot turns at a waypoint, its point occurs twice. Counts and seconds
+        waypoint once. If the robot turns at a waypoint, its point occurs twice. Counts and seconds
         are sums.
         """
         parts = [result.to_dict() for result in self.results]

@@ -263,10 +263,10 @@ class Level:
         Returns
         -------
         networkx.MultiGraph
-            Nodes are the vertices, by index: `cell` [row, col] (the surviving cell), `position`
-            [x, y] (its centre in metres, map frame), `class` ("free" or "unexplored"), `area_m2`.
-            Edges are the arcs, their key the index of the arc: `max_distance_m`, `through_m`,
-            `n_cracks` (cell sides of the boundary) and `base_pair` [[row, col], [row, col]], the
+            Nodes are the vertices, by index: `cell` [row, col] (the surviving cell), `position` [x,
+            y] (its centre in metres, map frame), `class` ("free" or "unexplored"), `area_m2`. Edges
+            are the arcs, their key the index of the arc: `max_distance_m`, `through_m`, `n_cracks`
+            (cell sides of the boundary) and `base_pair`. The last has [[row, col], [row, col]], the
             two cells of the base edge that stands for the arc. The graph has the `name` of the map,
             the index of the `level` and `resolution_m`; all attributes survive JSON.
         """
@@ -283,18 +283,17 @@ class Level:
     def dual_to_networkx(self) -> nx.MultiGraph[int]:
         """Return the dual as a multigraph: meeting points and holes, joined by boundaries.
 
-        A vertex without an arc has no face here, although the plane round it is one; `n_isolated`
-        of the graph counts these vertices, so that vertices - edges + faces = 2 components -
-        `n_isolated`.
+        A vertex without an arc has no face here, although the plane round it is one. `n_isolated`
+        of the graph counts these vertices: vertices - edges + faces = 2 components - `n_isolated`.
 
         Returns
         -------
         networkx.MultiGraph
             Nodes are the faces, by index in `dual`: `kind` ("ordinary", "protected" or "outside").
-            Edges are the dual edges, one for each arc and with its index as key: `length_m` and
-            `n_cracks` of the boundary (for a self-loop, of the line of its dual edge through its
-            own field), and `vertices` [u, v] on its two sides. The graph has the attributes of
-            `to_networkx` and `n_isolated`.
+            Edges are the dual edges, one for each arc and with its index as key. They have
+            `length_m` and `n_cracks` of the boundary, and `vertices` [u, v] on its two sides. A
+            self-loop has those of the line of its dual edge through its own field. The graph has
+            the attributes of `to_networkx` and `n_isolated`.
         """
         isolated = self.n_vertices - len(np.unique(self.arcs))
         kinds = [FaceKind(kind).name.lower() for kind in self.dual.kinds.tolist()]
@@ -329,9 +328,9 @@ class Level:
 
     @cached_property
     def through_m(self) -> FloatArray:
-        """float64 (n_arcs,), length of the shortest path of 8-neighbour moves from one surviving
-        cell inside its field to the boundary, across it by a side, and inside the other field to
-        the other surviving cell. In metres.
+        """float64 (n_arcs,), length in metres of the shortest path of 8-neighbour moves from one
+        surviving cell to the other. It runs inside the first field to the boundary, across it by a
+        side, and on inside the other field.
 
         Diagonals need both side cells: free ones in a free field, free or unexplored ones in an
         unexplored field. For a self-loop it is the shortest closed walk from its surviving cell
@@ -378,8 +377,8 @@ class Level:
     def boundary_middles(self) -> FloatArray:
         """float64 (n_arcs, 2), the middle of each arc's boundary, through which to draw the arc.
 
-        `(x, y)` in metres, map frame: the middle of the side between the two cells whose side is
-        nearest the mean of all sides of the boundary, so that it lies on the boundary.
+        `(x, y)` in metres, map frame, on the boundary: the middle of the side between two cells
+        that is nearest the mean of all sides.
         """
         edges, arc = self.boundary_table
         middles = middles_of(sides_of(edges, self._grid.shape[1]), arc, self.n_arcs)

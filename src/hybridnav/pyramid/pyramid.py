@@ -36,7 +36,7 @@ class DualGraphPyramid:
 
     `pyramid[0]` is the base, `pyramid[-1]` the apex, the level at which contraction ended;
     `len(pyramid)` counts the levels. `DualGraphPyramid.build` ends at the places, unless rooms or a
-    resistance let it go on; `with_regions` goes on from there, to one vertex for each connected set
+    resistance let it go on. `with_regions` goes on from there, to one vertex for each connected set
     of cells of one class.
 
     Examples
@@ -78,8 +78,8 @@ class DualGraphPyramid:
         """Contract the cells of a grid to places and, with rooms, further to rooms and the apex.
 
         At each level the stars of a maximal independent edge set are contracted (MIES; Haxhimusa
-        and Kropatsch), and edges that have become redundant are removed, so that every arc of a
-        level is exactly one connected boundary between two fields. A field has cells of one class.
+        and Kropatsch). Then edges that have become redundant are removed. So every arc of a level
+        is exactly one connected boundary between two fields. A field has cells of one class.
 
         Parameters
         ----------
@@ -109,9 +109,9 @@ class DualGraphPyramid:
         Raises
         ------
         InvalidValueError
-            When the merge distance is not positive, the linkage is not known, the seed is no
-            whole number, the rooms or the resistance are those of a grid of another shape, or
-            both are given; or when the map needs more than 126 levels.
+            When the merge distance is not positive, the linkage is not known, or the seed is no
+            whole number. When both rooms and a resistance are given, or those of a grid of another
+            shape. When the map needs more than 126 levels.
         """
         seed = checked_settings(merge_distance_m, linkage, seed)
         check_fit(grid, rooms, resistance)

@@ -218,7 +218,7 @@ class NumberedDoor(Protocol):
 
 
 class RoomWriter:
-    """Writer of names and numbers, of which none hides another.
+    """Writer of names and numbers that do not hide each other.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     costs, blocked
         What the query was planned with, drawn over the cells; None for nothing.
     unexplored
-        Whether to draw unexplored places and their arcs, of which most maps have many; they are
+        Whether to draw unexplored places and their arcs. Most maps have many of them; they are
         drawn in any case if the plan may enter them.
     width_in
         Width of a new figure in inches, 3.3 for one column of a paper; its height follows.

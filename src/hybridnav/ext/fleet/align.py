@@ -180,7 +180,7 @@ def moved_points(points: FloatArray, pose: Pose) -> FloatArray:
     return frozen(np.stack(along, axis=1))
 
 
-# The pose of a drawn floor on its map, by links of which some may be drawn in a wrong place.
+# The pose of a drawn floor on its map, by links; some may be drawn in a wrong place.
 
 _AGREED_M = 0.1
 """Distance in metres up to which the ends of all links agree: files and maps round."""
@@ -189,7 +189,7 @@ _MOST_M = 1.0
 _WALLS_M = 4.0
 """Metres that count as much as a graph that lies in walls altogether."""
 _MOST_PAIRS = 200
-"""Pairs of links of which poses are tried."""
+"""Pairs of links whose poses are tried."""
 _MOST_POINTS = 2000
 """Points of the graph that are looked up on the map."""
 _SPREAD = 3.0

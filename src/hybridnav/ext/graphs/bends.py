@@ -75,7 +75,7 @@ class Nodes:
         self.doors += added
 
     def indices_of(self, positions: Iterable[FloatArray]) -> list[int]:
-        """Return the nodes at some positions, all of which have one."""
+        """Return the nodes at some positions; each has one."""
         rows, cols = self.positions.T
         return [int(np.argmax((rows == row) & (cols == col))) for row, col in positions]
 
@@ -159,7 +159,7 @@ _NEARER = 0.5
 _LEAST_CELLS = 0.5
 """Least distance between bends, in cells: corners are one cell apart, so each may become a node."""
 _DRAWS = (3, 100)
-"""Least and greatest number of draws round a corner, most of which are no pair that bends there."""
+"""Least and greatest number of draws round a corner; most are no pair that bends there."""
 _ALL_DRAWS = 150_000
 """Draws of all corners of a round, within these."""
 _NEAREST_CELLS, _FARTHEST_M = 0.7, 4.0

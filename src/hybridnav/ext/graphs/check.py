@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 _PAIRS = 2000
-"""Random free points of which the share is counted that see a node."""
+"""Random free points; the share that sees a node is counted."""
 _HALVINGS = 24
 """Steps in which the point where an edge is blocked is found: to a millionth of its length."""
 

@@ -83,7 +83,7 @@ def lines_of(
     clearance
         float64 (rows, cols), distance to the next cell that is not free, in cells.
     rooms
-        The rooms, each of which gets a strand if it has room for one.
+        The rooms; each gets a strand if it has room for one.
     layout
         What strands are to be like.
 
@@ -201,7 +201,7 @@ def strands_of(lines: BoolArray, marks: BoolArray) -> tuple[LongArray, list[Stra
     Returns
     -------
     tuple
-        int64 (n, 2), the cell of each node; the strands between them, of which some may be rings.
+        int64 (n, 2), the cell of each node; the strands between them, some of them rings.
     """
     lines = np.pad(lines, 1)
     cols = lines.shape[1]

@@ -277,7 +277,7 @@ class Update:
     merged: dict[int, int]
     """Those of them most of whose cells went into another place, with that place."""
     split: dict[int, tuple[int, ...]]
-    """Old places of which several new ones mostly consist, with these."""
+    """Old places that fell into several new ones, with these."""
     changed: tuple[int, ...]
     """Places that kept their number, and most of their cells, but not all that they were."""
     cells: LongArray

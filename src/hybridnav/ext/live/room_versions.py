@@ -293,7 +293,7 @@ class RoomsUpdate:
     merged: dict[int, int]
     """Those of them most of whose cells went into another room, with that room."""
     split: dict[int, tuple[int, ...]]
-    """Old rooms of which several new ones mostly consist, with these."""
+    """Old rooms that fell into several new ones, with these."""
     changed: tuple[int, ...]
     """Rooms that kept their number, but have other cells."""
     doors: DoorEvents

@@ -351,7 +351,7 @@ class DoorEvents(NamedTuple):
     changed: tuple[int, ...]
     """Doors that kept their number, but have other cells or rooms."""
     split: dict[int, tuple[int, ...]]
-    """Doors of which several are left, with these: the one that kept the number among them."""
+    """Doors that fell into several, with these: the one that kept the number among them."""
     merged: dict[int, int]
     """Doors that died and are part of one other door now, wider or moved, with that door."""
 

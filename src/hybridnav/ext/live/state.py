@@ -105,7 +105,7 @@ class PlaceTable:
         return dict(zip(places, self._rows["area"][at].tolist(), strict=True))
 
     def write(self, places: Sequence[int] | LongArray, rows: AnyArray) -> None:
-        """Set the rows of some places, no two of which are the same."""
+        """Set the rows of some places, all different."""
         numbers = np.asarray(places, np.int64)
         self._own()
         new = numbers[~self._has(numbers)]

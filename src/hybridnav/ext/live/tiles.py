@@ -207,7 +207,7 @@ class Tiles:
         Parameters
         ----------
         boxes
-            Boxes on the map, no two of which have a cell in common.
+            Boxes on the map without common cells.
         classes
             uint8 (rows, cols), `CellClass` of the cells of the map.
         low

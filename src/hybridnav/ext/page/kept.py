@@ -83,7 +83,7 @@ class RoomsFile:
     Parameters
     ----------
     folder
-        The folder outside of which nothing is written.
+        The only folder that is written to.
     name
         Name of the file in it.
 

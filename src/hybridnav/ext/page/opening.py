@@ -160,7 +160,7 @@ class Opening:
 
 
 class Cells:
-    """A floor of which only the cells are there."""
+    """A floor that has its cells only."""
 
     def __init__(self, grid: OccupancyGrid, stage: Callable[[], str]) -> None:
         self._grid, self._layer, self._stage = grid, map_layer(grid), stage

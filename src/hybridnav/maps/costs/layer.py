@@ -53,9 +53,9 @@ class CostLayer:
     factors along the move. Costs are symmetric and never below the length, so that every bound on
     lengths is one on costs.
 
-    Two layers are joined by `first | second`, which takes the larger factor of each cell, as the
-    layers of Nav2's costmap are, or by `first * second`, for factors that do not depend on each
-    other: a wall is to be avoided in a slow zone too. What either layer closes is closed.
+    Two layers are joined by `first | second`, which takes the larger factor of each cell, as Nav2's
+    costmap does. `first * second` is for factors that do not depend on each other: a wall is to be
+    avoided in a slow zone too. Cells that either layer closes are closed.
 
     Parameters
     ----------
@@ -111,11 +111,11 @@ class CostLayer:
     ) -> CostLayer:
         """Make the layer of Nav2's inflation: factors that fall off with distance from obstacles.
 
-        The cost of a cell is that of `computeCost` in `nav2_costmap_2d/inflation_layer.hpp`:
-        254 in an occupied cell, 253 up to the inscribed radius, then, truncated to a whole number,
-        252 exp(-scaling (distance - inscribed radius)) up to the inflation radius, rounded up to
+        The cost of a cell is that of `computeCost` in `nav2_costmap_2d/inflation_layer.hpp`: 254 in
+        an occupied cell, 253 up to the inscribed radius. Then it is 252 exp(-scaling (distance -
+        inscribed radius)), truncated to a whole number, up to the inflation radius, rounded up to
         whole cells; 0 beyond. The factor is 1 + multiplier * cost / 252. Distances are Euclidean,
-        between the centres of cells, from the cells measured as occupied: those that the robot's
+        between the centres of cells, from the cells measured as occupied: cells that the robot's
         radius blocks are no obstacles. Unexplored cells are none either; their own factor is that
         of a free cell (in Nav2 `inflate_around_unknown: false`, `inflate_unknown: true`).
 
@@ -226,8 +226,8 @@ class CostLayer:
         or more are `keepout`; the others have the factor 1 + multiplier * cost / 252. Unknown
         values (-1) and cells outside the mask cost nothing. The robot's *centre* keeps out of a
         zone, and its radius is not added, as Nav2 lays filters over its inflation. The value at the
-        centre of a map cell counts, as in Nav2; a cell is also closed, other than in Nav2, if the
-        centre of a closed cell of a finer mask lies in it, so that no thin zone is lost.
+        centre of a map cell counts, as in Nav2. A cell is also closed if the centre of a closed
+        cell of a finer mask lies in it. Unlike Nav2, this loses no thin zone.
 
         Parameters
         ----------

@@ -138,7 +138,7 @@ def _one_by_one(
 
 
 def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
-    """Return the mesh of free cells of which some have changed.
+    """Return the mesh of free cells after some of them have changed.
 
     The polygons that share a point with a closed cell, or with a cell beside a freed one, are
     triangulated and merged again together with the freed cells; all others stay, with their

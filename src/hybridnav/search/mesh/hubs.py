@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Edges = tuple[LongArray, IntArray]
 
 _SIDES = (4, 8, 16, 32, 64)
-"""Sides of squares in cells, of which the first that the memory allows is taken."""
+"""Sides of squares in cells; the first that the memory allows is taken."""
 _SOURCES = 100
 """Corners from which paths are counted to rank all: four times as many leave 5 % fewer entries."""
 _BYTES, _BYTES_OF_VIEW = 8, 12

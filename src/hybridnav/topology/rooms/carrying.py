@@ -63,7 +63,7 @@ class Heirs(NamedTuple):
 
 
 def heirs_of(found: Iterable[Overlap], areas: Mapping[int, float]) -> Heirs:
-    """Return the heirs of old places, of which the cells that they had are given.
+    """Return the heirs of old places whose old cells are given.
 
     The heir of an old place is the new one that holds more than half of its cells. An heir of
     several takes the number of the one with which it shares the most cells; the least number breaks
@@ -140,7 +140,7 @@ class CarriedNames:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Old rooms of which the new map shows too little."""
+        """Old rooms that the new map hardly shows."""
         return tuple(name for name, each in self.rooms.items() if each.status == "lost")
 
 
@@ -435,7 +435,7 @@ def _doors(
 def _names(
     old: RoomLabels, new: RoomLabels, room_of: Mapping[int, int]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the new rooms, of which some are old ones, and those of the others."""
+    """Return the names of all new rooms, old names among them, and the names of the others."""
     numbers = [int(m[1]) for name in (*old.names, *new.names) if (m := NUMBERED.fullmatch(name))]
     first = max(numbers, default=0) + 1
     names, others = list[str](), list[str]()

@@ -32,7 +32,7 @@ _ROW_M, _MOST_ROW_M = 1.5, 3.0
 """Boundaries between the same two rooms with less than the first between them make one row. In a
 row that is wider than the second, posts and furniture part an opening, and no jambs doors."""
 _THIN_M = 0.1
-"""Side of the squares of which one crack of a boundary each is looked at for rows."""
+"""Side of the squares; one crack of a boundary in each is looked at for rows."""
 _ASIDE_M = 0.2
 """Clearance below which the endpoints of a boundary may run along a wall: an outline that lies
 beside a door by less is no wider than the door, and ends between its jambs."""

@@ -225,9 +225,9 @@ class Rooms:
 
     @property
     def is_listed(self) -> BoolArray:
-        """bool (n_rooms,), rooms in lists and pictures: wider than 1 m in the mean, or the map's
-        robot can enter them from such a one or the largest, or they have a name of their own. The
-        others are what a laser sees through glass."""
+        """bool (n_rooms,), rooms in lists and pictures. They are wider than 1 m in the mean, or the
+        map's robot can enter them from such a one or the largest, or they have a name of their own.
+        A laser sees the others through glass."""
         return self._listing.is_listed[: len(self.names)]
 
     @cached_property
@@ -353,9 +353,9 @@ class Rooms:
         Returns
         -------
         tuple of str
-            Such as "22 rooms, 1 of them too small for a robot 0.5 m wide", "71 doors, 12 of them
-            too narrow for a robot 0.5 m wide, 9 openings", and "3 rooms, 43 gaps below 0.3 m and
-            12 other doors": what is left out, empty if nothing is.
+            Counts of rooms and of doors, such as "22 rooms, 1 of them too small for a robot 0.5 m
+            wide", and of those left out, such as "3 rooms, 43 gaps below 0.3 m and 12 other doors";
+            the last is empty if there are none.
         """
         shown = self.doors if everything else self.listed_doors
         fits = self.fits if everything else self.fits[self.is_listed]
@@ -386,9 +386,9 @@ class Rooms:
         )
 
     def point_of(self, name: str) -> tuple[float, float]:
-        """Return the point that stands for a room: its named point, else the point of most
-        clearance in the largest part that the robot's radius leaves free, or in the whole room if
-        it leaves none.
+        """Return the point that stands for a room. This is its named point, else the point of most
+        clearance in the largest part that the robot's radius leaves free. If it leaves none, the
+        whole room counts.
 
         Parameters
         ----------

@@ -30,7 +30,7 @@ _SHIFTS = 4
 _REFINED = 24
 """Candidates that are refined: those of the highest correlation."""
 _APART_PIXELS = 10
-"""Side of the squares of translations of which only the best is a candidate."""
+"""Side of the squares of translations; only the best of each is a candidate."""
 _BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
 _FREE_WEIGHT = 0.3
 """What a wall on free space of the other map costs, where a wall on a wall counts 1."""

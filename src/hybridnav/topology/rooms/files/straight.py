@@ -74,7 +74,7 @@ def _in_line(
     directions: Sequence[tuple[float, BoolArray]],
     resolution_m: float,
 ) -> FloatArray:
-    """Return points of which those on one line along a wall are brought into line."""
+    """Return points after bringing those along one wall into line."""
     step = points[sides[:, 1]] - points[sides[:, 0]]
     length = np.hypot(*step.T)
     heading = directions_of(step[:, 1], step[:, 0])
