@@ -129,10 +129,10 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     root
         Maps below this folder are named by their paths from it; None names them by their files.
     metric
-        Reference of losses: "any-angle", for all paths the any-angle optimum; "octile", the octile
-        optimum, without losses for any-angle paths; "weighted", in a run with costs, for the costs
-        of all paths the least cost of paths of cells; "both", in a run with costs "weighted", else
-        the optimum in each path's own metric.
+        Reference of losses. "any-angle" is the any-angle optimum for all paths, "octile" the octile
+        optimum, without losses for any-angle paths. "weighted", in a run with costs, is the least
+        cost of paths of cells. "both" is "weighted" in a run with costs, else the optimum in each
+        path's own metric.
 
     Returns
     -------
@@ -212,13 +212,13 @@ def to_frame(study: Study) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Columns `map`, `method`, `metric`, `kind`, `start_row`, `start_col`, `goal_row` and
-        `goal_col`; `length_m`, NaN where the method found no path without a fault itself;
-        `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
-        uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
-        `reference_seconds` of A* on the whole grid; `expanded` cells,
-        intervals and nodes together. In a run with costs also `costs`, their text; `cost_m`,
-        `weighted_optimum_m`, `cost_lower_bound_m` and, for any-angle paths with a bound on paths of
-        cells, `cost_grid_bound_m`; `weighted_loss`, `gap` and `grid_gap`, as shares.
+        `goal_col`. `length_m` is NaN where the method found no path without a fault itself.
+        `octile_optimum_m` and `any_angle_optimum_m` follow, and as shares `loss` over the reference
+        of the study, `octile_loss` and `any_angle_loss`. Then `seconds` of the query and
+        `reference_seconds` of A* on the whole grid, and `expanded` cells, intervals and nodes
+        together. A run with costs also has `costs`, their text, `cost_m`, `weighted_optimum_m` and
+        `cost_lower_bound_m`. Any-angle paths with a bound on paths of cells have
+        `cost_grid_bound_m`. `weighted_loss`, `gap` and `grid_gap` are shares.
 
     Raises
     ------

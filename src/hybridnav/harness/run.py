@@ -80,7 +80,7 @@ class RunSettings:
     graphs: tuple[Any, ...] = ()
     """Graphs that others have made, or files of them; there must be one map. Routes go straight to
     the nearest node in sight of the start, over the edges that are shortest in metres, and straight
-    from the nearest node in sight of the goal."""
+    on from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
     """Methods with names and settings of their own, as `load_methods` reads them from a file."""
     clear_edges_only: bool = False
@@ -97,7 +97,7 @@ class RunSettings:
     """Seed of the sampler."""
     repeat: int = 0
     """Queries of each method and pair in the timing pass, in which one process asks all methods in
-    shuffled order; 0 for none: times are then those of the answers, one method after the other."""
+    shuffled order. 0 for none: times are then those of the answers, one method after the other."""
     robot_radius_m: float | None = None
     """None: 0.25 m for ROS maps, 0 for MovingAI's."""
     merge_distance_m: float | None = None
@@ -115,7 +115,7 @@ class RunSettings:
     timeout_s: float = 600.0
     """Longest silence of a worker: one query, or a preparation."""
     limit_s: float | None = None
-    """Seconds that a method may take on a map, for its preparation and all answers; the pairs that
+    """Seconds that a method may take on a map, for its preparation and all answers. The pairs that
     are left then are recorded as "too slow", and the timing pass leaves it out. None: no limit."""
 
 

@@ -322,9 +322,9 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     -------
     list of dict
         One row for each method and map, and one for all maps; "loss over" names the optimum, by
-        which rows belong into different tables. Differences are second minus first:
-        of the loss in percentage points with its 95 % bootstrap interval and the p-value of
-        Wilcoxon's signed-rank test, and of the time as the median ratio, with the same test.
+        which rows belong into different tables. Differences are second minus first. Those of the
+        loss are percentage points with a 95 % bootstrap interval and the p-value of Wilcoxon's
+        signed-rank test. The time has the median ratio, with the same test.
 
     Raises
     ------

@@ -49,8 +49,8 @@ def load_blocked(
     """Read the closed areas of a map from a file.
 
     They are obstacles, such as pallets: the robot keeps its radius off them. With `keepout` they
-    are zones for the *centre* of the robot, to which nothing is added: as Nav2 takes the mask of
-    its keepout filter, which it lays over the inflated map.
+    are zones for the *centre* of the robot, to which nothing is added. Nav2 lays the mask of its
+    keepout filter over the inflated map in the same way.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ def load_blocked(
         a `FeatureCollection`, a `Feature` or a geometry, of `Polygon`, `MultiPolygon`, `LineString`
         and `MultiLineString`; coordinates are `[x, y]` in metres, map frame. A mask of map_server
         closes cells as `CostLayer.keepout_mask` does, also for presets that know no costs. An image
-        is a mask of one pixel a cell, in the orientation of the map's image: a pixel closes its
-        cell when it is opaque and its darkness, 1 - brightness in [0, 1], is at least the map's
-        occupied threshold; lighter and transparent pixels close nothing.
+        is a mask of one pixel a cell, in the orientation of the map's image. An opaque pixel closes
+        its cell when its darkness, 1 - brightness in [0, 1], is at least the map's occupied
+        threshold. Lighter and transparent pixels close nothing.
     grid
         The map.
     keepout

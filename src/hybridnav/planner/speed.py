@@ -132,7 +132,7 @@ class SpeedMap:
 class SpeedProfile:
     """Poses along a path, with the speed and the time at each.
 
-    A step from a pose to the next is a drive or a turn on the spot; two poses at one point are a
+    A step from a pose to the next is a drive or a turn on the spot. Two poses at one point are a
     turn on the spot, also where straight lines without headings bend.
 
     Examples
@@ -152,8 +152,8 @@ class SpeedProfile:
     along_m: FloatArray
     """float64 (n,), metres driven before each pose."""
     curvature_per_m: FloatArray
-    """float64 (n,), turn of the heading in a metre of the step after each pose, at the last one of
-    that before it, rad / m, positive to the left; 0 for turns on the spot."""
+    """float64 (n,), turn of the heading in a metre of the step after each pose, rad / m, positive
+    to the left. The last pose has that of the step before it; turns on the spot have 0."""
     speed_m_s: FloatArray
     """float64 (n,), m / s, >= 0 backwards too; 0 at both ends, turns on the spot, kinks and
     reversals."""

@@ -62,7 +62,7 @@ class Explanation:
     """Square metres that can be reached from the start, and from the goal."""
     cut: FloatArray | None = field(default=None, repr=False)
     """float64 (n, 2), `(x, y)` in metres, map frame: a closed chain of cells that cannot be
-    entered, each beside the next one, which goes round one of the ends; beyond the map its rim.
+    entered, each beside the next one. It goes round one of the ends; beyond the map it is its rim.
     None where the ends are joined, an end is blocked, or corners may be cut."""
 
     @property

@@ -40,9 +40,9 @@ class ArcLine(NamedTuple):
 class CostLine:
     """Finisher of paths by costs, on one grid: it moves a path to where it costs least.
 
-    The path becomes a chain of points some three cells apart that is pulled taut by its own cost:
-    all points move to their sides at a time, by Newton's method on the integral of the factors,
-    until none would move any more; then its bends move one at a time. So the line passes obstacles
+    The path becomes a chain of points some three cells apart that is pulled taut by its own cost.
+    All points move to their sides at a time, by Newton's method on the integral of the factors,
+    until none would move any more. Then its bends move one at a time. So the line passes obstacles
     on the sides that the path takes, and lines that begin near each other end in the same place.
     New segments are tested exactly: a line never leaves the union of the closed squares of the
     enterable cells.
@@ -150,7 +150,7 @@ class CostLine:
         -------
         FloatArray
             float64 (m, 2), `(x, y)` in metres: `start`, and the points of the line from the first
-            one that it sees; None where a segment may not be driven, or it costs more.
+            one in its sight. None where a segment may not be driven, or it costs more.
         """
         here, most = self.on_grain(np.array([start]))[0], most_m / self._frame.resolution_m
         rest = kernels.rest_of(self.free, self.factors, self.on_grain(line), here, most)

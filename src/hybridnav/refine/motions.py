@@ -30,15 +30,15 @@ class MotionCheck:
     """Exact validity of states and motions of a robot in free space, in the map frame.
 
     A disc robot is a point on a grid inflated by its radius. It stays in the union of the closed
-    squares of the cells that it may stand on, and never passes between two blocked cells that meet
+    squares of the cells that it may stand on. It never passes between two blocked cells that meet
     at a corner (unless the grid allows corner cutting). Numbers that are not finite, points outside
     the map and headings above a million are not valid. Points are rounded to 2^-24 of a cell; every
     test of a straight line between rounded points is exact.
 
     With a footprint the base keeps these rules, on a grid inflated by no more than the inscribed
-    radius, and the footprint must not meet the inside of a cell that is occupied without inflation
+    radius. The footprint must not meet the inside of a cell that is occupied without inflation
     (`OccupancyGrid.measured`). As for the disc, unexplored and closed cells and the ground outside
-    the map stop only the base. A motion is valid only if every state on it is: motions without a
+    the map stop only the base. A motion is valid only if every state on it is. Motions without a
     turn and turns on the spot are decided exactly, others up to a hundredth of a cell.
 
     Parameters
@@ -59,7 +59,7 @@ class MotionCheck:
     Raises
     ------
     InvalidValueError
-        When `inside` does not have the shape of the map, a closed cell lies outside it, or the
+        When `inside` does not have the shape of the map, or a closed cell lies outside it. When the
         footprint is refused, reaches more than 5000 cells, or is narrower than the inflation of the
         map.
 
@@ -274,9 +274,8 @@ class MotionCheck:
         Parameters
         ----------
         points
-            `(x, y)` in metres for a disc, (n, 2), n >= 1, where bends at corners of cells are
-            judged too; or `(x, y, yaw)` for a robot that turns between them as in `turn_valid`, (n,
-            3).
+            `(x, y)` in metres for a disc, (n, 2), n >= 1; bends at corners of cells are judged too.
+            Or `(x, y, yaw)`, (n, 3), for a robot that turns between them as in `turn_valid`.
 
         Raises
         ------

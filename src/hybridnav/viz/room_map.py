@@ -46,8 +46,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
 ) -> Axes:
     """Draw rooms in colours that differ between neighbours, with names, doors as dots, scale bar.
 
-    Every room has its name or, where the name does not fit or would hide another, its number in the
-    list of rooms, beside the room if necessary; the legend then has the names of the numbers,
+    Every room has its name. Where the name does not fit or would hide another, it has its number in
+    the list of rooms, beside the room if necessary. The legend then has the names of the numbers,
     unless they end in them, as `room-7` does. Doors have their numbers if there is room for them.
 
     Openings are squares: they are wider than 2 m or not between jambs. Those of both kinds that are

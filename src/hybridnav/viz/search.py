@@ -204,8 +204,8 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
 ) -> Axes:
     """Draw the states or intervals of a search, its corridor, and its path.
 
-    For a search by OMPL, the picture shows states and motions; for a search of the mesh, the view
-    through each interval, coloured in the order of discovery, and the roots of the views.
+    For a search by OMPL, the picture shows states and motions. For a search of the mesh it shows
+    the view through each interval, coloured in the order of discovery, and the roots of the views.
 
     Parameters
     ----------

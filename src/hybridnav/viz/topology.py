@@ -122,7 +122,7 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     """Draw the graph of places over a faint map: free places black, unexplored ones grey.
 
     An arc runs from one position to the other inside its two places and across its own boundary,
-    straight if there is room: parallel arcs pass the obstacle between them on different sides. A
+    straight if there is room. Parallel arcs pass the obstacle between them on different sides. A
     self-loop is a closed curve inside its place round the holes that it encloses, or a petal
     towards holes that are too small to go round. Arcs to unexplored places are lighter.
 

@@ -81,9 +81,9 @@ class Building:
     Raises
     ------
     InvalidValueError
-        When two floors or two links have one name, the planners differ in preset or robot radius,
-        or plan with headings, a link names an unknown floor, or the robot cannot stand at an end of
-        a link that it fits in.
+        When two floors or two links have one name, or a link names an unknown floor. When the
+        planners differ in preset or robot radius, or plan with headings. When the robot cannot
+        stand at an end of a link that it fits in.
 
     Examples
     --------
@@ -192,8 +192,8 @@ class Building:
         at
             Position in a named room, as in `HybridPlanner.plan`.
         profile
-            A `Profile`, or the name of one of `profiles`, whose costs, width, links and closed
-            rooms hold, also for the bound; None for the robot of the maps, which passes all rooms.
+            A `Profile`, or the name of one of `profiles`. Its costs, width, links and closed rooms
+            hold, also for the bound. None for the robot of the maps, which passes all rooms.
 
         Returns
         -------
@@ -203,8 +203,8 @@ class Building:
         Raises
         ------
         InvalidValueError
-            When a floor, link, profile or name is not known, a name is that of rooms on several
-            floors, a point is not two finite numbers, or a closed item is not on its floor.
+            When a floor, link, profile or name is not known, or a name is that of rooms on several
+            floors. When a point is not two finite numbers, or a closed item is not on its floor.
         MapError
             When the journal cannot be read, or closes what is not in the building.
         """

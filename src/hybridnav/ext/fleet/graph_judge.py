@@ -94,8 +94,8 @@ class BuildingGraphReport:
     """
 
     counts: dict[str, RouteCounts]
-    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; without those
-    of which there are none."""
+    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; kinds without pairs
+    are left out."""
     contradictions: tuple[str, ...]
     """The first 100 pairs whose answer the building contradicts, and why, one line each."""
 
@@ -124,15 +124,15 @@ def judge_building_graph(
     """Compare routes on the graph of a building with its own, over all floors.
 
     Half of the pairs have both ends on one floor, half on two. A route runs straight from the start
-    to the nearest node in sight of it, over the edges and rides that cost least to the nearest node
-    in sight of the goal, and straight to the goal, as `evaluate --graph` has it on one map. Rides
-    cost what the building charges, whatever the graph states, and the way from the nodes of the
+    to the nearest node in sight of it. It takes the edges and rides that cost least to the nearest
+    node in sight of the goal, and runs straight to the goal, as in `evaluate --graph`. Rides have
+    the charge of the building, whatever the graph states, and the distance from the nodes of the
     graph to the ends of the building's link. The optimum is that of `Building.plan`.
 
-    An answer is `solved`; `contradicted` where the route leads through a wall, takes a ride that
-    the building does not have, or costs less than the optimum; `no path, wrong` where the building
-    has a route and the graph has none; `no path, right` where neither has; or `no node in sight` of
-    an end, which the graph does not answer.
+    An answer is `solved`, or `contradicted` where the route leads through a wall, takes a ride that
+    the building does not have, or costs less than the optimum. It is `no path, wrong` where the
+    building has a route and the graph has none, and `no path, right` where neither has. It is `no
+    node in sight` where the graph does not reach an end.
 
     Parameters
     ----------

@@ -101,8 +101,8 @@ def match_graph(
 ) -> MatchedGraph:
     """Match the graph of a building to its floors and links.
 
-    Floors are matched by their names. So are links; one whose name the building does not know is
-    taken for a link of the same kind whose ends lie within 1 m of its own on two floors or more.
+    Floors are matched by their names. So are links. A link whose name the building does not know is
+    taken for one of the same kind whose ends lie within 1 m of its own on two floors or more.
 
     Parameters
     ----------
@@ -115,9 +115,9 @@ def match_graph(
     align
         Whether the frame of each floor of the graph is another one than that of its map. The floor
         is then moved so that the ends of links lie at those of the building's links of the same
-        names: shifted where one link stops, by the rigid motion with the least sum of squared
-        distances where several do. Links that are drawn in another place than the others, and the
-        walls, suggest are not followed. Floors at which no such link stops stay as they are.
+        names. One link shifts it; several turn it too, by the rigid motion with the least sum of
+        squared distances. Links that are drawn in another place than the others, and the walls,
+        suggest are not followed. Floors at which no such link stops stay as they are.
 
     Returns
     -------

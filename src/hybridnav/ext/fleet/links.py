@@ -68,8 +68,8 @@ class Link:
     Raises
     ------
     InvalidValueError
-        When the kind is not known, there are not two ends on different floors, a time or the cost
-        is negative or not finite, or the greatest radius is not above 0.
+        When the kind is not known, or there are not two ends on different floors. When a time or
+        the cost is negative or not finite, or the greatest radius is not above 0.
 
     Examples
     --------

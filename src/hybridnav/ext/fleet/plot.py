@@ -49,7 +49,7 @@ def plot_building(
     """Draw the floors of a building one above the other, the highest on top, all in one scale.
 
     Every end of a link has a mark by its kind, and its name. Each route is a line on the floors
-    that it visits; where the first route takes a link, the mark is filled, and the name says which
+    that it visits. Where the first route takes a link, the mark is filled, and the name says which
     floor it leads to. A floor that no route visits is a narrow strip with its links.
 
     Parameters

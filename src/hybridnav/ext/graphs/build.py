@@ -218,10 +218,10 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
         percent of the shortest paths need.
     spacing_m
         Distance in metres within which every free point sees a node, unless `nodes` is reached
-        before. It matters to robots that join the graph at the nearest node: with 2 m instead of
-        1 m, routes from there are up to 2.8 times as long as the shortest path.
+        before. It matters to robots that join the graph at the nearest node. With 2 m instead of 1
+        m, routes from there are up to 2.8 times as long as the shortest path.
     stretch
-        At least 1: two nodes that see each other have a route at most this many times as long as
+        At least 1. Two nodes that see each other have a route at most this many times as long as
         the segment between them. With a smaller number there are more edges: 1.02 instead of 1.05
         makes 1.6 times as many.
     seed

@@ -93,11 +93,11 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
 ) -> tuple[str, ...]:
     """Write all that Nav2 needs of a map into one folder, or nothing.
 
-    The folder holds `graph.geojson`, whose edges have metadata for the scorers of the route server;
-    `rooms_mask.yaml`, in which the value of a cell is the number of its room, and `room_names.yaml`
-    with these numbers; `keepout_mask.yaml` and `speed_mask.yaml`, if they are given; `poses.yaml`,
-    goals in rooms, doors and lifts; `nav2_params.yaml`, to be merged into the parameters of the
-    robot; and a `README.md`.
+    The folder holds `graph.geojson`, whose edges have metadata for the scorers of the route server.
+    In `rooms_mask.yaml` the value of a cell is the number of its room, and `room_names.yaml` has
+    these numbers. There are `keepout_mask.yaml` and `speed_mask.yaml`, if they are given, and
+    `poses.yaml`, goals in rooms, doors and lifts. `nav2_params.yaml` is to be merged into the
+    parameters of the robot; a `README.md` explains all.
 
     Parameters
     ----------
@@ -128,8 +128,8 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
     Raises
     ------
     InvalidValueError
-        When the map has no rooms, the graph is one of another map or keeps no edge, a mask has
-        another form, a lift is no named point or has the service of another one, or the folder
+        When the map has no rooms, or the graph is one of another map or keeps no edge. When a mask
+        has another form, a lift is no named point or has the service of another one, or the folder
         holds other files.
     MapError
         When a mask cannot be read, or the folder cannot be written.

@@ -93,17 +93,17 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     topology
         The map; with rooms, nodes lie in rooms and doors too, and edges name them.
     spacing_m
-        Distance between the lanes of a hall in metres; None for 4, or where the robot can enter
-        less than 25 m² for half the root of that area, 1 at least. Edges are about 1.25 times as
-        long at most, and free space farther than 1.1 times from lanes gets one of its own.
+        Distance between the lanes of a hall in metres. None for 4; where the robot can enter less
+        than 25 m², for half the root of that area, 1 at least. Edges are about 1.25 times as long
+        at most, and free space farther than 1.1 times from lanes gets one of its own.
     margin_m
         Clearance beyond the robot's radius that lanes keep where there is as much, in metres.
     points
         Named points, `(x, y)` in metres in the map frame: each becomes a node with its name, joined
         to the nearest lane in sight.
     keep
-        A graph of the map as it was: its nodes and edges stay where the robot can still follow
-        them, with their ids, and only what they lack is added. A node that an obstacle covers now
+        A graph of the map as it was. Its nodes and edges stay where the robot can still follow
+        them, with their ids, and only missing parts are added. A node that an obstacle covers now
         moves off to free space within 1 m, if there is any, and keeps its id too. No id of that
         graph goes to anything else.
     progress
@@ -117,9 +117,9 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     Raises
     ------
     InvalidValueError
-        When an argument is out of range, the map allows corner cutting, no part of it is as large
-        as 1 m², or a named point is not free, lies in a part that gets no lanes, or has the place
-        of another one.
+        When an argument is out of range, the map allows corner cutting, or no part of it is as
+        large as 1 m². When a named point is not free, lies in a part that gets no lanes, or has the
+        place of another one.
 
     Notes
     -----

@@ -138,7 +138,7 @@ def graph_changes(before: Graph, after: Graph) -> dict[str, dict[str, list[Any]]
     -------
     dict
         `nodes` and `edges`, each with the ids that were `added`, are `gone`, or stay and have
-        `moved` by more than 1 mm; an edge moves with a node, or to other ones.
+        `moved` by more than 1 mm. An edge moves with a node, or to other ones.
 
     Examples
     --------

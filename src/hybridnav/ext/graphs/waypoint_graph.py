@@ -129,9 +129,9 @@ class WaypointGraph:
 
     @property
     def ids(self) -> tuple[list[Name], list[Name | None]]:
-        """The ids of nodes and edges that stay from one export to the next: whole numbers that the
-        facts hold as `id`, as files of Open-RMF, OpenStreetMap and LIF by hybridnav do; for others
-        their names."""
+        """The ids of nodes and edges that stay from one export to the next. They are whole numbers
+        that the facts hold as `id`, as files of Open-RMF, OpenStreetMap and LIF by hybridnav do;
+        for others their names."""
         node_ids = [_kept_id(self.node_facts, at, name) for at, name in enumerate(self.names)]
         edge_ids = [_kept_id(self.edge_facts, at, name) for at, name in enumerate(self.edge_names)]
         return [name for name in node_ids if name is not None], edge_ids
@@ -219,9 +219,9 @@ class RouteGraph:
     positions: FloatArray
     """float64 (n, 2), (row, col) of each node in grid units."""
     kinds: tuple[str, ...]
-    """The kind of each node: room, door, point (a named one), crossing, end (of a lane), bend,
-    place, cover (for points that would see no node nearby), lane (of a lane that `keep_right`
-    makes)."""
+    """The kind of each node: room, door, point (a named one), crossing, end (of a lane), bend, or
+    place. A cover is for points that would see no node nearby, a lane for a lane of
+    `keep_right`."""
     rooms: tuple[str | None, ...]
     """The room of each node, None for no room."""
     doors: LongArray
@@ -244,8 +244,8 @@ class RouteGraph:
     right_m: FloatArray
     """float64 (m,), the least free distance to the right."""
     ids: tuple[LongArray, LongArray]
-    """int64 (n,) and (m,), the ids of nodes and edges in files and messages, each once: nodes from
-    0, edges after them, unless `build_lane_graph` has kept those of a graph before."""
+    """int64 (n,) and (m,), the ids of nodes and edges in files and messages, each once. Nodes count
+    from 0, edges after them, unless `build_lane_graph` has kept the ids of an earlier graph."""
 
     @property
     def n_nodes(self) -> int:

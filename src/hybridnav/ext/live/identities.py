@@ -254,8 +254,8 @@ def carry_costs(layer: CostLayer, before: OccupancyGrid, after: OccupancyGrid) -
 
     Factors and closed cells stay on their cells, whatever became of these; new cells have the
     factor 1 and are open. A layer of clearance is made anew from its settings. Where it was joined
-    with others, what it contributed is not known any more: cells within its inflation radius of an
-    obstacle that came or went are returned as outdated, and new ones within that of any obstacle.
+    with others, its part is not known any more. Cells within its inflation radius of an obstacle
+    that came or went are returned as outdated, and new ones within that of any obstacle.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ class OnlinePyramid:
         away and take in single cells. Levels are made when they are read.
 
         Under the linkage "throats" places of different parts of the first map stay apart, and new
-        places may merge with any: throats of new cells are found by a build alone.
+        places may merge with any. Only a build finds throats of new cells.
 
         Parameters
         ----------
@@ -127,12 +127,12 @@ class OnlinePyramid:
             The map now, with the cells of this version's grid: its frame may have its origin whole
             rows and columns lower, and it may be larger on any side.
         changed
-            The area where measurements changed, as in `HybridPlanner.update`: a shapely geometry
-            in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
-            mask, bool (rows, cols) of the new grid. The robot's radius is added on all sides, and
-            cells by which the map grew always count. Only there are cells compared: others stay as
-            they were until an update states them, and `pyramid` refuses such a version. None
-            compares all cells, as do grids with another radius or other thresholds.
+            The area where measurements changed, as in `HybridPlanner.update`. It is a shapely
+            geometry in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max,
+            y_max)`, or a mask, bool (rows, cols) of the new grid. The robot's radius is added on
+            all sides, and cells by which the map grew always count. Other cells stay as they were
+            until an update states them, and `pyramid` refuses such a version. None compares all
+            cells, as do grids with another radius or other thresholds.
 
         Returns
         -------
@@ -142,8 +142,8 @@ class OnlinePyramid:
         Raises
         ------
         InvalidValueError
-            When the grid has cells of another size or at other points, or does not cover the one of
-            this version, or `changed` is no area and no mask of it.
+            When the grid has cells of another size or at other points, or does not cover that of
+            this version. When `changed` is no area and no mask of it.
         """
         checked_type("grid", grid, OccupancyGrid)
         rows, cols = shift_of(self.grid, grid, otherwise="build a new pyramid")

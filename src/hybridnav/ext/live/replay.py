@@ -332,12 +332,12 @@ class ReplayFigures:
         -------
         dict
             `places` and `rooms` with `updates`, `median_ms` and `p95_ms` of an update, counts of
-            events, `flipped_cells` an update, `flipped_share`, their share of the cells that stayed
-            free, and the shares of them that flip by merging and by cutting off; for the places
-            that are `untouched`, `apart` and `far` in some update (see `Flips`) how many there are,
-            how many of them flip then, the number of flips, and the share that flips in an update;
-            `doors` with events, and `lost_names` of rooms that died; counts of the last map;
-            `faults` of its levels, see `faults_of`.
+            events, and `flipped_cells` an update. `flipped_share` is their share of the cells that
+            stayed free; the shares of them that flip by merging and by cutting off follow. For the
+            places that are `untouched`, `apart` and `far` in some update (see `Flips`) there are
+            the numbers of them and of those that flip, the number of flips, and the share that
+            flips in an update. `doors` has events, `lost_names` the names of rooms that died.
+            Counts of the last map follow, and `faults` of its levels, see `faults_of`.
         """
         last = self._last
         if last is None:

@@ -139,9 +139,9 @@ class OnlineRooms:
         joins them to others depends on the whole map. They keep their room when the map is no such
         scan any more, until it is found anew.
 
-        Where two rooms meet may differ: a build looks farther, at the main directions of the map
-        and at whole rooms, and knows nothing of the rooms before, which an update holds on to.
-        Borders that a person drew where the map shows none may go when a room is found anew.
+        Where two rooms meet may differ. A build looks farther, at the main directions of the map
+        and at whole rooms. It does not know the rooms before, which an update holds on to. Borders
+        that a person drew where the map shows none may go when a room is found anew.
 
         All cells are compared, the numbers of all cells are copied, and all doors are measured. The
         rest takes as long as a fresh build of the window. That is more than an update of the places
@@ -222,8 +222,9 @@ class OnlineRooms:
         Raises
         ------
         InvalidValueError
-            When the version has no such room, another one has the name, or it is no name: empty,
-            too long, not one printable line, a point, or `room-` and the number of another room.
+            When the version has no such room, or another one has the name. When it is no name:
+            empty, too long, not one printable line, a point, or `room-` and the number of another
+            room.
         """
         self._check(number)
         check_names((name,))

@@ -193,7 +193,7 @@ class AnyAngleResult:
     lower_bound_m: float = 0.0
     """Proved lower bound on all any-angle paths, in metres."""
     headings_rad: FloatArray | None = None
-    """float64 (n,), the direction of travel at each point: from one to the next the path is the arc
+    """float64 (n,), the direction of travel at each point. From one to the next the path is the arc
     of a circle tangent to both, a line if they are equal. None for lines alone."""
     by_grid: bool | None = None
     """Whether the method found nothing itself and this is the shortened path of the grid; None if a
@@ -215,8 +215,8 @@ class CostClaim:
     """Cost of the path: the integral of the factors along it, in metres. Arcs may be priced along
     chords of a quarter of a cell."""
     lower_bound_m: float | Callable[[], float] = 0.0
-    """Proved lower bound on the costs of all paths of cells, or, beside an `any_angle` path, of all
-    any-angle paths, in metres; or how to find it, which is no part of planning."""
+    """Proved lower bound in metres on the costs of all paths of cells, or, beside an `any_angle`
+    path, of all any-angle paths. It may be a function, whose time is no part of planning."""
     grid_bound_m: float | None = None
     """Proved lower bound on the costs of all paths of cells, beside an `any_angle` path, which may
     cost less; None for none."""

@@ -176,7 +176,7 @@ def chords_of(grid: OccupancyGrid, points: ArrayLike, headings_rad: ArrayLike) -
     """Return a path of lines and arcs as a polyline.
 
     From each point to the next the path is a line, if both have the same heading, else the arc of a
-    circle that is tangent to both; between two equal points the robot turns on the spot.
+    circle that is tangent to both. Between two equal points the robot turns on the spot.
 
     Parameters
     ----------

@@ -76,10 +76,11 @@ def judge_path(
     -------
     Verdict
         Faults: wrong first or last cell; cells outside the map or not free; a step that does not go
-        to one of the 8 neighbours; a segment between centres that enters a blocked cell or passes
-        between two that meet at a corner; a diagonal step with one blocked side cell ("cuts a
-        corner": legal for a line, not for a move of the octile grid). A cell that is not free
-        counts as blocked. On a grid with `corner_cutting` there are no faults about corners.
+        to one of the 8 neighbours. A segment between centres that enters a blocked cell or passes
+        between two that meet at a corner is a fault. So is a diagonal step with one blocked side
+        cell ("cuts a corner": legal for a line, not for a move of the octile grid). A cell that is
+        not free counts as blocked. On a grid with `corner_cutting` there are no faults about
+        corners.
 
     Raises
     ------
@@ -132,11 +133,10 @@ def segment_faults(
 
     Free space is the union of the closed squares of the free cells; outside the map nothing is
     free. A segment may touch the side or corner of a blocked cell. It may not enter one, run along
-    a side that two of them share, or pass between two of them that meet at a corner, straight or
-    with a bend there.
+    a side that two of them share, or pass between two that meet at a corner, straight or bent.
 
     Points are converted to grid units and rounded to 2^-24 of a cell, so that corners and centres
-    of cells, the bends of shortest paths, are exact again; every test after that is exact. A point
+    of cells, the bends of shortest paths, are exact again. Every test after that is exact. A point
     interpolated on a segment that grazes a corner can lie on the wrong side of it: judge a path
     before it is resampled.
 

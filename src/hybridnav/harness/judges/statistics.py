@@ -191,9 +191,9 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
     optima_m
         Optimal lengths in metres, shape (n,); infinite or NaN for pairs without a path.
     edges
-        Increasing finite distances in metres between the buckets. By default powers of two from
-        1 m to the last below the longest optimum: the same on every map, so that buckets can be
-        compared, and wider where pairs are further apart.
+        Increasing finite distances in metres between the buckets. By default powers of two from 1 m
+        to the last below the longest optimum. They are the same on every map, so that buckets can
+        be compared.
 
     Returns
     -------

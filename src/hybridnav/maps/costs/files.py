@@ -282,8 +282,8 @@ def filter_costs(
     Raises
     ------
     InvalidValueError
-        When a message lacks a field or holds a wrong value, the filter is of another type, or a
-        keepout filter has a base or multiplier other than 0 and 1, which Nav2 calls wrong.
+        When a message lacks a field or holds a wrong value, or the filter is of another type. When
+        a keepout filter has a base or multiplier other than 0 and 1, which Nav2 calls wrong.
 
     Examples
     --------

@@ -43,7 +43,7 @@ def load_ros_map(
     """Load a map of ROS's map_server.
 
     In the modes trinary and scale a pixel of brightness v in [0, 1] (the mean of its colour
-    channels) has the occupancy 1 - v, or v with `negate`; pixels that are not fully opaque were
+    channels) has the occupancy 1 - v, or v with `negate`. Pixels that are not fully opaque were
     never measured. In the mode raw the 8-bit values 0 to 100 are percentages, all others unknown.
 
     Parameters

@@ -158,8 +158,8 @@ class Doorway:
     beside: Side | None = None
     """Where the door lies for a person who comes along the path; None for ahead."""
     ordinal: int | None = None
-    """Which of the doors there it is, or of the openings: 1 to 5 for the first to the fifth, -1 for
-    the last one; None where it is the only one, or its distance shows it."""
+    """Its number among the doors there, or the openings: 1 to 5 for the first to the fifth, -1 for
+    the last one. None where it is the only one, or its distance shows it."""
     wall: Wall | None = None
     """The wall that leads to it from the door before; None where the words follow none."""
     is_seen: bool = False

@@ -40,13 +40,13 @@ def cost_bound(
     """Return a lower bound on the cost of all paths between two positions, in cells.
 
     Paths may touch blocked cells, but not pass between two that meet at a corner. A *potential*, a
-    function that nowhere rises by more than the factor, is a bound by itself: no path costs less
+    function that nowhere rises by more than the factor, is a bound by itself. No path costs less
     than the potential rises from its start to its goal. One that is linear on four triangles a cell
-    is found by fast marching from both ends, and then raised by a primal-dual iteration; where it
-    is still too steep, the excess is subtracted. It covers the cells over which a path may cost
-    less than the known one. Paths that leave them cost more: between two corners of cells, the
-    cheapest path along sides and diagonals is at most 1.0824 times as dear as the cheapest at any
-    angle, whatever the factors are; along a side the smaller factor of its two cells counts.
+    is found by fast marching from both ends. A primal-dual iteration raises it; where it is still
+    too steep, the excess is subtracted. It covers the cells over which a path may cost less than
+    the known one. Paths that leave them cost more. Between two corners of cells, the cheapest path
+    along sides and diagonals is at most 1.0824 times as dear as the cheapest at any angle, whatever
+    the factors are. Along a side the smaller factor of its two cells counts.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Lattice:
     A block has 4 x 4 cells; in narrow maps, such as mazes, 2 x 2 or one. Each connected part of its
     free cells has a node, in its cheapest cell. Edges lead to blocks up to a knight's move away:
     straight segments with the exact integral of the factors along them. Parts that meet without
-    seeing each other are joined by the cheapest path of cells inside them, so two cells are
+    seeing each other are joined by the cheapest path of cells inside them. So two cells are
     connected in the lattice just if they are on the grid.
 
     Examples
@@ -300,8 +300,8 @@ class LatticeSearch:
     """Search of a lattice; threads may share it.
 
     The line leads through nodes of the lattice, by edges in 16 directions. It runs past obstacles
-    on the sides that a cheapest path takes, but for near ties, and costs a little more than one: a
-    percent or two on maps of buildings. To be shortened, see `refine.CostLine`.
+    on the sides that a cheapest path takes, except for near ties. It costs a percent or two more on
+    maps of buildings. To be shortened, see `refine.CostLine`.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class ConvexMesh:
     """int32 (n, 2), (row, col) in grid units: every vertex is a lattice corner of free space."""
     kinds: ByteArray
     """uint8 (n,), the one blocked cell of four at a corner: bit 1 for the upper row, bit 0 for the
-    upper column; 4 at corners that no path bends round."""
+    upper column. 4 at corners that no path bends round."""
     first: IntArray
     """int32 (p + 1,), polygon i has the slots `first[i]` to `first[i + 1]`."""
     begins: IntArray

@@ -141,7 +141,7 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     """Return the mesh of free cells after some of them have changed.
 
     The polygons that share a point with a closed cell, or with a cell beside a freed one, are
-    triangulated and merged again together with the freed cells; all others stay, with their
+    triangulated and merged again together with the freed cells. All others stay, with their
     numbers. Only the blocks are always found again.
 
     Parameters

@@ -65,13 +65,13 @@ class HubLabels:
     """int32 (squares + 1,), offsets of the views of each square."""
     views: IntArray
     """int32 (v, 3), twice the number of a corner that sees something of the square, plus 1 if it
-    sees all free space there; its entries from one to before another: on all others, a path from
-    the square would be slack."""
+    sees all free space there. Then its entries from one to before another; on all others, a path
+    from the square would be slack."""
     first: IntArray
-    """int32 (2 n + 1,), the parts of the label of corner i whose paths go on into one of the two
-    quadrants beside its blocked cell are `first[2 i]` to `first[2 i + 1]`, the others
-    `first[2 i + 1]` to `first[2 i + 2]`. The corner itself comes first, then directions nearest to
-    the wall."""
+    """int32 (2 n + 1,), the label of corner i in two parts. Paths of `first[2 i]` to `first[2 i +
+    1]` go on into one of the two quadrants beside its blocked cell, paths of `first[2 i + 1]` to
+    `first[2 i + 2]` into the other. The corner itself comes first, then directions nearest to the
+    wall."""
     offset: IntArray
     """int32 (p + 1,), offsets of the entries of each part."""
     heads: IntArray

@@ -64,9 +64,9 @@ class JumpGraph:
     """int64 (words, 3), for every 64 flat cells: the free ones, the corner cells, and the counts of
     both before them, free ones in the high half."""
     ahead: NDArray[np.int16 | np.int32]
-    """int16 or int32 (n_free, 8), by free cell in the order of rows and by direction: along a side
-    the distance to the next corner cell, along a diagonal to the next cell that is a corner cell or
-    sees one along a side; where there is none, minus the number of legal moves."""
+    """int16 or int32 (n_free, 8), by free cell in the order of rows and by direction. Along a side
+    it is the distance to the next corner cell, along a diagonal to the next cell that is a corner
+    cell or sees one along a side. If there is none, it is minus the number of legal moves."""
     order: IntArray
     """int32 (n,), the number of each corner cell in the order of rows."""
     places: LongArray
@@ -78,7 +78,7 @@ class JumpGraph:
     its first leg, and of its last one backwards."""
     middles: LongArray
     """int64 (m,), the corner cell that a shortcut leads past and two of its arcs, see `contract` in
-    the kernels; -1 for an arc of the graph; empty where the graph is not contracted."""
+    the kernels. -1 for an arc of the graph; empty where the graph is not contracted."""
     component: IntArray
     """int32 (n,), the connected part of the graph that each corner cell belongs to."""
 

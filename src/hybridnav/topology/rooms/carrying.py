@@ -150,11 +150,11 @@ def carry_names(
     """Carry the names of rooms and the numbers of doors from a map to a later one.
 
     The maps may have other frames, sizes and resolutions, and show other furniture and other parts
-    of the building. The walls of both are registered by a rigid transform; then the walls of each
+    of the building. The walls of both are registered by a rigid transform. Then the walls of each
     old room are moved a little more, against drift. A new room takes the name of an old one if more
-    than half of what both maps show of either lies in the other. All other old rooms are listed.
-    A door keeps its number if a boundary of new rooms lies within a metre of it, and both its rooms
-    are those that the old ones were carried to, or one is and it lies within half a metre.
+    than half of the part of either that both maps show lies in the other. All other old rooms are
+    listed. A door keeps its number if a boundary of new rooms lies within a metre of it, and both
+    rooms were carried. Within half a metre one room is enough.
 
     Parameters
     ----------

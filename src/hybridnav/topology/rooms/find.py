@@ -54,8 +54,8 @@ def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels
     """Find the rooms of a map.
 
     Free space is cut finely, along the lines of walls in every local direction and at narrow
-    passages; segments then merge where a small forest, learnt from people's rooms, judges by the
-    evidence on a boundary that both lie in one room.
+    passages. Then a small forest, learnt from people's rooms, judges each boundary by its evidence.
+    Segments merge if both lie in one room.
 
     Parameters
     ----------

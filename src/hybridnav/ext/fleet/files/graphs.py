@@ -59,8 +59,8 @@ def load_building_graph(
         * `.osm`, `.xml`: OpenStreetMap's XML with indoor tags, or an area graph (osmAG);
         * `.json`, `.lif`: a layout in VDMA's Layout Interchange Format.
     anchor
-        Where the frame of a file of OpenStreetMap is to lie on the Earth; None for the node that is
-        named root, or else the least latitude and longitude of the file.
+        Place of the frame of a file of OpenStreetMap on the Earth. None for the node that is named
+        root, or else the least latitude and longitude of the file.
     graph_index
         Which of the graphs of a building map, from 0 to 9; None for the first that has lanes.
 
@@ -166,9 +166,9 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     Parameters
     ----------
     topology
-        The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
-        have it as `door_name`, and the floor has areas, and the listed doors and openings that an
-        edge passes: none that are closed to the robot, or lead nowhere. They are called
+        The map. With rooms, nodes in rooms have the room's name as `name`, edges that pass a door
+        have it as `door_name`, and the floor has areas. It also has the listed doors and openings
+        that an edge passes, none that are closed to the robot or lead nowhere. They are called
         "FLOOR_doorNUMBER" and "FLOOR_openingNUMBER".
     graph
         Its route graph, as `build_lane_graph`, `build_route_graph` and `keep_right` make it.

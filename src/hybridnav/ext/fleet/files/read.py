@@ -61,13 +61,14 @@ def load_building(
     ----------
     path
         A YAML file, or a model (.hnm) that `save` has written of a building. The file has a list
-        `floors`, from the lowest to the highest, each with its `name`, its `map` (a map or a model,
+        `floors`, from the lowest to the highest. Each has its `name`, its `map` (a map or a model,
         relative to the file), and optionally `elevation_m`, a file of `rooms`, or `find_rooms:
-        true`; a list `links`, each with its `name`, its `kind` (lift, stairs or ramp), two or more
-        `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`; and optionally
-        `speed_m_s`, and `profiles`, each with its `name` and what differs from a plain `Profile`.
-        An end has its `floor` and a place: `at: [x, y]`, a `room`, or the number of a `door`, with
-        the `room` on whose side of it the robot stands; and optionally `yaw_rad`.
+        true`. A list `links` has for each its `name`, its `kind` (lift, stairs or ramp), two or
+        more `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`. Optional are
+        `speed_m_s`, and `profiles`, each with its `name` and its differences from a plain
+        `Profile`. An end has its `floor`, a place, and optionally `yaw_rad`. The place is `at: [x,
+        y]`, a `room`, or the number of a `door`, with the `room` on whose side of it the robot
+        stands.
     robot_radius_m
         Radius of the robot in metres on all floors; None for that of the models, or of the preset.
     preset
@@ -86,8 +87,8 @@ def load_building(
     MapNotFoundError
         When a file does not exist.
     MapError
-        When a file cannot be read, or a floor, a room, a door or the place of an end is not as it
-        is written, or does not suit the robot; one line that names the file and the line.
+        When a file cannot be read. When a floor, a room, a door or the place of an end is not as it
+        is written, or does not suit the robot. The text names the file and the line.
     PresetError
         When the preset does not exist or is not valid.
     InvalidValueError

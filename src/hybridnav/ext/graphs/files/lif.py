@@ -238,12 +238,12 @@ def export_lif(
 ) -> tuple[str, ...]:
     """Write a layout for a master control that speaks VDA 5050.
 
-    The file is that of the guideline "LIF - Layout Interchange Format", version 1.0.0 of March
-    2024 (VDMA), as the schema of ConstantinUp/LIF_Schema has it: a layout for each floor, with
-    `layoutLevelId`; a node for each node, with the floor as `mapId` and its name as `nodeName`; an
-    edge for each edge. A link is edges from floor to floor, both ways, whose `edgeName` is its kind
-    and name: "the end node can be located in another layout". Rooms are no stations, and there are
-    none.
+    The file is that of the guideline "LIF - Layout Interchange Format", version 1.0.0 of March 2024
+    (VDMA), as the schema of ConstantinUp/LIF_Schema has it. There is a layout for each floor, with
+    `layoutLevelId`, and a node for each node, with the floor as `mapId` and its name as `nodeName`.
+    Each edge is an edge. A link is edges from floor to floor, both ways, whose `edgeName` is its
+    kind and name: "the end node can be located in another layout". Rooms are no stations, and there
+    are none.
 
     Parameters
     ----------

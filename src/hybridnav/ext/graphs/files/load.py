@@ -69,8 +69,8 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     MapNotFoundError
         When there is no such file.
     MapError
-        When it cannot be read: it is in none of these formats, too large, has no node with a point,
-        has several floors and none is chosen, or not the floor that is.
+        When it cannot be read: it is in none of these formats, too large, or has no node with a
+        point. When it has several floors and none is chosen, or not the chosen floor.
 
     Examples
     --------

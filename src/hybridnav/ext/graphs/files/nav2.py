@@ -25,11 +25,11 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     """Write a route graph as Nav2's route server reads it, a GeoJSON file.
 
     A node is a `Point`, an edge a `LineString` in one direction; coordinates are metres in the map
-    frame. Ids are those of `graph.ids`, unique over nodes and edges. The `cost` of an
-    edge is its length in metres. The `metadata` of nodes are `class`, and `room` and `door` where
-    there is one; those of edges `class` (door or free), `room`, `door` (the first that it passes),
-    `doors`, `width_m`, `clearance_m`, `left_m` and `right_m`, and of lanes `lane` (right). Nothing
-    is null: what is not known or infinite is left out.
+    frame. Ids are those of `graph.ids`, unique over nodes and edges. The `cost` of an edge is its
+    length in metres. The `metadata` of nodes are `class`, and `room` and `door` where there is one.
+    Edges have `class` (door or free), `room`, `door` (the first that it passes), `doors`,
+    `width_m`, `clearance_m`, `left_m` and `right_m`. Lanes have `lane` (right). Nothing is null:
+    unknown or infinite values are left out.
 
     A `WaypointGraph` keeps its own ids, costs, lines and facts; ids that occur twice or that Nav2
     cannot hold are replaced by free ones. Facts of a graph that is not from Nav2 become `metadata`,
@@ -47,8 +47,8 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     Raises
     ------
     InvalidValueError
-        When this is no graph, the graph has no edge, which Nav2 refuses, or more nodes and edges
-        than Nav2 has ids, the frame has no name, or a fact contains itself.
+        When this is no graph, or the graph has no edge, which Nav2 refuses, or more nodes and edges
+        than Nav2 has ids. When the frame has no name, or a fact contains itself.
     MapError
         When the name ends otherwise, or the file cannot be written.
 

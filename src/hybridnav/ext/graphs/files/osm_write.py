@@ -46,13 +46,13 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
     * Rooms are closed ways with `indoor`, `level`, `level:ref` and `name`, as in Simple Indoor
       Tagging of OpenStreetMap's wiki, and `osmAG:type=area` with `osmAG:areaType`.
     * Doors are nodes with `door=yes`. Doors and openings between two rooms are ways of two nodes,
-      shared with the outlines of both where these are near, with `osmAG:type=passage`, and the ids
-      of the two areas as `osmAG:from` and `osmAG:to`, as in the draft "Indoor osmAG Map Standard"
-      and `OsmAGExporter.cpp` (jiajiezhang7/osmAG-from-cad).
+      shared with the outlines of both where these are near. They have `osmAG:type=passage`, and the
+      ids of the two areas as `osmAG:from` and `osmAG:to`. So it is in the draft "Indoor osmAG Map
+      Standard" and `OsmAGExporter.cpp` (jiajiezhang7/osmAG-from-cad).
     * Edges are ways with `highway=footway`, `indoor=yes`, and `oneway=yes` where no edge leads
       back.
     * Links are ways through their ends with `highway` elevator, steps or footway and all levels in
-      `level`, and on each floor an area with a passage to the room that it lies in.
+      `level`. On each floor they are an area with a passage to the room around.
 
     What a `Link` knows beside, the name of an edge's door, and the ids of nodes and edges that are
     whole numbers have keys that begin with `hybridnav:`.

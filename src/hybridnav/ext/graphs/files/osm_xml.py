@@ -29,9 +29,9 @@ _MOST_LATITUDE_DEG = 85.0
 class Anchor:
     """The place of a map frame's origin on the Earth, and where its y axis points.
 
-    The projection is local: metres to the north are degrees of latitude times the radius of
-    curvature of the meridian at the anchor, metres to the east degrees of longitude times that of
-    the parallel, on the ellipsoid of WGS 84. Up to 200 m from the anchor, and 60 degrees from the
+    The projection is local, on the ellipsoid of WGS 84. Metres to the north are degrees of latitude
+    times the radius of curvature of the meridian at the anchor. Metres to the east are degrees of
+    longitude times that of the parallel. Up to 200 m from the anchor, and 60 degrees from the
     equator, that is within 2 cm of the plane that touches the Earth there.
 
     Raises

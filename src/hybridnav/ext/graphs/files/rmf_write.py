@@ -42,9 +42,9 @@ def export_rmf(
 
     The file is that of `generate_nav_graphs` (open-rmf/rmf_traffic_editor,
     `rmf_building_map_tools/building_map/building.py`), and keeps the rules of `parse_graph`
-    (open-rmf/rmf_ros2, `rmf_fleet_adapter/src/rmf_fleet_adapter/agv/parse_graph.cpp`): all levels
-    in one frame in metres, each edge a lane in one direction, names of vertices unique in the file,
-    and the vertices of a lift above each other.
+    (open-rmf/rmf_ros2, `rmf_fleet_adapter/src/rmf_fleet_adapter/agv/parse_graph.cpp`). All levels
+    lie in one frame in metres, and each edge is a lane in one direction. Names of vertices are
+    unique in the file, and the vertices of a lift lie above each other.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def export_rmf(
     Returns
     -------
     tuple of str
-        What Open-RMF has no place for and the file does not hold, and lifts whose ends lie 0.1 to
-        0.5 m apart, as on maps of scans: their vertices lie at the mean of the ends, and a lane
-        joins them to the nearest node. One line each.
+        Facts for which Open-RMF has no place, and lifts whose ends lie 0.1 to 0.5 m apart, as on
+        maps of scans, one line each. The vertices of such a lift lie at the mean of the ends, and a
+        lane joins them to the nearest node.
 
     Raises
     ------

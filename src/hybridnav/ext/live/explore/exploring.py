@@ -107,9 +107,9 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
 
     The robot scans, makes its map and follows it with its pyramid. The unexplored places that it
     can drive to are its goals. It plans to the nearest one by the cost of the path (Yamauchi 1997),
-    on the places that it knows, by the preset `paper`; scans on the way; and chooses again when it
-    is there or the goal has become known from afar. An unexplored cell that stays unexplored
-    on three visits, or that no path leads to, is given up.
+    on the places that it knows, by the preset `paper`. It scans on the way, and chooses again when
+    it is there or the goal has become known from afar. An unexplored cell that stays unexplored on
+    three visits, or that no path leads to, is given up.
 
     Noise can close a door or a gap in the map. So when no goal is left, the robot drives back the
     way it came if that leads to a part of its map with goals. Else it takes the occupied cells away
@@ -150,8 +150,8 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     Raises
     ------
     InvalidValueError
-        When the start is not in a free cell, the number of goals or the seed is out of range, there
-        is no such ranking, or noise leaves no free cell round the robot.
+        When the start is not in a free cell, or noise leaves no free cell round the robot. When the
+        number of goals or the seed is out of range, or there is no such ranking.
 
     Examples
     --------

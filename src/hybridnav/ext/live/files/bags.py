@@ -107,9 +107,9 @@ class BagLog(ScanLog):
 
     The pose of a scan is that of its frame at its time, by the transforms of the bag (tf, and
     odometry for frames that they lack). Scans are left out and counted if there is no transform at
-    their time, the laser is tilted by more than 0.1 radians, or they do not follow from those
-    before (see `ScanSequence`). A laser that hangs upside down is read as such. Readings below the
-    scan's `range_min` are none.
+    their time, or the laser is tilted by more than 0.1 radians. So are scans that do not follow
+    from the ones before (see `ScanSequence`). A laser that hangs upside down is read as such.
+    Readings below the scan's `range_min` are none.
 
     Parameters
     ----------

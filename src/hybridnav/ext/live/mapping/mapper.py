@@ -32,7 +32,7 @@ class Mapper:
     """An occupancy grid in log odds that scans are added to (Moravec and Elfes).
 
     Each cell starts at the odds of 0.5. A scan adds the log odds of its inverse model, which is
-    Bayes' rule for cells that are independent of each other (Elfes 1989); sums stay within the odds
+    Bayes' rule for cells that are independent of each other (Elfes 1989). Sums stay within the odds
     of `least_probability` and its complement. The extents grow with the scans: cells lie on a
     lattice that never moves, so a grid that grew is bit for bit one that was large from the start.
 

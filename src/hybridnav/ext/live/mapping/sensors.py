@@ -51,7 +51,7 @@ class LaserModel:
 
     A beam occupies the cell in which it ends, or one `depth_m` farther, and frees the other cells
     whose inside it passes before it comes within a tolerance of its end. One scan counts once for
-    each cell, however many beams meet it: readings are far from independent where beams are dense,
+    each cell, however many beams meet it. Readings are far from independent where beams are dense,
     near the laser and along walls that they graze (Konolige 1997).
 
     Parameters

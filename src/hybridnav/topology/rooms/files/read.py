@@ -48,17 +48,17 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     path
         A YAML file of one of two forms. `rooms:` is a list of rooms with a `name` and either a
         `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings: parts and holes) or a
-        `seed` [x, y], which names the room that segmentation finds there; and optionally a `point`
+        `seed`. A `seed` [x, y] names the room that segmentation finds there. Optional is a `point`
         [x, y] that represents the room. Rings are filled by the even-odd rule, also where a ring
         crosses itself. Entries of one name are one room, if their outlines lie beside each other.
         Where outlines overlap, one that a person has drawn or changed since the file was written
         has the cells, and the later one of several. In addition, `points:` is a list of named
-        points, and `doors:` a mapping from numbers of doors to a point [x, y] of the boundary, or
-        a list with `number` and `point`: the door nearest to it, within a metre, keeps the number.
-        `cells:` holds cells that written
-        outlines miss. In the other form `locations:` is a list of names, with an image `data:` of
-        the size of the map's, whose pixel values index the list, or flat `polygons:` in pixels of
-        that image; polygons win if both are present, and the first of overlapping ones.
+        points. `doors:` is a mapping from numbers of doors to a point [x, y] of the boundary, or a
+        list with `number` and `point`. The door nearest to it, within a metre, keeps the number.
+        `cells:` holds cells that written outlines miss. In the other form `locations:` is a list of
+        names. Beside it stands an image `data:` of the size of the map's, whose pixel values index
+        the list, or flat `polygons:` in pixels of that image. Polygons win if both are present, and
+        the first of overlapping ones.
     grid
         The map.
 
@@ -72,9 +72,9 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     RoomsNotFoundError
         When the file or the image does not exist.
     RoomsError
-        When one of them cannot be read; a room has no name or the name of one elsewhere, leaves
-        the map, or has no free cell of its own; a named point lies outside the map or in an
-        obstacle; or the number of a door is invalid or occurs twice.
+        When one of them cannot be read. When a room has no name or the name of one elsewhere,
+        leaves the map, or has no free cell of its own. When a named point lies outside the map or
+        in an obstacle, or the number of a door is invalid or occurs twice.
 
     Examples
     --------

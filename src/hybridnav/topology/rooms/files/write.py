@@ -61,7 +61,7 @@ def save_rooms(
         The map.
     tolerance_m
         How far outlines may lie from the steps of the cells, in metres, before they are brought
-        into line with walls; None for the least of twelve from 0.05 to 0.6 m with which the file
+        into line with walls. None for the least of twelve from 0.05 to 0.6 m with which the file
         has at most 20 kB, else 0.6.
 
     Raises
@@ -70,8 +70,8 @@ def save_rooms(
         When the tolerance is not positive and finite, these are no rooms or no map, or the rooms
         are those of a map of another size.
     RoomsError
-        When the file cannot be written, or could not be read again: a room has no free cell, a
-        named point lies outside the map or in an obstacle, or there are too many rooms.
+        When the file cannot be written, or there are too many rooms. When it could not be read
+        again: a room has no free cell, or a named point lies outside the map or in an obstacle.
 
     Examples
     --------
