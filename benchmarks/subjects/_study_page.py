@@ -186,10 +186,10 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     """Return the circumstances of the study: what was asked, where, and when."""
     plan, machine = data["plan"], data["machine"]
     pairs = (
-        f"{plan['pairs']} a map ({plan['ompl_pairs']} for OMPL). On ROS and SLAM maps they are sampled, "
-        "as many in each of five classes of distance; robot radius 0.25 m, merge distance 4 m. On "
-        "MovingAI maps they are spread evenly over the scenario files; a point robot, merge "
-        "distance 40 m"
+        f"{plan['pairs']} a map ({plan['ompl_pairs']} for OMPL). On ROS and SLAM maps they are "
+        "sampled, as many in each of five classes of distance; robot radius 0.25 m, merge distance "
+        "4 m. On MovingAI maps they are spread evenly over the scenario files; a point robot, "
+        "merge distance 40 m"
     )
     lengths = next(iter(data["parts"].values()))
     facts = [

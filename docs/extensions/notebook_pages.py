@@ -78,8 +78,7 @@ def start_kernels_clean() -> None:
     """Keep kernels from reading the user's start-up files; let both sides report errors only."""
     profile = ROOT / "out" / "ipython" / "profile_default"
     profile.mkdir(parents=True, exist_ok=True)
-    (profile / "ipython_kernel_config.py").write_text(_ELSEWHERE = re.compile(r'(?:src|<link[^>]+href)="(?:https?:)?//[^"]+"')
-_QUIET_KERNEL, encoding="utf-8")
+    (profile / "ipython_kernel_config.py").write_text(_QUIET_KERNEL, encoding="utf-8")
     os.environ["IPYTHONDIR"] = str(profile.parent)
     logging.getLogger("traitlets").setLevel(logging.ERROR)
 

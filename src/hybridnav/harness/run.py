@@ -79,8 +79,8 @@ class RunSettings:
     baselines: tuple[str, ...] = ()
     graphs: tuple[Any, ...] = ()
     """Graphs that others have made, or files of them; there must be one map. Routes go straight to
-    the nearest node in sight of the start, over the edges that are shortest in metres, and straight
-    on from the nearest node in sight of the goal."""
+    the nearest node in sight of the start. They take the edges that are shortest in metres, and go
+    straight on from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
     """Methods with names and settings of their own, as `load_methods` reads them from a file."""
     clear_edges_only: bool = False

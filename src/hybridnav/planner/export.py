@@ -105,11 +105,11 @@ def export_rooms(
 ) -> None:
     """Write the rooms of a map, and their doors.
 
-    CSV has a line for each room: its name, x and y of its point, the area of its free cells in m²,
-    whether the robot fits, and the numbers of its doors. GeoJSON has a `Polygon` or `MultiPolygon`
-    for each room with the same properties, and a `Point` in each door, with its `number`, `rooms`,
-    `kind`, `width_m`, `passage_m` and `passable`. Narrow rooms that the robot cannot enter, doors
-    to them, and gaps are left out, as in lists.
+    CSV has a line for each room: its name, x and y of its point, the area of its free cells in m².
+    Then follow whether the robot fits, and the numbers of its doors. GeoJSON has a `Polygon` or
+    `MultiPolygon` for each room with the same properties, and a `Point` in each door, with its
+    `number`, `rooms`, `kind`, `width_m`, `passage_m` and `passable`. Narrow rooms that the robot
+    cannot enter, doors to them, and gaps are left out, as in lists.
 
     Parameters
     ----------

@@ -296,8 +296,8 @@ class PlanResult:
         Raises
         ------
         PlanError
-            When no proof is known of such an answer: if corners may be cut, for paths of OMPL, for
-            copies of a result, and with costs other than those of clearance.
+            When no proof of such an answer is known: if corners may be cut, for paths of OMPL and
+            copies of a result, and with costs other than clearance.
 
         Examples
         --------

@@ -55,12 +55,12 @@ class LineOfSight:
     """Shortener of cell paths of one grid to any-angle paths; it holds one byte a cell.
 
     The string start, centres of the inner cells, goal is pulled taut. A bend between two points in
-    sight of it gives way to a convex hull: that of the corners of blocked cells inside the triangle
-    of the three (the triangle step of Hershberger and Snoeyink). The taut string bends only at
+    sight of it gives way to the convex hull of the corners of blocked cells inside the triangle of
+    the three. That is the triangle step of Hershberger and Snoeyink. The taut string bends only at
     corners of blocked cells, and is the shortest path that passes the obstacles on the same sides.
     Then parts of the string are led past the other sides of obstacles on the straight line between
-    their ends, always on one hand (V. Lumelsky, A. Stepanov: Path-planning strategies for a point
-    mobile automaton, 1987). They are pulled taut, and kept if they are shorter.
+    their ends, always on one hand. So do V. Lumelsky and A. Stepanov (Path-planning strategies for
+    a point mobile automaton, 1987). They are pulled taut, and kept if they are shorter.
 
     Turns are decided exactly and new segments are tested exactly, so a path never leaves the union
     of the closed squares of the enterable cells. It does not pass between two blocked cells that

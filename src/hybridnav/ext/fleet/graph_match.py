@@ -101,8 +101,8 @@ def match_graph(
 ) -> MatchedGraph:
     """Match the graph of a building to its floors and links.
 
-    Floors are matched by their names. So are links. A link whose name the building does not know is
-    taken for one of the same kind whose ends lie within 1 m of its own on two floors or more.
+    Floors are matched by their names. So are links. A link with another name is taken for one of
+    the same kind if the ends of both lie within 1 m on two floors or more.
 
     Parameters
     ----------

@@ -333,11 +333,11 @@ class ReplayFigures:
         dict
             `places` and `rooms` with `updates`, `median_ms` and `p95_ms` of an update, counts of
             events, and `flipped_cells` an update. `flipped_share` is their share of the cells that
-            stayed free; the shares of them that flip by merging and by cutting off follow. For the
+            stayed free; the shares of them that flip by merging and by cutting off follow. For
             places that are `untouched`, `apart` and `far` in some update (see `Flips`) there are
-            the numbers of them and of those that flip, the number of flips, and the share that
-            flips in an update. `doors` has events, `lost_names` the names of rooms that died.
-            Counts of the last map follow, and `faults` of its levels, see `faults_of`.
+            their number, how many flip, the number of flips, and the share in an update. `doors`
+            has events, `lost_names` the names of rooms that died. Counts of the last map follow,
+            and `faults` of its levels, see `faults_of`.
         """
         last = self._last
         if last is None:

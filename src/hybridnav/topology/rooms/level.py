@@ -226,7 +226,7 @@ class Rooms:
     @property
     def is_listed(self) -> BoolArray:
         """bool (n_rooms,), rooms in lists and pictures. They are wider than 1 m in the mean, or the
-        map's robot can enter them from such a one or the largest, or they have a name of their own.
+        map's robot can enter them from such a one or the largest. Or they have a name of their own.
         A laser sees the others through glass."""
         return self._listing.is_listed[: len(self.names)]
 
@@ -354,8 +354,8 @@ class Rooms:
         -------
         tuple of str
             Counts of rooms and of doors, such as "22 rooms, 1 of them too small for a robot 0.5 m
-            wide", and of those left out, such as "3 rooms, 43 gaps below 0.3 m and 12 other doors";
-            the last is empty if there are none.
+            wide". The last counts the left out ones, such as "3 rooms, 43 gaps below 0.3 m and 12
+            other doors"; empty if there are none.
         """
         shown = self.doors if everything else self.listed_doors
         fits = self.fits if everything else self.fits[self.is_listed]

@@ -177,9 +177,9 @@ _SPEED_M_S = 2.0
 class ScanSequence:
     """A test of whether each scan of a robot follows from the scan before.
 
-    A scan that has another number of beams, an earlier time, or a pose beyond reach is a mistake or
-    a new beginning: the robot was carried, its clock was set. So it is refused, but if the next
-    scan follows from it, that one is a new beginning and holds.
+    A scan may have another number of beams, an earlier time, or a pose beyond reach. That is a
+    mistake or a new beginning: the robot was carried, its clock was set. So it is refused, but if
+    the next scan follows from it, that one is a new beginning and holds.
 
     Examples
     --------

@@ -49,7 +49,7 @@ def _check_lengths(**lengths_m: float) -> None:
 class LaserModel:
     """Inverse model of laser beams without width (Thrun, Burgard, Fox 2005, section 9.2).
 
-    A beam occupies the cell in which it ends, or one `depth_m` farther, and frees the other cells
+    A beam occupies the cell in which it ends, or one `depth_m` farther. It frees the other cells
     whose inside it passes before it comes within a tolerance of its end. One scan counts once for
     each cell, however many beams meet it. Readings are far from independent where beams are dense,
     near the laser and along walls that they graze (Konolige 1997).
