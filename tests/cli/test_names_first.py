@@ -86,7 +86,7 @@ def test_what_is_closed_is_found_once_for_named_ends(monkeypatch):
 def test_help_says_whether_rooms_beside_the_map_are_read(cli, command, reads):
     said = " ".join(cli(command, "--help").out.replace("│", " ").split())
     assert ("rooms.yaml beside the map" in said) == reads
-    assert "in place of a model's or of those that are found" in said
+    assert "in place of a model's or of found ones" in said
 
 
 def test_rooms_are_found_anew_beside_a_file_of_rooms_on_demand(cli, tmp_path):

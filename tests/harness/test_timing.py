@@ -200,7 +200,7 @@ def test_the_load_of_the_answers_before_is_not_that_of_the_pass(before, within, 
     assert bool(about.warnings) == is_busy
     words = dict(about.facts)["load of the machine"]
     assert words.startswith(f"{before:.2f} at the start")
-    assert ("without what was before it" in words) == (seconds > 60)
+    assert ("without earlier load" in words) == (seconds > 60)
 
 
 @pytest.mark.usefixtures("here")

@@ -58,7 +58,7 @@ SeedOption = Annotated[
     typer.Option(
         "--seed",
         metavar="N",
-        help="Seed of what is random: pyramid, sampled pairs or noise; else the model's, the "
+        help="Seed of random choices: pyramid, sampled pairs or noise; else the model's, the "
         "preset's or 0.",
     ),
 ]
@@ -161,7 +161,7 @@ RoomsOption = Annotated[
     typer.Option(
         "--rooms",
         metavar="FILE",
-        help="Rooms as YAML, in place of a model's or of those that are found.",
+        help="Rooms as YAML, in place of a model's or of found ones.",
     ),
 ]
 

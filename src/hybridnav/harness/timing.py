@@ -160,7 +160,7 @@ BUSY = 1.5
 """Load above which a machine is busy in the timing pass, whose one process is a load of 1."""
 
 _MEMORY_S = 60.0
-"""Seconds after which a reading of the load remembers what came before to the share 1 / e."""
+"""Seconds after which earlier load has the share 1 / e of a reading."""
 
 Key = tuple[str, str]
 """Hashes of a map and a method."""
@@ -205,7 +205,7 @@ class Circumstances:
             start, end = self.loads[0], self.loads[-1]
             text = f"{start:.2f} at the start, {end:.2f} at the end, {self.most_load:.2f} at most"
             if self.own_loads != self.loads:
-                text += " in the pass, without what was before it"
+                text += " in the pass, without earlier load"
             facts.append(("load of the machine", text))
         facts += [("command", command) for command in self.commands]
         return facts

@@ -279,7 +279,7 @@ def _as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
             elif time.monotonic() - seen > NO_WORKER_S:
                 raise InvalidValueError(
                     f"scheduler {client.scheduler.address}: it has had no worker for "
-                    f"{NO_WORKER_S:g} s: start workers and run this again, what is recorded stays"
+                    f"{NO_WORKER_S:g} s: start workers and run this again, records stay"
                 ) from None
         else:
             yield from done
@@ -310,9 +310,9 @@ def distances_on_cluster(
 ) -> Any:
     """Return what `planner.distances` does, found on a dask.distributed cluster.
 
-    The planner is sent once, with the structures that it has built: prepare it before. Each task
-    is a block of starts with all goals; what a worker that is lost had to do is done elsewhere. The
-    results of at most two tasks of each thread wait at a time, beside the table itself.
+    The planner is sent once, with the structures that it has built: prepare it before. Each task is
+    a block of starts with all goals; blocks of a lost worker are done elsewhere. The results of at
+    most two tasks of each thread wait at a time, beside the table itself.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ MOST_COST = 100.0
 
 @dataclass(frozen=True)
 class RoomUse:
-    """What routes may do in a room, and what a metre in it costs them; profiles heed it.
+    """Use of a room by routes, and the cost of a metre in it; profiles heed it.
 
     Raises
     ------

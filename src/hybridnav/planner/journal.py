@@ -71,7 +71,7 @@ class OutOfOrder:
                 )
         if not _WHAT.fullmatch(self.what):
             raise InvalidValueError(
-                "what is closed must be link:NAME, door:N or room:NAME, in a building with FLOOR: "
+                "a closed thing must be link:NAME, door:N or room:NAME, in a building with FLOOR: "
                 f"before a door or a room, got {brief(self.what)}"
             )
 
@@ -98,7 +98,7 @@ class OutOfOrder:
         return Blocked(doors=[int(door)] if door else [], rooms=[room] if room else [])
 
     def check_on(self, topology: TopologicalMap) -> None:
-        """Refuse what is not on a map without floors.
+        """Refuse things that are not on a map without floors.
 
         Raises
         ------
@@ -111,7 +111,8 @@ class OutOfOrder:
 
 
 class Journal:
-    """What is out of order in a building or on a map, in `NAME.closed.yaml` beside its file.
+    """Things that are out of order in a building or on a map, in `NAME.closed.yaml` beside its
+    file.
 
     Programs and threads may share it: each change reads the file anew under a lock and writes it
     whole. Two that change different things lose nothing. Of two that change one thing the last one
@@ -142,7 +143,7 @@ class Journal:
         return f"Journal({str(self.path)!r})"
 
     def items(self) -> tuple[OutOfOrder, ...]:
-        """Return what is out of order now; the file is read when it has changed.
+        """Return the things that are out of order now; the file is read when it has changed.
 
         Raises
         ------

@@ -51,10 +51,10 @@ class Path:
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
     where an any-angle path turns. With `is_curved` those at which lines and arcs meet: straight
-    lines between them are chords, shorter than what is driven; `poses` lie on the arcs."""
+    lines between them are chords, shorter than the driven ones; `poses` lie on the arcs."""
     length_m: float
-    """Length in metres of what is driven, on arcs along them; for a cell path it is counted as
-    a + b sqrt 2 cells from the moves."""
+    """Driven length in metres, on arcs along them; for a cell path it is counted as a + b sqrt 2
+    cells from the moves."""
     headings_rad: FloatArray | None = None
     """float64 (m,), heading at each point, counter-clockwise from the x axis; None if the state
     space has none."""

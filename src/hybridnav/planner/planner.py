@@ -334,7 +334,8 @@ class HybridPlanner(Questions):
             return self._now.plan_many((first, last), smooth, blocked)
 
     def prepare(self, *, labels: float | None = None, progress: Progress = no_progress) -> None:
-        """Build what queries need, each once, and renew what is stale; threads may plan meanwhile.
+        """Build the structures that queries need, each once, and renew stale ones; threads may plan
+        meanwhile.
 
         Parameters
         ----------
@@ -360,13 +361,13 @@ class HybridPlanner(Questions):
     ) -> None:
         """Plan by other costs, or on a changed map, from now on, exactly and with proofs.
 
-        Queries of other threads that run already finish by what was before; the update waits for
+        Queries of other threads that run already finish by the state before; the update waits for
         them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
 
         `shortest`, `octile`, `grid-astar` and `robot` follow a changed grid alone. Their results
         have no route, and names, places and doors are refused, until an update brings the places of
         the map now. All other presets need these at once. Costs that were given stay with their
-        cells on a changed map; those that the preset computes from the map are computed anew.
+        cells on a changed map; costs that the preset computes from the map are computed anew.
 
         Parameters
         ----------
@@ -445,5 +446,5 @@ class HybridPlanner(Questions):
         return self._now.points_of(waypoints, at, self._closing(waypoints, blocked))
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
-        """Return closed cells with those that the costs close for all queries."""
+        """Return closed cells with cells that the costs close for all queries."""
         return self._now.closed_for_all(closed)

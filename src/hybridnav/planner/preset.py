@@ -63,7 +63,7 @@ class LimitSettings(Section):
 
 
 class Preset(Section):
-    """A planner's configuration: sections `pyramid`, `planner` and `limits`, and what it is for.
+    """A planner's configuration: sections `pyramid`, `planner` and `limits`, and its purpose.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     Raises
     ------
     PresetNotFoundError
-        When there is no such preset or file; the message lists those that exist.
+        When there is no such preset or file; the message lists existing ones.
     PresetError
         When a key is unknown or a value is out of range; the message names the key and its place.
 

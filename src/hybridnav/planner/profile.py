@@ -62,7 +62,7 @@ class Profile:
     through_private: bool = False
     """Whether routes pass rooms of `use: private`, in which others only start or end."""
     elsewhere: float = 1.0
-    """What a metre outside of rooms of `prefer: corridor` counts, on a floor that has some."""
+    """Cost of a metre outside of rooms of `prefer: corridor`, on a floor that has some."""
     costs: bool = True
     """Whether the `cost` of rooms counts."""
     stairs: bool = True
@@ -90,7 +90,7 @@ class Profile:
 
     @property
     def described(self) -> str:
-        """What it asks for, in one line."""
+        """Its demands, in one line."""
         parts = [] if self.through_private else ["no private rooms on the way"]
         if self.elsewhere > 1:
             parts.append(f"a metre outside of corridors counts {self.elsewhere:g}")

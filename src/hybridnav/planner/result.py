@@ -213,7 +213,8 @@ class PlanResult:
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
-        """What a person does along the path; none without a path, and on a map without rooms."""
+        """Instructions for a person along the path; none without a path, and on a map without
+        rooms."""
         source = self.instruction_source
         return source if isinstance(source, tuple) else source.instructions()
 

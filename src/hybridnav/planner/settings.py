@@ -126,7 +126,7 @@ class PlannerSettings(Section):
 
     @property
     def finish(self) -> Finish:
-        """What is done with the path that the method finds."""
+        """Smoothing of the path that the method finds."""
         return "none"
 
     @property
@@ -197,7 +197,7 @@ class OctileSettings(PlannerSettings):
 
     @property
     def finish(self) -> Finish:
-        """What is done with the path of cells."""
+        """Smoothing of the path of cells."""
         return self.smooth
 
 
@@ -212,7 +212,7 @@ class _ByCosts(PlannerSettings):
 
     @property
     def finish(self) -> Finish:
-        """What is done with the path of cells."""
+        """Smoothing of the path of cells."""
         return self.smooth
 
     @property

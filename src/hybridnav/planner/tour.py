@@ -46,7 +46,7 @@ class Tour:
     legs: tuple[Leg, ...]
     """The tour by rooms; none unless it is solved and the map has rooms."""
     instructions: tuple[Instruction, ...] = ()
-    """What a person does along the tour; none unless it has legs."""
+    """Instructions for a person along the tour; none unless it has legs."""
 
     @property
     def status(self) -> PlanStatus:

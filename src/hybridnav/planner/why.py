@@ -51,13 +51,13 @@ class Explanation:
     opened: Bottleneck
     """The bottleneck with nothing closed."""
     tight: TightPlace | None
-    """Where the widest path is tightest: with what is closed, or, if that leaves no path at any
+    """Where the widest path is tightest: with the closures, or, if they leave no path at any
     radius, without. None without a path."""
     to_open: tuple[Closure, ...]
     """The fewest closures that have to open for a path of this radius; none if there is one, or if
     opening does not help."""
     through_unexplored: bool
-    """Whether there is a path of this radius, with what is closed, that enters unexplored cells."""
+    """Whether there is a path of this radius, with the closures, that enters unexplored cells."""
     reached_m2: tuple[float, float]
     """Square metres that can be reached from the start, and from the goal."""
     cut: FloatArray | None = field(default=None, repr=False)
@@ -67,12 +67,12 @@ class Explanation:
 
     @property
     def has_path(self) -> bool:
-        """Whether there is a path of this radius, with what is closed."""
+        """Whether there is a path of this radius, with the closures."""
         return not self.blocked_ends and self.radius_m < self.closed.radius_m
 
     @property
     def widest_m(self) -> float:
-        """The radius below which every disc has a path, with what is closed, metres; 0 for none."""
+        """The radius below which every disc has a path, with the closures, metres; 0 for none."""
         return self.closed.radius_m
 
     @property

@@ -137,10 +137,10 @@ class DualGraphPyramid:
 
         All levels up to the places are those of this pyramid. Above them, the arcs with the
         greatest *expansion rating* are contracted first: the squared length of the boundaries
-        between two fields over the product of their areas, both in cells. Regions are what has
-        grown when no two fields may merge without having more than so many cells. From there
-        contraction goes on without this limit. With rooms, regions lie inside rooms, and the levels
-        of the rooms and of the apex come above them.
+        between two fields over the product of their areas, both in cells. Regions are the fields
+        when no two may merge without having more than so many cells. From there contraction goes on
+        without this limit. With rooms, regions lie inside rooms, and the levels of the rooms and of
+        the apex come above them.
 
         Parameters
         ----------

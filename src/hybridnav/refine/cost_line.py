@@ -157,8 +157,8 @@ class CostLine:
         return self.in_metres(rest, start, line[-1]) if len(rest) else None
 
     def on_grain(self, points: FloatArray) -> FloatArray:
-        """Return the positions of points, on the grain of exact tests; what lies on the rim of the
-        map stays there."""
+        """Return the positions of points, on the grain of exact tests; points on the rim of the map
+        stay there."""
         line = np.rint(self._frame.positions_of(points) * GRAIN) / GRAIN
         return np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
 

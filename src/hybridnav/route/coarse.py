@@ -177,9 +177,9 @@ def corridor_of(
     places
         Dense indices of the route's places, in their order.
     beside
-        `"route"`: none. `"joined"`: the places beside the first and the last one, and those that
-        two arcs join to the route, so that a path can leave it there and come back.
-        `"neighbours"`: all that an arc joins to it.
+        `"route"`: none. `"joined"`: the places beside the first and the last one, and places that
+        two arcs join to the route, so that a path can leave it there and come back. `"neighbours"`:
+        all that an arc joins to it.
     enterable
         bool (n_places,), the places that may be entered; None for all.
 

@@ -42,11 +42,11 @@ class DoorRoute:
     """Arcs of the room level between them, one fewer than vertices."""
     legs_m: tuple[float, ...]
     """Length inside each room, from the middle of one boundary to that of the next, in metres; on a
-    graph by costs what it costs."""
+    graph by costs its cost."""
 
     @property
     def length_m(self) -> float:
-        """Length of the route in metres, or what it costs."""
+        """Length of the route in metres, or its cost."""
         return sum(self.legs_m)
 
 
@@ -72,10 +72,10 @@ class _Links(NamedTuple):
 class DoorGraph:
     """The room level as a graph of darts, each an arc passed in one direction.
 
-    A dart is linked to those that leave the room that it enters. The cost is that of the shortest
-    path of cells inside the room, or of the cheapest one, between the cells in the middle of both
-    boundaries. It is counted in whole numbers, never below that of the path and at most 1e-10 of it
-    above, so that no route costs less than the cheapest path.
+    A dart is linked to the darts that leave the room that it enters. The cost is that of the
+    shortest path of cells inside the room, or of the cheapest one, between the cells in the middle
+    of both boundaries. It is counted in whole numbers, never below that of the path and at most
+    1e-10 of it above, so that no route costs less than the cheapest path.
 
     Parameters
     ----------

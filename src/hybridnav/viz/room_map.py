@@ -51,8 +51,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     unless they end in them, as `room-7` does. Doors have their numbers if there is room for them.
 
     Openings are squares: they are wider than 2 m or not between jambs. Those of both kinds that are
-    too narrow for the map's robot radius are hollow dots. What is not listed is left out and
-    counted in the legend: gaps, which are doors narrower than 0.3 m, rooms that cannot be entered
+    too narrow for the map's robot radius are hollow dots. The legend counts what the picture leaves
+    out: gaps, which are doors narrower than 0.3 m, rooms that cannot be entered
     (`Rooms.is_listed`), and doors to them. Those rooms are drawn as free cells.
 
     Parameters
@@ -66,7 +66,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     names
         Whether to write the names.
     everything
-        Whether to draw all rooms and doors, not only those that are listed.
+        Whether to draw all rooms and doors, not only listed ones.
     title
         Title instead of the map's name and the count of rooms; empty for none.
     width_in

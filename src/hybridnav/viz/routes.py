@@ -73,7 +73,7 @@ def plot_tour(  # noqa: PLR0913 - all but two have defaults
     title
         Title instead of the map's name and the length; empty for none.
     costs, blocked
-        What the query was planned with, drawn over the cells; None for nothing.
+        Costs and closures of the query, drawn over the cells; None for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -144,7 +144,7 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
     title
         Title instead of the map's name and the count of routes; empty for none.
     costs, blocked
-        What the query was planned with, drawn over the cells; None for nothing.
+        Costs and closures of the query, drawn over the cells; None for none.
     width_in
         Width of a new figure in inches; its height follows.
 

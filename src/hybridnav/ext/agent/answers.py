@@ -88,7 +88,7 @@ class MapAnswers:
         -------
         dict
             An `Answer`; with `ok` False if the question cannot be answered as it is, where `text`
-            says what to do, and `choices` what a name may mean. Pictures have `png`, bytes.
+            has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
         """
         tool = next((one for one in ask.TOOLS if one.name == name), None)
         try:

@@ -283,9 +283,9 @@ class Tool(NamedTuple):
     asks: type[BaseModel]
     """The model of its arguments. The docstring of the model describes the tool to its callers."""
     gives: type[Answer]
-    """What it returns."""
+    """The model of its answer."""
     edits: bool = False
-    """Whether it changes what others see, and is refused unless edits are allowed."""
+    """Whether it changes the map for others, and is refused unless edits are allowed."""
 
 
 TOOLS = (

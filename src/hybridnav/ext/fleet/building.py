@@ -63,7 +63,7 @@ class Building:
     """Several floors of a building, joined by links: lifts, stairs and ramps.
 
     Threads may share it. Its planners may follow changes of their maps and costs
-    (`HybridPlanner.update`): what is known of the floor before is then forgotten.
+    (`HybridPlanner.update`): earlier distances of the floor are then forgotten.
 
     Parameters
     ----------
@@ -76,7 +76,8 @@ class Building:
     profiles
         Profiles beside those of `hybridnav.planner.PROFILES`, or in place of one of their names.
     journal
-        What is out of order: it is closed for all queries until it is opened again. None for none.
+        Things that are out of order: closed for all queries until they are opened again. None for
+        none.
 
     Raises
     ------
@@ -206,7 +207,7 @@ class Building:
             When a floor, link, profile or name is not known, or a name is that of rooms on several
             floors. When a point is not two finite numbers, or a closed item is not on its floor.
         MapError
-            When the journal cannot be read, or closes what is not in the building.
+            When the journal cannot be read, or closes things that are not in the building.
         """
         asked = _Asked(blocked or {}, closed_links, stairs, at)
         return self._under_profile(start, goal, asked, profile, (1, 1.0))[0]
@@ -260,8 +261,8 @@ class Building:
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures of all planners, and the costs between the ends of links, now.
 
-        Floors with more than 128 ends have none computed in advance: queries compute what they
-        need.
+        Floors with more than 128 ends have none computed in advance: queries compute them as
+        needed.
 
         Parameters
         ----------
@@ -275,7 +276,7 @@ class Building:
 
     @property
     def known(self) -> tuple[Known, ...]:
-        """What is known of the costs between the ends of links on each floor."""
+        """Known costs between the ends of links on each floor."""
         return tuple(table.known for table in self._current())
 
     def adopt(self, known: Sequence[Known]) -> None:

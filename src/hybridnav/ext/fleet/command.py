@@ -143,7 +143,7 @@ def _closures(
         kind, colon, rest = text.partition(":")
         if not colon or not rest.strip():
             raise UsageError(
-                "--blocked must be link:NAME, or FLOOR: and what is closed there, as 2:door:7, "
+                "--blocked must be link:NAME, or FLOOR: and a thing there, as 2:door:7, "
                 f"got {text!r:.80}"
             )
         if kind == "link":

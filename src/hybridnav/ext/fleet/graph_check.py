@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class BuildingGraphCheck:
-    """The graph of a building on its maps, and what is wrong with it. Made by
-    `check_building_graph`.
+    """The graph of a building on its maps, and its faults. Made by `check_building_graph`.
 
     Examples
     --------
@@ -40,9 +39,9 @@ class BuildingGraphCheck:
     matched: MatchedGraph
     """The graph, matched to the building."""
     floors: dict[str, GraphCheck]
-    """What is wrong on each floor, by its name."""
+    """The faults on each floor, by its name."""
     findings: tuple[Finding, ...]
-    """What is wrong with floors, links, and the graph as a whole; empty for nothing."""
+    """Faults of floors, links, and the graph as a whole; empty for none."""
 
     @property
     def count(self) -> int:
@@ -52,11 +51,11 @@ class BuildingGraphCheck:
 
 
 def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
-    """Find what is wrong with the graph of a building.
+    """Find the faults of the graph of a building.
 
     Each floor is checked as by `check_graph`, but a node is `one-way` only if routes over other
-    floors cannot reach and leave it either. `graphs.BUILDING_KINDS` lists what is found beside
-    that. The graph need not have links that the robot does not fit in.
+    floors cannot reach and leave it either. `graphs.BUILDING_KINDS` lists the kinds of findings
+    beside them. The graph need not have links that the robot does not fit in.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class DoorLine:
     ends: tuple[Point, Point]
     """Two points `(x, y)` in metres, in the frame of the floor."""
     rooms: tuple[str | None, str | None] = (None, None)
-    """The rooms on both sides; None for what lies in no room, or where the file does not say."""
+    """The rooms on both sides; None for nameless space, or where the file does not say."""
     is_opening: bool = False
     """Whether it is no door that could be shut."""
 

@@ -63,7 +63,7 @@ class Link:
     """A lift, stairs or a ramp. It leads in both directions between any two of its ends.
 
     A ride costs `wait_s`, and from one end to the next one `ride_s`, in seconds, and `cost_m` in
-    metres on top: what a planner charges is `cost_m + speed * seconds`.
+    metres on top: a planner charges `cost_m + speed * seconds`.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class Link:
     name: str
     """Name, unlike those of other links of the building."""
     kind: LinkKind
-    """What it is: robots that climb no stairs are kept from stairs."""
+    """Its kind: robots that climb no stairs are kept from stairs."""
     ends: tuple[LinkEnd, ...]
     """Two or more, on different floors, from the lowest to the highest."""
     wait_s: float = 0.0
@@ -165,7 +165,7 @@ class Link:
         return float(self.wait_s + self.ride_s * rides)
 
     def charge_m(self, from_floor: str, to_floor: str, *, speed_m_s: float) -> float:
-        """Return what a ride is charged in metres.
+        """Return the charge of a ride in metres.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class Ride:
     from_floor: str
     to_floor: str
     charge_m: float
-    """What it costs, in metres."""
+    """Its charge, in metres."""
 
     @property
     def seconds(self) -> float:

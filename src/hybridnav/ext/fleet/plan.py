@@ -71,11 +71,12 @@ class BuildingPlan:
     profile: str | None = None
     """Name of the profile that it was planned under; None for none."""
     note: str = ""
-    """What the profile forbids, one line, where that leaves no route."""
+    """The reason, one line, where the profile leaves no route."""
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
-        """What a person does along the route; none without a route, and if no floor has rooms."""
+        """Instructions for a person along the route; none without a route, and if no floor has
+        rooms."""
         source = self.instruction_source
         return source if isinstance(source, tuple) else source.instructions()
 

@@ -123,7 +123,7 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
     Returns
     -------
     tuple of str
-        What the bundle does not hold: rooms without a number, edges in keepout zones.
+        Things left out of the bundle: rooms without a number, edges in keepout zones.
 
     Raises
     ------

@@ -35,7 +35,7 @@ _HALVINGS = 24
 
 @dataclass(frozen=True, eq=False)
 class GraphCheck:
-    """A graph on its map, and what is wrong with it. Made by `check_graph`.
+    """A graph on its map, and its faults. Made by `check_graph`.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class GraphCheck:
     graph: WaypointGraph
     """The graph."""
     findings: tuple[Finding, ...]
-    """What was found, empty if nothing is wrong."""
+    """The findings, empty if nothing is wrong."""
     is_free: BoolArray
     """bool (n,), nodes where the robot fits."""
     is_clear: BoolArray
@@ -79,7 +79,7 @@ class GraphCheck:
 def check_graph(
     topology: TopologicalMap, graph: WaypointGraph, *, along_lines: bool = False
 ) -> GraphCheck:
-    """Find what is wrong with a graph on a map.
+    """Find the faults of a graph on a map.
 
     Edges are straight from node to node, as Nav2 drives them, unless stated otherwise. Tests
     against the cells are exact, for a disc of the map's robot radius; a point lies in the cell of

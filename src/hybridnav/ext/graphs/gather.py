@@ -92,7 +92,7 @@ class Example:
     """
 
     where: str
-    """The node, edge, door or room, and what is known about the case."""
+    """The node, edge, door or room, and known facts about the case."""
     points: tuple[Point, ...] = ()
     """`(x, y)` in metres, map frame: one for a node, two for an edge, none if it is nowhere."""
 
@@ -117,7 +117,7 @@ class Finding:
 
     @property
     def text(self) -> str:
-        """What is counted."""
+        """The counted things, in words."""
         return (KINDS | BUILDING_KINDS)[self.kind]
 
     @property

@@ -185,7 +185,7 @@ def first_broken_edge(
     grid
         The map now; a graph from a file needs it, for others the default is their own.
     by
-        What the ids are: `"nodes"` or `"edges"`.
+        The kind of the ids: `"nodes"` or `"edges"`.
 
     Returns
     -------

@@ -74,7 +74,7 @@ class WaypointGraph:
     others: tuple[dict[str, Any], ...] = ()
     """Features of a GeoJSON file that are neither nodes nor edges, such as polygons."""
     findings: tuple[Finding, ...] = ()
-    """What was wrong with the file itself."""
+    """Faults of the file itself."""
 
     @classmethod
     def from_networkx(cls, graph: nx.Graph[Any], *, name: str = "") -> WaypointGraph:

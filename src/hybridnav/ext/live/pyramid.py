@@ -235,7 +235,7 @@ class OnlinePyramid:
         Raises
         ------
         InvalidValueError
-            When cells of the grid changed outside what an update stated.
+            When cells of the grid changed that no update stated.
         """
         return pyramid_of(self._with_levels, self._box(), self)
 

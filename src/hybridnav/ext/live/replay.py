@@ -130,7 +130,7 @@ def grids_of_scans(
         Scans with poses, such as those of a `CarmenLog`. Scans that the mapper refuses are left
         out.
     mapper
-        What they are added to.
+        The mapper to which they are added.
     every
         Scans after which a map is yielded, at least 1; the last map has all scans.
     robot_radius_m
@@ -293,7 +293,7 @@ class _Flipped:
 
 
 class ReplayFigures:
-    """What a replay did: times, what became of places, rooms and doors, flips of numbers.
+    """Figures of a replay: times, events of places, rooms and doors, flips of numbers.
 
     Examples
     --------

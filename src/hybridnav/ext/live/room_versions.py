@@ -313,9 +313,9 @@ class RoomsUpdate:
         Returns
         -------
         tuple of tuple of int
-            The doors to close now, ascending: those that are left, and all parts of one that fell
-            into several. Then the closed doors that are no more, also those that are part of a
-            wider one now: `doors.merged` states which.
+            The doors to close now, ascending: doors that are left, and all parts of one that fell
+            into several. Then the closed doors that are no more, also parts of a wider one now:
+            `doors.merged` states which.
 
         Raises
         ------

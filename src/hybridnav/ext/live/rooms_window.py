@@ -314,7 +314,7 @@ class OnlineDoor:
     number: int
     """Its number, from 1, never used again."""
     rooms: tuple[int, int]
-    """Numbers of the rooms on both sides; -1 for what lies in no room."""
+    """Numbers of the rooms on both sides; -1 for nameless space."""
     position: tuple[float, float]
     """A point on the boundary, in its middle; `(x, y)` in metres, map frame."""
     width_m: float

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Closings:
-    """The profiles that queries may name, and the journal of what is closed for all.
+    """The profiles that queries may name, and the journal of things closed for all.
 
     Examples
     --------
@@ -38,12 +38,12 @@ class Closings:
 
     profiles: Sequence[Profile]
     journal: Journal | None
-    """None where nothing keeps what is closed."""
+    """None where no file keeps closures."""
     check: Callable[[OutOfOrder], None]
-    """Refuses to close what is not there."""
+    """Refuses to close missing things."""
 
     def describe(self, change: ClosingChange | None = None) -> dict[str, Any]:
-        """Return the profiles with what they ask for, and what is out of order, after a change.
+        """Return the profiles with their demands, and things that are out of order, after a change.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Closings:
         journal = self.journal
         if change is not None:
             if journal is None or journal.path.resolve().parent != journal.path.parent.resolve():
-                raise InvalidValueError("nothing here keeps what is closed, in the folder of a map")
+                raise InvalidValueError("no journal keeps closures here, in the folder of a map")
             if change.closed:
                 self.check(OutOfOrder(change.what))
                 journal.close(change.what, why=change.why, by=change.by)

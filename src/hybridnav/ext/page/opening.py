@@ -39,7 +39,7 @@ class Opening:
     make
         Makes the site; it is given what to call with the name of each stage.
     name
-        What the page calls it; None for the name of the map.
+        Its name on the page; None for the name of the map.
     floors
         Names of the floors, from the lowest to the highest; one map has none.
 
@@ -131,7 +131,7 @@ class Opening:
         return self._site
 
     def floor(self, text: str) -> Session | Cells:
-        """Return what is there of a floor by its number, as it stands in an address.
+        """Return a floor by its number, as it stands in an address, as far as it is prepared.
 
         Raises
         ------
@@ -143,7 +143,7 @@ class Opening:
         return self._cells if self._site is None and text == "0" else self.site.floor(text)
 
     def state(self) -> dict[str, Any]:
-        """Return how far it is: whether rooms and places are there, and what is being done."""
+        """Return how far it is: whether rooms and places are there, and the present step."""
         return {
             "ready": self._site is not None,
             "stage": self._stage,
@@ -151,7 +151,7 @@ class Opening:
         }
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page needs to know beside its maps: the floors alone, until the rest is
+        """Return the facts that a page needs beside its maps: the floors alone, until the rest is
         there."""
         if self._site is not None:
             return self._site.describe()

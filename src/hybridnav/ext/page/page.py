@@ -105,7 +105,7 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
     Parameters
     ----------
     site
-        What it shows.
+        Its content.
     path
         The file; one that exists is replaced.
     queries

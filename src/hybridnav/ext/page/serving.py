@@ -29,13 +29,14 @@ def serve(
     Parameters
     ----------
     shown
-        What the page shows: a site, or one that is prepared meanwhile.
+        The content of the page: a site, or one that is prepared meanwhile.
     folder
         The only folder in which anything is written.
     port
         The port; 0 for a free one.
     allow_edits
-        Whether programs that call the server may change what others see, as people may on the page.
+        Whether programs that call the server may change the map for others, as people may on the
+        page.
     ready
         Called with the address, which holds a token that nobody can guess.
 

@@ -53,7 +53,8 @@ class Session:
     file
         The file of its rooms; None for rooms that cannot be saved.
     journal
-        What is out of order on one map; None for none, and for a floor, whose building has it.
+        Things that are out of order on one map; None for none, and for a floor, whose building has
+        them.
 
     Examples
     --------
@@ -128,7 +129,7 @@ class Session:
     # --- pictures
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page needs to know of the map before it draws anything."""
+        """Return the facts that a page needs of the map before it draws anything."""
         grid, pyramid = self.grid, self.planning.topology.pyramid
         names = {pyramid.place_level: "places", pyramid.room_level: "rooms"}
         return map_facts(grid, self.layer("map").n_zooms) | {

@@ -73,7 +73,7 @@ class Routes(Protocol):
 
 
 class Site:
-    """What a page shows: a map, or the floors of a building. Threads may share it.
+    """The content of a page: a map, or the floors of a building. Threads may share it.
 
     A map is a site of one floor, whose name is empty: nothing on the page names it.
 
@@ -127,8 +127,8 @@ class Site:
     ) -> Self:
         """Return the site of a building.
 
-        Floors without rooms get those that `find_rooms` finds. Floors of one map have one session:
-        a change of its rooms is one on both.
+        Floors without rooms get the rooms that `find_rooms` finds. Floors of one map have one
+        session: a change of its rooms is one on both.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class Site:
             )
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page needs to know beside its maps."""
+        """Return the facts that a page needs beside its maps."""
         routes = self._routes()
         facts = {"name": self.name, "ready": True, "floors": list(self.names)}
         return facts | {"links": routes.links, "presets": routes.presets}
@@ -183,7 +183,8 @@ class Site:
         return {"ready": True, "stage": ""}
 
     def changes(self) -> dict[str, Any]:
-        """Return what others may have changed: the journal, and the version of each floor."""
+        """Return the state that others may have changed: the journal, and the version of each
+        floor."""
         versions = [session.version for session in self.sessions]
         return self.closings.describe() | {"versions": versions}
 

@@ -202,7 +202,7 @@ class AnyAngleResult:
 
 @dataclass(frozen=True)
 class CostClaim:
-    """What a method that plans by costs claims about the cost of its path.
+    """Claims of a method that plans by costs about the cost of its path.
 
     Examples
     --------

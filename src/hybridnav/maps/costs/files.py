@@ -217,7 +217,7 @@ def load_keepout_mask(
     Returns
     -------
     CostLayer
-        The factors of the map's cells, and in `keepout` those that are closed, None without any.
+        The factors of the map's cells, and in `keepout` the closed ones, None without any.
 
     Raises
     ------

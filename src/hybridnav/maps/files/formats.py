@@ -115,10 +115,10 @@ def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
     """Write a map as map_server, Nav2 and `load_map` read it: a YAML file and a PGM image.
 
     A cell of occupancy p becomes a pixel of brightness 255 (1 - p), rounded, but never across a
-    threshold: free, occupied and unexplored cells stay what they are. Cells that were never
-    measured become grey 205, or the nearest grey that the thresholds call unexplored. A map that
-    was read from grey of 8 bits, in the mode trinary or scale and without `negate`, is written with
-    equal pixels.
+    threshold: free, occupied and unexplored cells keep their class. Cells that were never measured
+    become grey 205, or the nearest grey that the thresholds call unexplored. A map that was read
+    from grey of 8 bits, in the mode trinary or scale and without `negate`, is written with equal
+    pixels.
 
     The robot's radius and dropped islands are no part of such a map: what was measured is written.
 

@@ -120,8 +120,8 @@ class Wall:
     """The hand at which it lies; of the wall opposite that to which one turns along it; None for
     one who looks round for the nearest door."""
     ordinal: int | None
-    """Which of the doors in it, or of the openings, behind those that are passed, from 1 to 5; None
-    where the name at the door tells it."""
+    """Its number among the doors in the wall, or the openings, behind the passed ones, from 1 to 5.
+    None where the name at the door is enough."""
     past: int = 0
     """How many openings one passes before the door, 3 at most."""
     is_opposite: bool = False
@@ -226,7 +226,7 @@ class Instruction:
     """The turn; of a start that from the robot's heading, of a door that just before it, of a ride
     that out of it."""
     doorway: Doorway | None = None
-    """What a path crosses; None but for the kind `cross`."""
+    """The door or opening that a path crosses; None but for the kind `cross`."""
     waypoint: str | None = None
     """Name or coordinates of the waypoint at which one arrives."""
     landmark: Landmark | None = None

@@ -149,7 +149,7 @@ class Language:
     counted_opening: str
     """One of several; besides `{ordinal}`."""
     wide: str
-    """What is added to a wide opening; `{width}`."""
+    """Addition to a wide opening; `{width}`."""
     out_turning: str
     """End of a sentence with a turn behind a door; `{turn}`."""
     lift: NameWords

@@ -69,7 +69,7 @@ def check_language(language: str) -> Language:
     Raises
     ------
     InvalidValueError
-        When there are no sentences in this language; the message lists those that exist.
+        When there are no sentences in this language; the message lists existing ones.
 
     Examples
     --------

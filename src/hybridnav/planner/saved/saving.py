@@ -42,10 +42,10 @@ def save(thing: Saved, path: PathLike, *, compress: bool = False) -> None:
     Parameters
     ----------
     thing
-        A planner, with its grid, its topological map, and what it has prepared so far, but the
-        lattice, which changes with the costs: call `HybridPlanner.prepare` first to include all.
-        Or several planners on one topological map, such as those of several presets. Or only
-        such a map, a grid or a `Model`. Or a `Building`, which `load_building` loads.
+        A planner, with its grid, its topological map, and all prepared structures but the lattice,
+        which changes with the costs: call `HybridPlanner.prepare` first to include all. Or several
+        planners on one topological map, such as those of several presets. Or only such a map, a
+        grid or a `Model`. Or a `Building`, which `load_building` loads.
     path
         The file, which must end in `.hnm`. It is written whole or not at all; processes that have
         loaded the file it replaces keep the old one.

@@ -174,7 +174,7 @@ class OmplSettings(BaseModel):
     """Seconds that a query may take; kept to within 10 %."""
     iterations: Annotated[_Int, Field(ge=1, le=1_000_000_000)] | None = None
     """Iterations of planners and of simplification that a query may take, instead of the seconds,
-    which stay as a limit: what is reached before it repeats for equal seeds."""
+    which stay as a limit. Results before that limit repeat for equal seeds."""
     seed: Annotated[_Int, Field(ge=1, lt=2**31)] = 1
     """Seed of OMPL's random numbers."""
     confine: Confinement = "chain"

@@ -160,7 +160,7 @@ def build_lattice(free: BoolArray, factors: FloatArray) -> Lattice:
     free
         bool (rows, cols), which cells may be entered.
     factors
-        float32 (rows, cols), >= 1, what a metre in each cell costs, in metres.
+        float32 (rows, cols), >= 1, cost of a metre in each cell, in metres.
 
     Raises
     ------

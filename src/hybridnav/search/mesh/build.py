@@ -345,10 +345,10 @@ does not begin: on five of the six real maps on which it would be given up."""
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class CornerHierarchy:
-    """Corners at which paths bend, and arcs from each to those that were contracted after it.
+    """Corners at which paths bend, and arcs from each to corners that were contracted after it.
 
-    A shortest path climbs from the corners that its start sees, and from those that its goal sees,
-    up to one where both meet.
+    A shortest path climbs from the corners that its start sees, and from corners that its goal
+    sees, up to one where both meet.
     """
 
     first: IntArray

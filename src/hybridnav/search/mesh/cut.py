@@ -329,7 +329,7 @@ class DetourSearch:
     free
         bool (rows, cols), its free cells.
     closed
-        int64 (m,), flat cells that are closed, sorted, each once; those that are not free change
+        int64 (m,), flat cells that are closed, sorted, each once; cells that are not free change
         nothing.
     scratch
         Copies of `free` to close cells in and open them again; None to make one.

@@ -52,7 +52,7 @@ class JumpGraph:
     come in any order. Cells are those of the smallest rectangle round all free ones, in a frame of
     blocked ones; a flat cell is its place in that rectangle.
 
-    Contracted, arcs lead from each corner cell to those that were contracted after it, and corner
+    Contracted, arcs lead from each corner cell to cells that were contracted after it, and corner
     cells are numbered from the last one contracted to the first.
     """
 

@@ -176,7 +176,7 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
 
 
 def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
+    """Return labels spread into walls, and through unexplored cells, but never through a wall.
 
     They reach 0.25 m. On some maps only a wall of one cell separates two rooms: labels do not
     spread through it into unexplored cells, or into free cells without a room.

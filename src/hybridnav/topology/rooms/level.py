@@ -44,7 +44,7 @@ class Door:
     number: int
     """Number for people, from 1. A file of rooms keeps it."""
     rooms: tuple[str | None, str | None]
-    """Names of the rooms on both sides; None for what lies in no room."""
+    """Names of the rooms on both sides; None for nameless space."""
     position: tuple[float, float]
     """A point on the boundary, in its middle; `(x, y)` in metres, map frame."""
     width_m: float
@@ -65,7 +65,7 @@ class Door:
 
     @property
     def kind(self) -> str:
-        """What people call it: "door" or "opening"."""
+        """Its word for people: "door" or "opening"."""
         return "opening" if self.is_opening else "door"
 
     @property
@@ -348,7 +348,7 @@ class Rooms:
         Parameters
         ----------
         everything
-            Count all rooms and doors, not only those that are listed.
+            Count all rooms and doors, not only listed ones.
 
         Returns
         -------

@@ -136,7 +136,7 @@ _LEAST_HALL_M2 = 90.0
 
 @dataclass(frozen=True)
 class RoomKind:
-    """What a room is by its shape.
+    """Kind of a room by its shape.
 
     Examples
     --------

@@ -20,7 +20,7 @@ _LOOKED_AT = 2**16
 
 
 def is_building(path: PathLike) -> bool:
-    """Return whether a file describes a building, by what it contains.
+    """Return whether a file describes a building, by its content.
 
     Parameters
     ----------

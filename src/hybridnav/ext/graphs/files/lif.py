@@ -261,7 +261,7 @@ def export_lif(
     Returns
     -------
     tuple of str
-        What the file does not hold, one line each.
+        Facts left out of the file, one line each.
 
     Raises
     ------

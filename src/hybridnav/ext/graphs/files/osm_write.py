@@ -54,7 +54,7 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
     * Links are ways through their ends with `highway` elevator, steps or footway and all levels in
       `level`. On each floor they are an area with a passage to the room around.
 
-    What a `Link` knows beside, the name of an edge's door, and the ids of nodes and edges that are
+    Other facts of a `Link`, the name of an edge's door, and the ids of nodes and edges that are
     whole numbers have keys that begin with `hybridnav:`.
 
     Parameters

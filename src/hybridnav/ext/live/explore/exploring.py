@@ -33,7 +33,7 @@ doors that its map may have closed."""
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What the robot knew when it chose a goal.
+    """Knowledge of the robot when it chose a goal.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """What a robot made of a floor plan.
+    """The map that a robot made of a floor plan.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     Returns
     -------
     Exploration
-        The map that the robot made, and what it drove.
+        The map that the robot made, and its drive.
 
     Raises
     ------

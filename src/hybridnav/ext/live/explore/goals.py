@@ -58,7 +58,7 @@ class Goals:
         Parameters
         ----------
         topology
-            The places of what is known.
+            The places of the known map.
         cell
             (row, col) of the robot, a free cell.
         left_out

@@ -185,7 +185,7 @@ def _noisy(ranges_m: FloatArray, noise_m: float, seed: int | np.random.Generator
 class SimulatedLaser:
     """A laser that measures how far its beams run to the first occupied cell of a map.
 
-    Unexplored cells, and what lies outside the map, do not stop a beam.
+    Unexplored cells, and the ground outside the map, do not stop a beam.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ class SimulatedLaser:
         seed: int | np.random.Generator = 0,
         time_s: float = math.nan,
     ) -> LaserScan:
-        """Return what the laser would measure.
+        """Return the readings of the laser.
 
         Parameters
         ----------

@@ -99,7 +99,7 @@ def outlined(
         if n_painted > _MOST_PAINTED * found[0].size:
             raise RoomsError(
                 f"{read.of(outline.room, outline.line)}: the outlines up to here cover the map "
-                f"more than {_MOST_PAINTED} times: remove those that lie in others"
+                f"more than {_MOST_PAINTED} times: remove rooms that lie in others"
             )
         found[outline.fingerprint not in written].ravel()[cells] = outline.room
     return found[0], found[1]
