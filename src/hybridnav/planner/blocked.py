@@ -72,8 +72,7 @@ class Blocked:
     ------
     InvalidValueError
         When ids are not integers, cells are not integers of shape (n, 2), or names are not text.
-        When an area has fewer than three points, is not finite, intersects itself or is of another
-        kind.
+        When an area has fewer than three points, is not finite, or intersects itself.
 
     Examples
     --------

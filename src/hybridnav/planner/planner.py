@@ -334,8 +334,7 @@ class HybridPlanner(Questions):
             return self._now.plan_many((first, last), smooth, blocked)
 
     def prepare(self, *, labels: float | None = None, progress: Progress = no_progress) -> None:
-        """Build the structures that queries need, each once, and renew stale ones; threads may plan
-        meanwhile.
+        """Build all structures, each once, and renew stale ones; threads may plan meanwhile.
 
         Parameters
         ----------

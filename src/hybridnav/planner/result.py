@@ -109,8 +109,7 @@ class Refinement:
     by: Answer
     """The source of the answer. The path of the `circumscribed disc` is valid with every heading.
     The `inscribed disc` proves that there is no path, or the robot can drive its cheapest one.
-    `OMPL` sampled it. The path of the `grid`, shortened by line of sight, counts where all else
-    failed."""
+    `OMPL` sampled it. The path of the `grid`, pulled taut, counts where all else failed."""
     trace: tuple[tuple[float, float], ...] = ()
     """Seconds and cost of each better path."""
     iterations: int = 0
@@ -213,8 +212,7 @@ class PlanResult:
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
-        """Instructions for a person along the path; none without a path, and on a map without
-        rooms."""
+        """Instructions for a person; none without a path, and on a map without rooms."""
         source = self.instruction_source
         return source if isinstance(source, tuple) else source.instructions()
 

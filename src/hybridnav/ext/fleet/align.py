@@ -85,8 +85,7 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
     Maps of two floors seldom have one frame. The first floor stays. Floors that links join to it,
     and so on, are moved, and turned where two or more links determine that. It is the rigid motion
     with the least sum of squared distances between the ends of links (Kabsch 1976). Stairs and
-    ramps count where no lift leads to the floor. Floors that no link joins to the first stay as
-    they are.
+    ramps count where no lift leads to the floor. Other floors stay as they are.
 
     Parameters
     ----------

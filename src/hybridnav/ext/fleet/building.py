@@ -76,8 +76,7 @@ class Building:
     profiles
         Profiles beside those of `hybridnav.planner.PROFILES`, or in place of one of their names.
     journal
-        Things that are out of order: closed for all queries until they are opened again. None for
-        none.
+        Things out of order: closed for all queries until they are opened again. None for none.
 
     Raises
     ------

@@ -75,8 +75,7 @@ class BuildingPlan:
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
-        """Instructions for a person along the route; none without a route, and if no floor has
-        rooms."""
+        """Instructions for a person; none without a route, and if no floor has rooms."""
         source = self.instruction_source
         return source if isinstance(source, tuple) else source.instructions()
 

@@ -223,8 +223,7 @@ class OnlineRooms:
         ------
         InvalidValueError
             When the version has no such room, or another one has the name. When it is no name:
-            empty, too long, not one printable line, a point, or `room-` and the number of another
-            room.
+            empty, too long, not one printable line, a point, or `room-` with another number.
         """
         self._check(number)
         check_names((name,))

@@ -35,8 +35,7 @@ def serve(
     port
         The port; 0 for a free one.
     allow_edits
-        Whether programs that call the server may change the map for others, as people may on the
-        page.
+        Whether programs that call the server may change the map for others, as people may.
     ready
         Called with the address, which holds a token that nobody can guess.
 

@@ -53,8 +53,7 @@ class Session:
     file
         The file of its rooms; None for rooms that cannot be saved.
     journal
-        Things that are out of order on one map; None for none, and for a floor, whose building has
-        them.
+        Things out of order on one map; None for none, and for a floor, whose building has them.
 
     Examples
     --------

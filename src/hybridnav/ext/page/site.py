@@ -183,8 +183,7 @@ class Site:
         return {"ready": True, "stage": ""}
 
     def changes(self) -> dict[str, Any]:
-        """Return the state that others may have changed: the journal, and the version of each
-        floor."""
+        """Return what may have changed: the journal, and the version of each floor."""
         versions = [session.version for session in self.sessions]
         return self.closings.describe() | {"versions": versions}
 

@@ -195,8 +195,8 @@ class Rooms:
 
     @cached_property
     def doors(self) -> tuple[Door, ...]:
-        """All boundaries between free cells of different rooms, by number; also those that no robot
-        of the map's radius passes, and gaps."""
+        """All boundaries between free cells of different rooms, by number; also gaps, and doors
+        that no robot of the map's radius passes."""
         found = self._boundaries
         arcs: list[list[int]] = [[] for _ in range(found.n_boundaries)]
         labels = self.label_of_vertex[self.level.arcs]

@@ -66,9 +66,8 @@ def load_building(
         true`. A list `links` has for each its `name`, its `kind` (lift, stairs or ramp), two or
         more `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`. Optional are
         `speed_m_s`, and `profiles`, each with its `name` and its differences from a plain
-        `Profile`. An end has its `floor`, a place, and optionally `yaw_rad`. The place is `at: [x,
-        y]`, a `room`, or the number of a `door`, with the `room` on whose side of it the robot
-        stands.
+        `Profile`. An end has a `floor`, a place, and optionally `yaw_rad`. The place is `at: [x,
+        y]`, a `room`, or the number of a `door`, with the `room` where the robot stands.
     robot_radius_m
         Radius of the robot in metres on all floors; None for that of the models, or of the preset.
     preset
