@@ -127,8 +127,8 @@ def _table(
 _NOTES = {
     "consistency": "Contradictions of checks, by kind. A cell is empty if that check had no case.",
     "loss octile": "The loss of the plan is that of the best path of cells inside its regions; in "
-    "order, of the best that passes them as the plan does. The presets that read the plan off a "
-    "path have zeros by construction. A path may be better than its plan: `paper` and "
+    "order, of the best path that passes them in the plan's order. The presets that read the plan "
+    "off a path have zeros by construction. A path may be better than its plan: `paper` and "
     "`simple-graph` also search places beside the route.",
     "time": "Medians over the pairs in common; a speed-up is the reference's time over the "
     "method's: the median of the ratios, and the ratio of the means.",

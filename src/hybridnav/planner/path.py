@@ -154,8 +154,8 @@ class Path:
         spacing_m
             As in `poses`; it changes neither speeds nor times, but with `speed_map`.
         speed_map
-            Limits of zones; on each step from pose to pose the least one that the straight line
-            between them touches holds. None for no zones.
+            Limits of zones; each step from pose to pose keeps the least limit that the straight
+            line between them touches. None for no zones.
 
         Raises
         ------

@@ -388,8 +388,8 @@ class Level:
     def n_cracks(self) -> LongArray:
         """int64 (n_arcs,), cell sides of each boundary: the length of the arc's dual edge.
 
-        Only a dual graph has it: neither an adjacency of fields nor their distances contain how
-        long the line is along which two fields meet.
+        Only a dual graph has it: neither an adjacency of fields nor their distances contain the
+        length of the line between two fields.
         """
         counts: LongArray = np.bincount(self.boundary_table[1], minlength=self.n_arcs)
         return frozen(counts)

@@ -172,8 +172,8 @@ class CostLine:
         """Round the bends of a line by arcs of circles.
 
         Bends that lie too close to each other are merged. An arc has the radius or up to four times
-        that; no cell may be blocked that the box round any short piece of it meets.
-        Where no such arc fits, the robot turns on the spot.
+        that; the box round any short piece of it meets no blocked cell. Where no such arc fits, the
+        robot turns on the spot.
 
         Parameters
         ----------

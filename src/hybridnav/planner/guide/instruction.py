@@ -230,7 +230,7 @@ class Instruction:
     waypoint: str | None = None
     """Name or coordinates of the waypoint at which one arrives."""
     landmark: Landmark | None = None
-    """What shows the direction at a start without a heading, or where a goal lies."""
+    """The sign of the direction at a start without a heading, or of the place of a goal."""
     change: FloorChange | None = None
     """The ride; None but for the kind `ride`."""
     heading_rad: float | None = None

@@ -124,7 +124,7 @@ class Language:
     go_along: str
     """Through a door in a wall that one follows; besides `{along}`."""
     past: tuple[str, ...]
-    """What ends `{along}`: none, one, two or three openings that one passes."""
+    """The end of `{along}`: none, one, two or three openings that one passes."""
     along_for: str
     """What follows `{along}` where nobody counts; `{metres}`."""
     via: str

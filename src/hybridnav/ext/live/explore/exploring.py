@@ -86,8 +86,8 @@ class Exploration:
     share_known: float
     """Share of the floor plan's free cells in the robot's reach that its map knows."""
     is_complete: bool
-    """Whether no goal was left; False where the number of choices ended it. A door that is
-    closed in the map may still hide what `share_known` leaves."""
+    """Whether no goal was left; False where the number of choices ended it. A door that is closed
+    in the map may still hide the rest of `share_known`."""
     seconds: dict[str, float] = field(repr=False)
     """Seconds of computing: mapping, pyramid, goals, rooms, planning."""
 

@@ -242,7 +242,7 @@ class SimulatedLaser:
         pose
             `(x, y, heading)` of the laser, metres and radians, map frame.
         seed
-            Of the noise; a generator, for noise that differs from scan to scan.
+            Seed of the noise; a generator, for noise that differs from scan to scan.
         time_s
             When the scan is taken.
 
