@@ -33,7 +33,7 @@ CloseOption = Annotated[
 OpenOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--open", metavar="WHAT", help="Open again what was closed, or all. May be repeated."
+        "--open", metavar="WHAT", help="Open a closed thing again, or all. May be repeated."
     ),
 ]
 WhyOption = Annotated[
@@ -52,7 +52,7 @@ def closed(
     *,
     reading: MapOptions,
 ) -> None:
-    """List what is out of order in MAP, or close and open links, doors and rooms.
+    """List things out of order in MAP, or close and open links, doors and rooms.
 
     It stays closed for plans, pages and programs until it is opened again: NAME.closed.yaml beside
     MAP holds it.

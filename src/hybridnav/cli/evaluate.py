@@ -135,7 +135,7 @@ def evaluate(
 
     Records go to records.jsonl in the folder --out; a run that was stopped goes on where it was.
     --preset may be given several times, shortest where no method is named; --set holds for all of
-    them. --seed is that of sampled pairs. --costs is what methods plan and are judged by. Robot
+    them. --seed is that of sampled pairs. Methods plan by --costs and are judged by them. Robot
     radii of presets do not count. On MovingAI maps the radius is 0 unless stated, and the size of
     places 40 m.
 

@@ -165,8 +165,8 @@ def plan(
 ) -> None:
     """Plan a route on MAP, or over the floors of a building, from a point or room to another.
 
-    Without --rooms, rooms are those of rooms.yaml beside the map, if there. What hybridnav closed
-    has closed stays closed.
+    Without --rooms, rooms are those of rooms.yaml beside the map, if there. Things that `hybridnav
+    closed` has closed stay closed.
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """

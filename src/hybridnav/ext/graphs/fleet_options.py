@@ -49,7 +49,7 @@ PointsOption = Annotated[
         "--points",
         metavar="FILE",
         help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
-        "get a node with the name at each. Its section lifts: has those of lifts.",
+        "get a node with the name at each. Its section lifts: has points of lifts.",
     ),
 ]
 NodesOption = Annotated[

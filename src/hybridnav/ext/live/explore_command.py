@@ -78,7 +78,7 @@ def explore(
     max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Let a simulated robot explore MAP, and print what it drove and knows.
+    """Let a simulated robot explore MAP, and print its drive and its knowledge.
 
     --out writes the robot's map, a ROS map (.yaml).
     """
