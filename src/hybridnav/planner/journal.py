@@ -114,7 +114,7 @@ class Journal:
     """Things out of order in a building or on a map, in `NAME.closed.yaml` beside its file.
 
     Programs and threads may share it: each change reads the file anew under a lock and writes it
-    whole. Two that change different things lose nothing. Of two that change one thing the last one
+    whole. Two that change different things lose nothing. If two change one thing, the last one
     wins.
 
     Parameters
