@@ -107,14 +107,15 @@ def search_of(
 
 
 def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
-    mesh, graph = search.mesh, search.graph
+    # Another thread may be building: that the graph is there is read before the graph.
+    is_prepared, mesh, graph = search.is_prepared, search.mesh, search.graph
     sizes = {
         "corners": len(mesh.corners),
         "polygons": mesh.n_polygons,
         "slots": len(mesh.begins),
         "blocks": len(mesh.block_head),
     }
-    values = key | {"is_prepared": search.is_prepared, "expanded": search.expanded}
+    values = key | {"is_prepared": is_prepared, "expanded": search.expanded}
     parts = [MESH.part(mesh, sizes, values)]
     if search.edges is None or graph is None:
         return parts
