@@ -269,4 +269,4 @@ def test_too_little_memory_and_presets_without_labels_are_named() -> None:
         planner.prepare(labels=0.001)
     assert labels_of(planner) is None
     with pytest.raises(InvalidValueError, match="no hub labels"):
-        planner_of(hn.example_map("figure1"), "octile").prepare(labels=5)
+        planner_of(hn.example_map("figure1"), "grid-astar").prepare(labels=5)

@@ -14,35 +14,20 @@ Euclidean shortest path computation using hub labeling, 2023.
 import math
 
 import numpy as np
+from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import fetch, grow
+from hybridnav._base.kernels.arrays import fetch, grow, push
 from hybridnav._base.kernels.exact import is_legal, turn_of
-from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, pop, push, put_corner
+from hybridnav.search.kernels.hubs import reach_next
+from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, put_corner
 from hybridnav.search.mesh.kernels.squares import line_before, quarter_of
 from hybridnav.search.mesh.kernels.views import distance, lobe_of
 
-_SAME = 1e-12
-"""Difference of two distances that counts as none, in cells: rounding alone causes it."""
-
 
 @njit(cache=True, nogil=True)
-def _reach_next(mesh, edges, here, work, size, n_touched):
-    """Reach the corners to which a shortest path may go on from a corner.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    edges
-        See `edges_of`.
-    here
-        The corner.
-    work
-        Cost of corners (infinite), corner before, corners touched; keys and values of the heap.
-    size, n_touched
-        Sizes of the heap and of the list of corners touched; returned.
-    """
+def _reach_on_mesh(mesh, edges, here, work, size, n_touched):
+    """Reach the corners to which a shortest path may go on; see `reach_next`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads = edges
     costs, before, touched, heap = work
@@ -62,128 +47,19 @@ def _reach_next(mesh, edges, here, work, size, n_touched):
                 touched[n_touched] = other
                 n_touched += 1
             costs[other], before[other] = reached, here
-            size = push(heap, size, reached, other)
+            push(heap, size, reached, float(other))
+            size += 1
     return size, n_touched
 
 
-@njit(cache=True, nogil=True)
-def _room_for(n, n_edges):
-    """Return work arrays for `_reach_next`; every edge is queued once at most."""
-    heap = np.empty(n_edges + 1), np.empty(n_edges + 1, np.int32)
-    return np.full(n, np.inf), np.empty(n, np.int32), np.empty(n, np.int32), heap
+@overload(reach_next)
+def _reach_of_mesh(graph, edges, here, work, size, n_touched):  # noqa: ARG001 - numba's rule
+    """Return what stands for `reach_next` on a mesh."""
 
+    def reach(graph, edges, here, work, size, n_touched):
+        return _reach_on_mesh(graph, edges, here, work, size, n_touched)
 
-@njit(cache=True, nogil=True)
-def uses_of_corners(mesh, edges, sources):
-    """Count the shortest paths from some corners to all others that each corner is on, float64."""
-    n = len(mesh[0])
-    work = _room_for(n, len(edges[1]))
-    costs, before, touched, heap = work
-    uses, below, order = np.zeros(n), np.zeros(n), np.empty(n, np.int32)
-    for source in sources:
-        costs[source], before[source], touched[0] = 0.0, -1, source
-        size, n_touched, n_settled = push(heap, 0, 0.0, source), 1, 0
-        while size:
-            cost, here = heap[0][0], heap[1][0]
-            size = pop(heap, size)
-            if cost == costs[here]:
-                order[n_settled], below[here] = here, 1.0
-                n_settled += 1
-                size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
-        for k in range(n_settled - 1, 0, -1):
-            here = order[k]
-            uses[here] += below[here]
-            below[before[here]] += below[here]
-        for corner in touched[:n_touched]:
-            costs[corner] = np.inf
-    return uses
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def labels_of_corners(mesh, edges, ranked, most):
-    """Label corners with hubs: search from each, and stop where labels so far say as much.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    edges
-        See `edges_of`.
-    ranked
-        int32, the corners at which paths bend, those on most paths first.
-    most
-        Most entries.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32 the next corner on the
-        path to the hub, without the corner itself as its own hub; whether there was room for all.
-    """
-    n = len(mesh[0])
-    work = _room_for(n, len(edges[1]))
-    costs, before, touched, heap = work
-    to_hub = np.full(len(ranked), np.inf)
-    ranks = np.full(n, np.int64(len(ranked)))
-    # Each corner has a run of entries in a common pool, and moves to a longer one when it is full.
-    begin, count, room = np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros(n, np.int32)
-    hubs, lengths, onward = np.empty(4096, np.int32), np.empty(4096), np.empty(4096, np.int32)
-    used = total = 0
-    for rank in range(len(ranked)):
-        root = ranked[rank]
-        ranks[root] = rank
-        # The labels of the root by hub, for the tests below.
-        for k in range(begin[root], begin[root] + count[root]):
-            to_hub[hubs[k]] = lengths[k]
-        # Dijkstra from the root, which looks no further where labels say as much.
-        costs[root], before[root], touched[0] = 0.0, -1, root
-        size, n_touched = push(heap, 0, 0.0, root), 1
-        while size:
-            cost, here = heap[0][0], heap[1][0]
-            size = pop(heap, size)
-            if cost > costs[here]:
-                continue
-            # A hub of before, which may be the corner itself, lies on a path that is as short.
-            if ranks[here] < rank and to_hub[ranks[here]] <= cost + _SAME:
-                continue
-            at, stop = begin[here], begin[here] + count[here]
-            while at < stop and to_hub[hubs[at]] + lengths[at] > cost + _SAME:
-                at += 1
-            if at < stop:
-                continue
-            # Write the entry, and move the run where it is full.
-            if here != root:
-                if count[here] == room[here]:
-                    room[here] = max(8, 2 * room[here])
-                    while used + room[here] > len(hubs):
-                        hubs, lengths, onward = grow(hubs), grow(lengths), grow(onward)
-                    for k in range(count[here]):
-                        old, new = begin[here] + k, used + k
-                        hubs[new], lengths[new], onward[new] = hubs[old], lengths[old], onward[old]
-                    begin[here] = used
-                    used += room[here]
-                at = begin[here] + count[here]
-                hubs[at], lengths[at], onward[at] = rank, cost, before[here]
-                count[here] += 1
-                total += 1
-            size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
-        # Only what was touched is reset.
-        for corner in touched[:n_touched]:
-            costs[corner] = np.inf
-        for k in range(begin[root], begin[root] + count[root]):
-            to_hub[hubs[k]] = np.inf
-        if total > most:
-            return begin, hubs[:0], lengths[:0], onward[:0], False
-    # The runs one behind the other, in the order of the corners.
-    offset = np.zeros(n + 1, np.int64)
-    for corner in range(n):
-        offset[corner + 1] = offset[corner] + count[corner]
-    kept = np.empty(total, np.int64)
-    for corner in range(n):
-        for k in range(count[corner]):
-            kept[offset[corner] + k] = begin[corner] + k
-    return offset, hubs[kept], lengths[kept], onward[kept], True
+    return reach if len(graph) == 8 else None
 
 
 # A query. An entry holds the rank of its hub above the distance to it, in units.
