@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav.search.kernels.hubs import labels_of_corners, uses_of_corners
+from hybridnav.search.kernels.labels import labels_of_corners, uses_of_corners
 from hybridnav.search.mesh.kernels.hubs import ABOVE
 from hybridnav.search.mesh.kernels.squares import (
     corners_by_square,

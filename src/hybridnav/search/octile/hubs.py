@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import FAR
-from hybridnav.search.kernels.hubs import labels_of_corners
+from hybridnav.search.kernels.labels import labels_of_corners
 from hybridnav.search.octile.kernels import hubs as kernels
 from hybridnav.search.octile.kernels.legs import legs_that_follow
 

@@ -19,7 +19,7 @@ from numba.extending import overload
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import fetch, grow, push
 from hybridnav._base.kernels.exact import is_legal, turn_of
-from hybridnav.search.kernels.hubs import reach_next
+from hybridnav.search.kernels.labels import reach_next
 from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, put_corner
 from hybridnav.search.mesh.kernels.squares import line_before, quarter_of
 from hybridnav.search.mesh.kernels.views import distance, lobe_of

@@ -12,7 +12,7 @@ from numba.extending import overload
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, push
 from hybridnav._base.moves import FAR, octile_cost
-from hybridnav.search.kernels.hubs import reach_next
+from hybridnav.search.kernels.labels import reach_next
 from hybridnav.search.octile.kernels.legs import class_of, is_direct, join, row_col_kind
 from hybridnav.search.octile.kernels.tables import corner_at, is_corner
 
