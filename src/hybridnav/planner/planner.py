@@ -339,7 +339,8 @@ class HybridPlanner(Questions):
         Parameters
         ----------
         labels
-            Most MB of hub labels for `shortest`, which a change of the map drops; None for none.
+            Most MB of hub labels for `shortest`, and for the distances of `octile`; a change of the
+            map drops them. None for none.
         progress
             Called after each step with the number of steps done and of all steps.
 

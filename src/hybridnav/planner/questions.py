@@ -308,7 +308,9 @@ def prepare(method: Method, labels: float | None, progress: Progress) -> None:
         raise InvalidValueError(f"labels must be a number of MB > 0, got {labels!r:.40}")
     is_made = method.label(labels, progress)
     if is_made is None:
-        raise InvalidValueError("this preset has no hub labels: take shortest, or leave labels out")
+        raise InvalidValueError(
+            "this preset has no hub labels: take shortest or octile, or leave labels out"
+        )
     if not is_made:
         raise InvalidValueError(
             f"hub labels of this map need more than {labels:g} MB: allow more, or leave labels out"

@@ -16,6 +16,7 @@ from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
+    from hybridnav._base.typing import BoolArray
     from hybridnav.planner import PlannerSettings
     from hybridnav.search.distance_table import LabelSource
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
@@ -62,14 +63,24 @@ class OverJumps(Method):
         if self._search is None:
             with self._building:
                 if self._search is None:
-                    free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
-                    graph = build_jump_graph(free)
+                    graph = build_jump_graph(self._free())
                     progress(1, 2)
                     if graph.n_corners >= CONTRACTED_FROM:
                         graph = contract_graph(graph)
                     self._search = JumpSearch(graph)
                     progress(2, 2)
         return self._search
+
+    def label(self, most_mb: float, progress: Progress) -> bool | None:
+        """Build hub labels of the corner cells, for distances; see `Method`."""
+        if self._grid.corner_cutting:
+            return None
+        is_made = self.prepare().label(self._free(), most_mb)
+        progress(1, 1)
+        return is_made
+
+    def _free(self) -> BoolArray:
+        return self._grid.enterable(allow_unexplored=self._allow_unexplored)
 
     def changed(self, change: MapChange) -> OverJumps:
         """Return the method of the changed map, whose graph the next query builds; see `Method`."""
@@ -103,7 +114,7 @@ class OverJumps(Method):
         """Return the length of a shortest path; see `Method`."""
         if query.closed is not None or self._search is None or self._grid.corner_cutting:
             return self.find(query).cost_m
-        return self._search.path(*query.cells).length_cells * self._grid.resolution_m
+        return self._search.length(*query.cells) * self._grid.resolution_m
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""

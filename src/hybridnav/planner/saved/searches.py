@@ -14,6 +14,7 @@ from hybridnav.planner.saved.structures import (
     CORNER_HIERARCHY,
     HUB_LABELS,
     JUMP_GRAPH,
+    JUMP_LABELS,
     MESH,
     refusal,
 )
@@ -107,14 +108,15 @@ def search_of(
 
 
 def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
-    mesh, graph = search.mesh, search.graph
+    # Another thread may be building: that the graph is there is read before the graph.
+    is_prepared, mesh, graph = search.is_prepared, search.mesh, search.graph
     sizes = {
         "corners": len(mesh.corners),
         "polygons": mesh.n_polygons,
         "slots": len(mesh.begins),
         "blocks": len(mesh.block_head),
     }
-    values = key | {"is_prepared": search.is_prepared, "expanded": search.expanded}
+    values = key | {"is_prepared": is_prepared, "expanded": search.expanded}
     parts = [MESH.part(mesh, sizes, values)]
     if search.edges is None or graph is None:
         return parts
@@ -225,7 +227,16 @@ def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
         "middles": len(graph.middles),
     }
     values = key | {"origin": list(graph.origin), "shape": list(graph.shape)}
-    return [JUMP_GRAPH.part(graph, sizes, values)]
+    parts, labels = [JUMP_GRAPH.part(graph, sizes, values)], search.labels
+    if labels is not None:
+        of_labels = {
+            "corners": graph.n_corners,
+            "entries": len(labels.entries),
+            "squares": len(labels.begin) - 1,
+            "views": len(labels.views),
+        }
+        parts.append(JUMP_LABELS.part(labels, of_labels, key))
+    return parts
 
 
 def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearch:
@@ -242,7 +253,15 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
         raise refusal(filed, f"{sizes['middles']} middles for {sizes['arcs']} arcs")
     _check_index(filed, arrays["index"])
     _check_arcs(filed, arrays)
-    return jumps.JumpSearch(jumps.JumpGraph(values.origin, values.shape, **arrays))
+    search = jumps.JumpSearch(jumps.JumpGraph(values.origin, values.shape, **arrays))
+    if JUMP_LABELS.kind in fitting:
+        of_labels = fitting[JUMP_LABELS.kind]
+        _check_same(of_labels, "corners", search.graph.n_corners)
+        labels = jumps.JumpHubs(**JUMP_LABELS.read(of_labels, known))
+        if fault := labels.fault(values.shape, search.graph.n_corners):
+            raise refusal(of_labels, fault)
+        search.adopt(labels)
+    return search
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:

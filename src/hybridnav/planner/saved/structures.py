@@ -271,7 +271,7 @@ CORNER_HIERARCHY = Structure(
 
 HUB_LABELS = Structure(
     "hub labels",
-    1,
+    2,
     (
         ArraySpec("entries", "int64", ("entries",), least=0),
         ArraySpec("layout", "float64", (4,), least=0),
@@ -312,6 +312,23 @@ JUMP_GRAPH = Structure(
     },
 )
 
+JUMP_LABELS = Structure(
+    "jump labels",
+    1,
+    (
+        ArraySpec("entries", "int64", ("entries",), least=0),
+        ArraySpec("offset", "int32", ("17*corners+1",), below="entries", is_offsets=True),
+        ArraySpec("begin", "int32", ("squares+1",), below="views", is_offsets=True),
+        ArraySpec("views", "int32", ("views", 2), least=0),
+    ),
+    {
+        "corners": "cells",
+        "entries": "10000*corners",
+        "squares": "cells+100",
+        "views": "10000*squares",
+    },
+)
+
 PRESET = Structure("preset", 2, (), {})
 
 
@@ -339,6 +356,7 @@ KINDS = frozenset(
         CORNER_HIERARCHY,
         HUB_LABELS,
         JUMP_GRAPH,
+        JUMP_LABELS,
     )
 )
 """The kinds of all parts of a model."""

@@ -162,3 +162,156 @@ def meet(labels, buckets, table):
                 through = cost + further[at]
                 if through < row[goals[at]]:
                     row[goals[at]] = through
+
+
+# Hub labels of all corners of a graph. The label of a corner holds hubs, corners that many shortest
+# paths pass, with the distances to them: any two corners that a path joins have a hub of a shortest
+# one in both labels.
+#
+# T. Akiba, Y. Iwata, Y. Yoshida: Fast exact shortest-path distance queries on large networks by
+# pruned landmark labeling, 2013.
+
+_SAME = 1e-12
+"""Difference of two distances that counts as none, in cells: rounding alone causes it."""
+
+
+def reach_next(graph, edges, here, work, size, n_touched):
+    """Reach the corners to which a shortest path may go on from a corner.
+
+    A search overloads it for its kind of graph, as numba tells them apart.
+
+    Parameters
+    ----------
+    graph
+        A tuple of arrays, the first of them with an element for each corner.
+    edges
+        Where those of each corner begin, and their heads.
+    here
+        The corner.
+    work
+        Cost of corners (infinite), corner before, corners touched; float64 heap of costs and
+        corners.
+    size, n_touched
+        Sizes of the heap and of the list of corners touched; returned.
+    """
+    raise NotImplementedError
+
+
+@njit(cache=True, nogil=True)
+def _room_for(n, n_edges):
+    """Return work arrays for `reach_next`; every edge is queued once at most."""
+    heap = np.empty((n_edges + 1, 2))
+    return np.full(n, np.inf), np.empty(n, np.int32), np.empty(n, np.int32), heap
+
+
+@njit(cache=True, nogil=True)
+def uses_of_corners(graph, edges, sources):
+    """Count the shortest paths from some corners to all others that each corner is on, float64."""
+    n = len(graph[0])
+    work = _room_for(n, len(edges[1]))
+    costs, before, touched, heap = work
+    uses, below, order = np.zeros(n), np.zeros(n), np.empty(n, np.int32)
+    for source in sources:
+        costs[source], before[source], touched[0] = 0.0, -1, source
+        size, n_touched, n_settled = 1, 1, 0
+        heap[0, 0], heap[0, 1] = 0.0, float(source)
+        while size:
+            cost, here = heap[0, 0], np.int32(pop(heap, size))
+            size -= 1
+            if cost == costs[here]:
+                order[n_settled], below[here] = here, 1.0
+                n_settled += 1
+                size, n_touched = reach_next(graph, edges, here, work, size, n_touched)
+        for k in range(n_settled - 1, 0, -1):
+            here = order[k]
+            uses[here] += below[here]
+            below[before[here]] += below[here]
+        for corner in touched[:n_touched]:
+            costs[corner] = np.inf
+    return uses
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def labels_of_corners(graph, edges, ranked, most):
+    """Label corners with hubs: search from each, and stop where labels so far say as much.
+
+    Parameters
+    ----------
+    graph, edges
+        See `reach_next`.
+    ranked
+        int32, the corners at which paths bend, those on most paths first.
+    most
+        Most entries.
+
+    Returns
+    -------
+    tuple
+        int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32 the next corner on the
+        path to the hub, without the corner itself as its own hub; whether there was room for all.
+    """
+    n = len(graph[0])
+    work = _room_for(n, len(edges[1]))
+    costs, before, touched, heap = work
+    to_hub = np.full(len(ranked), np.inf)
+    ranks = np.full(n, np.int64(len(ranked)))
+    # Each corner has a run of entries in a common pool, and moves to a longer one when it is full.
+    begin, count, room = np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros(n, np.int32)
+    hubs, lengths, onward = np.empty(4096, np.int32), np.empty(4096), np.empty(4096, np.int32)
+    used = total = 0
+    for rank in range(len(ranked)):
+        root = ranked[rank]
+        ranks[root] = rank
+        # The labels of the root by hub, for the tests below.
+        for k in range(begin[root], begin[root] + count[root]):
+            to_hub[hubs[k]] = lengths[k]
+        # Dijkstra from the root, which looks no further where labels say as much.
+        costs[root], before[root], touched[0] = 0.0, -1, root
+        size, n_touched = 1, 1
+        heap[0, 0], heap[0, 1] = 0.0, float(root)
+        while size:
+            cost, here = heap[0, 0], np.int32(pop(heap, size))
+            size -= 1
+            if cost > costs[here]:
+                continue
+            # A hub of before, which may be the corner itself, lies on a path that is as short.
+            if ranks[here] < rank and to_hub[ranks[here]] <= cost + _SAME:
+                continue
+            at, stop = begin[here], begin[here] + count[here]
+            while at < stop and to_hub[hubs[at]] + lengths[at] > cost + _SAME:
+                at += 1
+            if at < stop:
+                continue
+            # Write the entry, and move the run where it is full.
+            if here != root:
+                if count[here] == room[here]:
+                    room[here] = max(8, 2 * room[here])
+                    while used + room[here] > len(hubs):
+                        hubs, lengths, onward = grow(hubs), grow(lengths), grow(onward)
+                    for k in range(count[here]):
+                        old, new = begin[here] + k, used + k
+                        hubs[new], lengths[new], onward[new] = hubs[old], lengths[old], onward[old]
+                    begin[here] = used
+                    used += room[here]
+                at = begin[here] + count[here]
+                hubs[at], lengths[at], onward[at] = rank, cost, before[here]
+                count[here] += 1
+                total += 1
+            size, n_touched = reach_next(graph, edges, here, work, size, n_touched)
+        # Only what was touched is reset.
+        for corner in touched[:n_touched]:
+            costs[corner] = np.inf
+        for k in range(begin[root], begin[root] + count[root]):
+            to_hub[hubs[k]] = np.inf
+        if total > most:
+            return begin, hubs[:0], lengths[:0], onward[:0], False
+    # The runs one behind the other, in the order of the corners.
+    offset = np.zeros(n + 1, np.int64)
+    for corner in range(n):
+        offset[corner + 1] = offset[corner] + count[corner]
+    kept = np.empty(total, np.int64)
+    for corner in range(n):
+        for k in range(count[corner]):
+            kept[offset[corner] + k] = begin[corner] + k
+    return offset, hubs[kept], lengths[kept], onward[kept], True

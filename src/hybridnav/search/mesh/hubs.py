@@ -9,7 +9,8 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import no_progress
-from hybridnav.search.mesh.kernels.hubs import ABOVE, labels_of_corners, uses_of_corners
+from hybridnav.search.kernels.labels import labels_of_corners, uses_of_corners
+from hybridnav.search.mesh.kernels.hubs import ABOVE
 from hybridnav.search.mesh.kernels.squares import (
     corners_by_square,
     squares_of_polygons,
@@ -31,6 +32,8 @@ _SOURCES = 100
 _BYTES, _BYTES_OF_VIEW = 8, 12
 """Bytes of an entry of a label, and of a corner of a square."""
 
+_MOST_CORNERS = 1 << 23
+"""Most corners that leave room for the bits of a view."""
 _MOST_SEEN = 1 << ABOVE
 """Most corners of a square."""
 _MOST_BITS = 46
@@ -64,8 +67,9 @@ class HubLabels:
     begin: IntArray
     """int32 (squares + 1,), offsets of the views of each square."""
     views: IntArray
-    """int32 (v, 3), twice the number of a corner that sees something of the square, plus 1 if it
-    sees all free space there. Then its entries from one to before another; on all others, a path
+    """int32 (v, 3), a corner that sees something of the square, with eight bits below. For each
+    quarter of the square they say whether the corner sees all free space there, and below these
+    whether it sees something. Then its entries from one to before another; on all others, a path
     from the square would be slack."""
     first: IntArray
     """int32 (2 n + 1,), the label of corner i in two parts. Paths of `first[2 i]` to `first[2 i +
@@ -100,8 +104,8 @@ class HubLabels:
             return f"{len(self.begin) - 1} squares of {side:.0f} cells"
         if np.diff(self.begin).max(initial=0) > _MOST_SEEN:
             return "more corners of a square than have a number"
-        twice, low, high = self.views.T
-        is_inside = (twice >> 1 < n_corners) & (low <= high) & (high <= len(self.entries))
+        seen, low, high = self.views.T
+        is_inside = (seen >> 8 < n_corners) & (low <= high) & (high <= len(self.entries))
         if not is_inside.all() or (self.entries >> int(bits) >= n_corners).any():
             return "views or entries name what does not exist"
         return ""
@@ -135,6 +139,8 @@ def label_corners(
         None if they need more memory: the work ends as soon as that is known.
     """
     most = int(most_mb * 1e6)
+    if len(mesh.corners) > _MOST_CORNERS:
+        return None
     bending = np.flatnonzero(mesh.is_convex)
     sources = bending[:: max(1, len(bending) // _SOURCES)].astype(np.int32)
     uses = uses_of_corners(arrays, edges, sources)
@@ -210,19 +216,23 @@ def _squares(
     walls[mesh.begins[slots]] = slots
     rows, cols = mesh.polygon_at.shape
     for side in _SIDES:
-        n_across = cols // side + 2
-        n_squares = n_across * (rows // side + 2)
+        half, across = side / 2, (cols // side + 2, 2 * cols // side + 2)
+        n_squares, n_quarters = across[0] * (rows // side + 2), across[1] * (2 * rows // side + 2)
         room = max(most - 4 * n_squares, 0) // _BYTES_OF_VIEW
-        squares = squares_of_polygons(arrays, float(side), n_across)
-        layout = float(side), n_across, n_squares
-        found = np.empty(min(room, 1 << 20), np.int32)
+        squares = squares_of_polygons(arrays, half, across[1])
+        layout = half, across[1], n_quarters
+        found = np.empty(min(4 * room, 1 << 20), np.int32)
         offset = squares_of_views(arrays, walls, squares, layout, found)
-        if offset[-1] > room:
+        if offset[-1] > 4 * room:
             continue
         if offset[-1] > len(found):
             found = np.empty(offset[-1], np.int32)
             offset = squares_of_views(arrays, walls, squares, layout, found)
-        listed = corners_by_square(offset, found[: offset[-1]], n_squares)
-        begin, seen = views_of_squares(arrays, parts, (float(side), n_across), *listed)
-        return None if np.diff(begin).max() > _MOST_SEEN else ((side, n_across), begin, seen)
+        begin, listed = corners_by_square(
+            offset, found[: offset[-1]], across[1], (across[0], n_squares)
+        )
+        if len(listed) > room:
+            continue
+        begin, seen = views_of_squares(arrays, parts, (float(side), across[0]), begin, listed)
+        return None if np.diff(begin).max() > _MOST_SEEN else ((side, across[0]), begin, seen)
     return None

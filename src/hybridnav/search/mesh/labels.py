@@ -138,7 +138,8 @@ class HubTables(MeshLabels):
 
     def labels(self, ends: Any) -> Labels:
         """Return the labels of ends."""
-        room = np.empty(ROOM, np.int8), np.empty(ROOM, np.int64), np.full(self.n_corners, hubs.FAR)
+        seen = np.empty(ROOM, np.int8), np.empty(ROOM, np.int32), np.empty(ROOM, np.int64)
+        room = *seen, np.full(self.n_corners, hubs.FAR)
         found: Labels = hub_labels_of_points(
             self._mesh, self._labels, self._place[1], (ends[3], ends[0]), room
         )

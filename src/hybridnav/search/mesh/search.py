@@ -145,18 +145,27 @@ class _HubWork(_Work):
         super().__init__(mesh)
         n = len(mesh.corners)
         self.sights, self.costs = np.empty((2, _ROOM), np.int8), np.empty((2, _ROOM), np.int64)
-        self.totals = np.empty(_ROOM, np.int64)
+        self.views, self.totals = np.empty((2, _ROOM), np.int32), np.empty(_ROOM, np.int64)
         self.hubs = np.full(n, hubs.FAR), np.empty(n, np.int32)
 
     def make_room(self) -> None:
         self.sights = np.concatenate([self.sights, self.sights], axis=1)
+        self.views = np.concatenate([self.views, self.views], axis=1)
         self.costs = np.concatenate([self.costs, self.costs], axis=1)
         self.totals = np.empty(self.costs.shape[1], np.int64)
 
     @property
     def arrays(self) -> tuple[object, ...]:
         """The arrays in the order of `query_hubs`."""
-        return self.sights, self.costs, self.totals, *self.hubs, self.counts, self.bounds
+        return (
+            self.sights,
+            self.views,
+            self.costs,
+            self.totals,
+            *self.hubs,
+            self.counts,
+            self.bounds,
+        )
 
 
 @copies_alike

@@ -142,24 +142,26 @@ def hub_labels_of_points(mesh, hub_labels, polygon_at, ends, room):
     ends
         int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
     room
-        Room for the corners of a square, int8 and int64; int64 (hubs,) least distances.
+        Room for the corners of a square, int8, int32 and int64; int64 (hubs,) least distances.
     """
     entries, layout, _, views = hub_labels[:4]
     shift, units = int(layout[2]), layout[3] * UNITS
     mask = (np.int64(1) << shift) - 1
     cells, points = ends
-    sights, to_seen, least = room
+    sights, views_at, to_seen, least = room
     offset = np.zeros(len(points) + 1, np.int64)
     nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
     for k in range(len(points)):
         y, x = points[k, 0], points[k, 1]
-        low, high = view_of_square(mesh, hub_labels, x, y, sights, to_seen)
+        n_seen = view_of_square(mesh, hub_labels, x, y, sights, views_at, to_seen)
         begin = n
-        for i in range(high - low):
-            corner, cell = views[low + i, 0] >> 1, (cells[k, 0], cells[k, 1])
-            if is_hidden(mesh, polygon_at, cell, (x, y), corner, sights, i):
+        for i in range(n_seen):
+            seen, first, last = views[views_at[i]]
+            if is_hidden(
+                mesh, polygon_at, (cells[k, 0], cells[k, 1]), (x, y), seen >> 8, sights, i
+            ):
                 continue
-            for packed in entries[views[low + i, 1] : views[low + i, 2]]:
+            for packed in entries[first:last]:
                 hub, reached = packed >> shift, to_seen[i] + (packed & mask)
                 if least[hub] == UNREACHED:
                     if n == len(nodes):

@@ -14,35 +14,20 @@ Euclidean shortest path computation using hub labeling, 2023.
 import math
 
 import numpy as np
+from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow
+from hybridnav._base.kernels.arrays import fetch, grow, push
 from hybridnav._base.kernels.exact import is_legal, turn_of
-from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, pop, push, put_corner
-from hybridnav.search.mesh.kernels.squares import line_before
+from hybridnav.search.kernels.labels import reach_next
+from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, put_corner
+from hybridnav.search.mesh.kernels.squares import line_before, quarter_of
 from hybridnav.search.mesh.kernels.views import distance, lobe_of
-
-_SAME = 1e-12
-"""Difference of two distances that counts as none, in cells: rounding alone causes it."""
 
 
 @njit(cache=True, nogil=True)
-def _reach_next(mesh, edges, here, work, size, n_touched):
-    """Reach the corners to which a shortest path may go on from a corner.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    edges
-        See `edges_of`.
-    here
-        The corner.
-    work
-        Cost of corners (infinite), corner before, corners touched; keys and values of the heap.
-    size, n_touched
-        Sizes of the heap and of the list of corners touched; returned.
-    """
+def _reach_on_mesh(mesh, edges, here, work, size, n_touched):
+    """Reach the corners to which a shortest path may go on; see `reach_next`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads = edges
     costs, before, touched, heap = work
@@ -62,128 +47,19 @@ def _reach_next(mesh, edges, here, work, size, n_touched):
                 touched[n_touched] = other
                 n_touched += 1
             costs[other], before[other] = reached, here
-            size = push(heap, size, reached, other)
+            push(heap, size, reached, float(other))
+            size += 1
     return size, n_touched
 
 
-@njit(cache=True, nogil=True)
-def _room_for(n, n_edges):
-    """Return work arrays for `_reach_next`; every edge is queued once at most."""
-    heap = np.empty(n_edges + 1), np.empty(n_edges + 1, np.int32)
-    return np.full(n, np.inf), np.empty(n, np.int32), np.empty(n, np.int32), heap
+@overload(reach_next)
+def _reach_of_mesh(graph, edges, here, work, size, n_touched):  # noqa: ARG001 - numba's rule
+    """Return what stands for `reach_next` on a mesh."""
 
+    def reach(graph, edges, here, work, size, n_touched):
+        return _reach_on_mesh(graph, edges, here, work, size, n_touched)
 
-@njit(cache=True, nogil=True)
-def uses_of_corners(mesh, edges, sources):
-    """Count the shortest paths from some corners to all others that each corner is on, float64."""
-    n = len(mesh[0])
-    work = _room_for(n, len(edges[1]))
-    costs, before, touched, heap = work
-    uses, below, order = np.zeros(n), np.zeros(n), np.empty(n, np.int32)
-    for source in sources:
-        costs[source], before[source], touched[0] = 0.0, -1, source
-        size, n_touched, n_settled = push(heap, 0, 0.0, source), 1, 0
-        while size:
-            cost, here = heap[0][0], heap[1][0]
-            size = pop(heap, size)
-            if cost == costs[here]:
-                order[n_settled], below[here] = here, 1.0
-                n_settled += 1
-                size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
-        for k in range(n_settled - 1, 0, -1):
-            here = order[k]
-            uses[here] += below[here]
-            below[before[here]] += below[here]
-        for corner in touched[:n_touched]:
-            costs[corner] = np.inf
-    return uses
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def labels_of_corners(mesh, edges, ranked, most):
-    """Label corners with hubs: search from each, and stop where labels so far say as much.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    edges
-        See `edges_of`.
-    ranked
-        int32, the corners at which paths bend, those on most paths first.
-    most
-        Most entries.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32 the next corner on the
-        path to the hub, without the corner itself as its own hub; whether there was room for all.
-    """
-    n = len(mesh[0])
-    work = _room_for(n, len(edges[1]))
-    costs, before, touched, heap = work
-    to_hub = np.full(len(ranked), np.inf)
-    ranks = np.full(n, np.int64(len(ranked)))
-    # Each corner has a run of entries in a common pool, and moves to a longer one when it is full.
-    begin, count, room = np.zeros(n, np.int64), np.zeros(n, np.int32), np.zeros(n, np.int32)
-    hubs, lengths, onward = np.empty(4096, np.int32), np.empty(4096), np.empty(4096, np.int32)
-    used = total = 0
-    for rank in range(len(ranked)):
-        root = ranked[rank]
-        ranks[root] = rank
-        # The labels of the root by hub, for the tests below.
-        for k in range(begin[root], begin[root] + count[root]):
-            to_hub[hubs[k]] = lengths[k]
-        # Dijkstra from the root, which looks no further where labels say as much.
-        costs[root], before[root], touched[0] = 0.0, -1, root
-        size, n_touched = push(heap, 0, 0.0, root), 1
-        while size:
-            cost, here = heap[0][0], heap[1][0]
-            size = pop(heap, size)
-            if cost > costs[here]:
-                continue
-            # A hub of before, which may be the corner itself, lies on a path that is as short.
-            if ranks[here] < rank and to_hub[ranks[here]] <= cost + _SAME:
-                continue
-            at, stop = begin[here], begin[here] + count[here]
-            while at < stop and to_hub[hubs[at]] + lengths[at] > cost + _SAME:
-                at += 1
-            if at < stop:
-                continue
-            # Write the entry, and move the run where it is full.
-            if here != root:
-                if count[here] == room[here]:
-                    room[here] = max(8, 2 * room[here])
-                    while used + room[here] > len(hubs):
-                        hubs, lengths, onward = grow(hubs), grow(lengths), grow(onward)
-                    for k in range(count[here]):
-                        old, new = begin[here] + k, used + k
-                        hubs[new], lengths[new], onward[new] = hubs[old], lengths[old], onward[old]
-                    begin[here] = used
-                    used += room[here]
-                at = begin[here] + count[here]
-                hubs[at], lengths[at], onward[at] = rank, cost, before[here]
-                count[here] += 1
-                total += 1
-            size, n_touched = _reach_next(mesh, edges, here, work, size, n_touched)
-        # Only what was touched is reset.
-        for corner in touched[:n_touched]:
-            costs[corner] = np.inf
-        for k in range(begin[root], begin[root] + count[root]):
-            to_hub[hubs[k]] = np.inf
-        if total > most:
-            return begin, hubs[:0], lengths[:0], onward[:0], False
-    # The runs one behind the other, in the order of the corners.
-    offset = np.zeros(n + 1, np.int64)
-    for corner in range(n):
-        offset[corner + 1] = offset[corner] + count[corner]
-    kept = np.empty(total, np.int64)
-    for corner in range(n):
-        for k in range(count[corner]):
-            kept[offset[corner] + k] = begin[corner] + k
-    return offset, hubs[kept], lengths[kept], onward[kept], True
+    return reach if len(graph) == 8 else None
 
 
 # A query. An entry holds the rank of its hub above the distance to it, in units.
@@ -223,20 +99,27 @@ def _see_each_other(polygon_at, cells, endpoints):
 
 
 @njit(cache=True, nogil=True)
-def view_of_square(mesh, labels, x, y, sights, costs):
-    """Write the distances of the corners of a point's square, in units; return the first view and
-    the one after the last, or -1 without room."""
+def view_of_square(mesh, labels, x, y, sights, views_at, costs):
+    """Write the corners that see something of a point's quarter of a square: whether they see all,
+    their views, and distances in units; return how many, or -1 without room."""
     cx, cy = mesh[0], mesh[1]
-    layout, begin, views = labels[1], labels[2], labels[3]
-    square = line_before(y, layout[0]) * int(layout[1]) + line_before(x, layout[0])
-    low, high, units = begin[square], begin[square + 1], 1.0 / layout[3]
+    entries, layout, begin, views = labels[:4]
+    row, col = line_before(y, layout[0] / 2), line_before(x, layout[0] / 2)
+    square = (row + 1 >> 1) * int(layout[1]) + (col + 1 >> 1)
+    bit, units = quarter_of(row, col), 1.0 / layout[3]
+    low, high, n = begin[square], begin[square + 1], 0
     if high - low > len(costs):
-        return low, -1
-    for k in range(high - low):
-        corner, sights[k] = views[low + k, 0] >> 1, views[low + k, 0] & 1
-        dx, dy = cx[corner] - x, cy[corner] - y
-        costs[k] = np.int64(math.sqrt(dx * dx + dy * dy) * units + 0.5)
-    return low, high
+        return -1
+    for at in range(low, high):
+        seen = views[at, 0]
+        if seen & bit:
+            for k in range(views[at, 1], views[at, 2], 8):
+                fetch(entries, k)
+            corner, sights[n], views_at[n] = seen >> 8, (seen & bit << 4) > 0, at
+            dx, dy = cx[corner] - x, cy[corner] - y
+            costs[n] = np.int64(math.sqrt(dx * dx + dy * dy) * units + 0.5)
+            n += 1
+    return n
 
 
 @njit(cache=True, nogil=True)
@@ -277,9 +160,9 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
         See `look_from_endpoints`.
     work
         Room for the corners of both ends: int8 (2, n) whether the end sees each (1), or not (-1),
-        or it is not known (0); int64 (2, n) distances to them; int64 (n,) least distances by the
-        corners of the goal. By hub, int64 the least distance from the start, above the number of
-        its corner (`FAR`); int32 hubs touched. Counts and bounds.
+        or it is not known (0); int32 (2, n) their views; int64 (2, n) distances to them; int64
+        (n,) least distances by the corners of the goal. By hub, int64 the least distance from the
+        start, above the number of its corner (`FAR`); int32 hubs touched. Counts and bounds.
     effort
         See `query`; with a limit of 0 the length is found without the path.
 
@@ -288,8 +171,8 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     tuple
         See `query`.
     """
-    _, polygon_at, cells = where
-    sights, costs, totals, least, touched, counts, bounds = work
+    component, polygon_at, cells = where
+    sights, at, costs, totals, least, touched, counts, bounds = work
     sx, sy, tx, ty = endpoints
     entries, layout, _, views = labels[:4]
     shift = int(layout[2])
@@ -300,18 +183,23 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     bounds[:] = math.hypot(tx - sx, ty - sy)
     if _see_each_other(polygon_at, cells, endpoints):
         return DONE, _path_through(mesh, endpoints, none, none)
+    bounds[:] = np.inf
+    inner = polygon_at[cells[0], cells[1]], polygon_at[cells[2], cells[3]]
+    if component[inner[0]] != component[inner[1]]:
+        return DONE, np.empty((0, 2))
     # The corners in sight of the squares of both ends.
-    low, high = view_of_square(mesh, labels, sx, sy, sights[0], costs[0])
-    to_low, to_high = view_of_square(mesh, labels, tx, ty, sights[1], costs[1])
-    if high < 0 or to_high < 0:
+    n_start = view_of_square(mesh, labels, sx, sy, sights[0], at[0], costs[0])
+    n_goal = view_of_square(mesh, labels, tx, ty, sights[1], at[1], costs[1])
+    if n_start < 0 or n_goal < 0:
         return WORK_FULL, np.empty((0, 2))
 
     # All corners of the start, seen or not: the least distances to hubs, then to corners of the
     # goal. They are lower bounds.
     n_touched = 0
-    for k in range(high - low):
+    for k in range(n_start):
         cost = costs[0, k]
-        for packed in entries[views[low + k, 1] : views[low + k, 2]]:
+        for j in range(views[at[0, k], 1], views[at[0, k], 2]):
+            packed = entries[j]
             hub, reached = packed >> shift, cost + (packed & mask) << ABOVE | k
             known = least[hub]
             if reached < known:
@@ -319,10 +207,10 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
                 if known == FAR:
                     touched[n_touched] = hub
                     n_touched += 1
-    n_goal = to_high - to_low
     for m in range(n_goal):
         least_to = FAR
-        for packed in entries[views[to_low + m, 1] : views[to_low + m, 2]]:
+        for j in range(views[at[1, m], 1], views[at[1, m], 2]):
+            packed = entries[j]
             least_to = min(least_to, (packed & mask) + (least[packed >> shift] >> ABOVE))
         totals[m] = costs[1, m] + least_to
 
@@ -334,29 +222,30 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
         if totals[m] >= best:
             break
         totals[m] = FAR
-        if is_hidden(
-            mesh, polygon_at, cells[2:], (tx, ty), views[to_low + m, 0] >> 1, sights[1], m
-        ):
+        view = at[1, m]
+        if is_hidden(mesh, polygon_at, cells[2:], (tx, ty), views[view, 0] >> 8, sights[1], m):
             continue
-        for packed in entries[views[to_low + m, 1] : views[to_low + m, 2]]:
+        for j in range(views[view, 1], views[view, 2]):
+            packed = entries[j]
             hub, reached = packed >> shift, costs[1, m] + (packed & mask)
             while reached + (least[hub] >> ABOVE) < best:
                 k = least[hub] & ((1 << ABOVE) - 1)
-                corner = views[low + k, 0] >> 1
+                corner = views[at[0, k], 0] >> 8
                 if is_hidden(mesh, polygon_at, cells[:2], (sx, sy), corner, sights[0], k):
-                    least[hub] = _next_best(labels, low, high, hub, sights[0], costs[0])
+                    least[hub] = _next_best(labels, at[0, :n_start], hub, sights[0], costs[0])
                 else:
                     best, best_hub = reached + (least[hub] >> ABOVE), hub
-                    one, two = low + k, to_low + m
+                    one, two = corner, views[view, 0] >> 8
     # Only what was touched is reset. Then the path from hub to hub, and its length in order.
     for hub in touched[:n_touched]:
         least[hub] = FAR
-    bounds[:] = np.inf if one < 0 else best * layout[3]
+    if one >= 0:
+        bounds[:] = best * layout[3]
     if one < 0 or effort[2] == 0:
         return DONE, np.empty((0, 2))
     # The corners from either end to the hub.
-    there = _corners_to(labels, views[one, 0] >> 1, best_hub, shift)
-    back = _corners_to(labels, views[two, 0] >> 1, best_hub, shift)
+    there = _corners_to(labels, one, best_hub, shift)
+    back = _corners_to(labels, two, best_hub, shift)
     path = _path_through(mesh, endpoints, there, back)
     length = 0.0
     for k in range(len(path) - 1):
@@ -367,16 +256,17 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
 
 
 @njit(cache=True, nogil=True)
-def _next_best(labels, low, high, hub, sights, costs):
+def _next_best(labels, at, hub, sights, costs):
     """Return the least distance to a hub by a corner that is not known as hidden, above the
     corner's number."""
     entries, layout, _, views = labels[:4]
     shift = int(layout[2])
     mask = (np.int64(1) << shift) - 1
     best = FAR
-    for k in range(high - low):
+    for k in range(len(at)):
         if sights[k] >= 0:
-            for packed in entries[views[low + k, 1] : views[low + k, 2]]:
+            for j in range(views[at[k], 1], views[at[k], 2]):
+                packed = entries[j]
                 if packed >> shift == hub:
                     best = min(best, costs[k] + (packed & mask) << ABOVE | k)
     return best

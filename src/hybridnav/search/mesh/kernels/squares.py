@@ -29,6 +29,12 @@ def line_before(value, side):
 
 
 @njit(cache=True, nogil=True)
+def quarter_of(row, col):
+    """Return the bit of a quarter of a square, by its row and column among all quarters."""
+    return 1 << (2 * (row & 1) + (col & 1))
+
+
+@njit(cache=True, nogil=True)
 def corner_of_square(square, side, n_across):
     """Return the least row and column coordinate in a square."""
     return (square // n_across - 1) * side + _SHIFT, (square % n_across - 1) * side + _SHIFT
@@ -195,19 +201,45 @@ def squares_of_views(mesh, walls, squares, layout, found):
 
 @guarded
 @njit(cache=True, nogil=True)
-def corners_by_square(offset, found, n_squares):
-    """Return the corners of each square: int32 (n_squares + 1,) offsets, and int32 twice the number
-    of each corner, plus 1 if it sees all free space in the square."""
-    begin = np.zeros(n_squares + 1, np.int32)
-    for twice in found:
-        begin[(twice >> 1) + 1] += 1
-    for square in range(n_squares):
-        begin[square + 1] += begin[square]
-    at, corners = begin[:-1].copy(), np.empty(len(found), np.int32)
-    for corner in range(len(offset) - 1):
-        for twice in found[offset[corner] : offset[corner + 1]]:
-            corners[at[twice >> 1]] = 2 * corner + (twice & 1)
-            at[twice >> 1] += 1
+def corners_by_square(offset, found, n_across, layout):
+    """Join quarters into squares, and return the corners of each.
+
+    Parameters
+    ----------
+    offset, found
+        Results of `squares_of_views` for the quarters.
+    n_across
+        Number of quarters in a row.
+    layout
+        Number of squares in a row, and in all.
+
+    Returns
+    -------
+    tuple
+        int32 (squares + 1,) offsets; int32 corners with eight bits below, see `HubLabels.views`.
+    """
+    n_squares_across, n_squares = layout
+    begin, last = np.zeros(n_squares + 1, np.int32), np.full(n_squares, -1, np.int32)
+    at, corners = begin[:-1], np.empty(0, np.int32)
+    # They are counted, then written.
+    for turn in range(2):
+        for corner in range(len(offset) - 1):
+            for twice in found[offset[corner] : offset[corner + 1]]:
+                row, col = (twice >> 1) // n_across, (twice >> 1) % n_across
+                square = (row + 1 >> 1) * n_squares_across + (col + 1 >> 1)
+                if last[square] != 2 * corner + turn:
+                    last[square] = 2 * corner + turn
+                    if turn == 0:
+                        begin[square + 1] += 1
+                    else:
+                        corners[at[square]] = corner << 8
+                        at[square] += 1
+                if turn == 1:
+                    corners[at[square] - 1] |= quarter_of(row, col) * (16 * (twice & 1) + 1)
+        if turn == 0:
+            for square in range(n_squares):
+                begin[square + 1] += begin[square]
+            at, corners = begin[:-1].copy(), np.empty(begin[-1], np.int32)
     return begin, corners
 
 
@@ -240,8 +272,8 @@ def views_of_squares(mesh, parts, layout, begin, corners):
     kept = np.zeros(len(begin), np.int32)
     for square in range(len(begin) - 1):
         y, x = corner_of_square(square, side, n_across)
-        for twice in corners[begin[square] : begin[square + 1]]:
-            corner = twice >> 1
+        for seen in corners[begin[square] : begin[square + 1]]:
+            corner = seen >> 8
             ex = 1.0 if kinds[corner] & 1 else -1.0
             ey = 1.0 if kinds[corner] & 2 else -1.0
             low = high = -1
@@ -264,7 +296,7 @@ def views_of_squares(mesh, parts, layout, begin, corners):
                     part += 1
                 high = offset[part]
             if low < high:
-                views[n, 0], views[n, 1], views[n, 2] = twice, low, high
+                views[n, 0], views[n, 1], views[n, 2] = seen, low, high
                 n += 1
         kept[square + 1] = n
     return kept, views[:n].copy()
