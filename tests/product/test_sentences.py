@@ -61,13 +61,9 @@ def _docstrings(name: str) -> list[str]:
         return []
     tree = ast.parse(textwrap.dedent(inspect.getsource(thing)))
     parts = [one for one in ast.walk(tree) if isinstance(one, ast.ClassDef | ast.FunctionDef)]
-    texts = [one.value for p in parts if p.name[0] != "_" for one in p.body if _is_text(one)]
-    return [inspect.cleandoc(text.value) for text in texts]
-
-
-def _is_text(node: ast.stmt) -> bool:
-    constant = node.value if isinstance(node, ast.Expr) else None
-    return isinstance(constant, ast.Constant) and isinstance(constant.value, str)
+    nodes = [one for p in parts if p.name[0] != "_" for one in p.body if isinstance(one, ast.Expr)]
+    texts = [one.value.value for one in nodes if isinstance(one.value, ast.Constant)]
+    return [inspect.cleandoc(text) for text in texts if isinstance(text, str)]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
