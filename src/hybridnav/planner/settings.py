@@ -180,8 +180,8 @@ class ShortestSettings(PlannerSettings):
     """Seconds after which a query returns the best path so far, with its proved bound; null for no
     limit. Until the planner is prepared, such queries shorten a path of cells by line of sight."""
     labels_mb: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] | None = None
-    """Most MB of hub labels, which are built in the background once queries have had the graph of
-    corners built, anew after a change of the map; null for none but those of `prepare`."""
+    """Most MB of hub labels. They are built in the background once queries have had the graph of
+    corners built, and anew after a change of the map; null for none but those of `prepare`."""
 
 
 class OctileSettings(PlannerSettings):
