@@ -248,7 +248,12 @@ class _Kernel(_Renewed):
 
     def enable_caching(self) -> None:
         """Keep what is compiled, and look for what is kept."""
-        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
+        del self._cache  # type: ignore[has-type]
+
+    @cached_property
+    def _cache(self) -> _Cache:
+        """The cache of a kernel that is called: a plan calls one of eight that it imports."""
+        return _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or load it from the cache."""
