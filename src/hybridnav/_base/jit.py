@@ -8,6 +8,7 @@ import sys
 import time
 import warnings
 from functools import cache, cached_property
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -188,7 +189,7 @@ def _load_arrays() -> None:
         return
     sys.modules[blas] = None  # type: ignore[assignment]
     try:
-        pass
+        import_module("numba.np.arraymath")._HAVE_BLAS = True
     finally:
         del sys.modules[blas]
 
