@@ -189,7 +189,7 @@ def _load_arrays() -> None:
         return
     sys.modules[blas] = None  # type: ignore[assignment]
     try:
-        import_module("numba.np.arraymath")._HAVE_BLAS = True
+        import_module("numba.np.arraymath")._HAVE_BLAS = True  # noqa: SLF001 - scipy has it
     finally:
         del sys.modules[blas]
 
