@@ -13,6 +13,7 @@ import json
 import os
 import pickle
 import platform
+import resource
 import shutil
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.common import ROOT, Refused, option
+from benchmarks.subjects.cold import PLAN
 from hybridnav._base.jit import LEVELS
 
 if TYPE_CHECKING:
@@ -162,9 +164,23 @@ def answers(python: Path, folder: Path, **settings: str) -> tuple[dict[str, Any]
     return json.loads(done.stdout)["answers"], done.stderr.strip().splitlines()[-1]
 
 
+def seconds(environment: Environment, *words: str) -> float:
+    """Return the seconds of a processor that a command takes in an empty home, least of three."""
+    found = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = environment.python.with_name("hybridnav")
+        run(command, *words, env={"PATH": os.environ["PATH"], "HOME": os.devnull})
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(found)
+
+
 def judge(environment: Environment, tree: Path, folder: Path) -> bool:
     """Print whether an installed wheel answers as compiled code does, in a home of no use."""
     packages = environment.packages
+    for words in (("--help",), PLAN, (*PLAN, "--preset", "paper")):
+        print(f"  {seconds(environment, *words):.2f} s of a processor: {' '.join(words)}")
     for part in ("tests", "benchmarks", "maps"):
         shutil.copytree(tree / part, folder / part)
     for place in (packages / "hybridnav").rglob("__pycache__"):
