@@ -63,7 +63,7 @@ class _Commands(TyperGroup):
         for name in self.list_commands(ctx):
             home = _home(name)
             text = home.info.help if isinstance(home, typer.Typer) else home.__doc__
-            self.commands[name] = TyperCommand(name, help=inspect.cleandoc(text))
+            self.commands[name] = TyperCommand(name, help=inspect.cleandoc(text or ""))
         super().format_commands(ctx, formatter)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
