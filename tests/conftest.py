@@ -1,6 +1,7 @@
 """Fixtures for every test."""
 
 import json
+import math
 import os
 import signal
 import sys
@@ -46,8 +47,10 @@ class Outcome:
 
 @pytest.fixture
 def cli(monkeypatch, capsys):
-    """Run the command line in this process."""
-    from hybridnav.cli import main
+    """Run the command line in this process, which does not tell how long it compiles."""
+    from hybridnav.cli import main, warm
+
+    monkeypatch.setattr(warm, "_PATIENCE_S", math.inf)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["hybridnav", *map(str, arguments)])

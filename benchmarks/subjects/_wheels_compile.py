@@ -19,7 +19,8 @@ def main(listed: Path, folder: Path) -> None:
     jit.SHIPPED = folder
     jit.LEVELS.clear()  # what another level has does not count
     level = os.environ["NUMBA_CPU_NAME"]
-    for module, name, signatures in pickle.loads(listed.read_bytes()):  # noqa: S301 - our own
+    kernels = pickle.loads(listed.read_bytes())  # noqa: S301 - our own
+    for (module, name), signatures in kernels.items():
         kernel = getattr(import_module(module), name)
         cache = kernel._cache  # noqa: SLF001 - numba has no other access
         cache._cache_file = cache._shipped(level)  # noqa: SLF001

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import http.client
 import sys
-import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,7 +52,7 @@ def fetched(entry: dict[str, str], folder: Path, host: str) -> str:
     try:
         with urllib.request.urlopen(address, timeout=PATIENCE_S) as answer:  # noqa: S310 - https
             content: bytes = answer.read()
-    except (urllib.error.URLError, OSError) as error:
+    except (http.client.HTTPException, OSError) as error:  # cut off, or never begun
         return str(getattr(error, "reason", error))
     if hashlib.sha256(content).hexdigest() != entry["sha256"]:
         return "it has another checksum"

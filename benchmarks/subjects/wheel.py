@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,13 +72,14 @@ class Environment:
         return time.perf_counter() - began, is_fine
 
     def megabytes(self) -> list[tuple[int, str]]:
-        """Return what each package takes on disk, the largest first."""
+        """Return what each package takes on disk without bytecode, the largest first."""
         (packages,) = self.venv.glob("lib/python*/site-packages")
         sizes = []
-        for part in packages.iterdir():
-            files = part.rglob("*") if part.is_dir() else [part]
-            size = sum(file.stat().st_size for file in files if file.is_file())
-            sizes.append((round(size / 1e6), part.name))
+        for one in distributions(path=[str(packages)]):
+            files = [Path(str(each.locate())) for each in one.files or ()]
+            bare = (file for file in files if file.suffix != ".pyc" and file.is_file())
+            size = sum(file.stat().st_size for file in bare)
+            sizes.append((round(size / 1e6), one.metadata["Name"]))
         return sorted(sizes, reverse=True)
 
 
@@ -85,7 +87,8 @@ def measure(python: str, wheel: Path, folder: Path) -> bool:
     """Print the table of one interpreter; return whether every command succeeded."""
     made = Environment(python, wheel, folder)
     sizes = made.megabytes()
-    print(f"\n{python}: installed in {made.seconds:.0f} s, {sum(size for size, _ in sizes)} MB")
+    total = sum(size for size, _ in sizes)
+    print(f"\n{python}: installed in {made.seconds:.0f} s, {total} MB without bytecode")
     print("  " + ", ".join(f"{name} {size}" for size, name in sizes[:LARGEST]))
     plan = "plan", "office/office.yaml", *ENDS
     jobs = [

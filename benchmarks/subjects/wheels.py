@@ -1,10 +1,10 @@
 """Build wheels that bring compiled kernels, one for each Python, and try them: `make wheels`.
 
-In a clean clone, commands, pages, presets and notebooks run once, which lists the kernels and the
-types that they are called with. For each Python they are compiled for the levels of x86-64 in
-`hybridnav._base.jit.LEVELS` and packed. Each wheel is then installed into an empty environment with
-a home that cannot be written: nothing may be compiled there, and the answers of `tests.answers`
-must be those of a run that compiles for this processor, bit for bit. Exits with 1 where one fails.
+For each Python `EXERCISE` runs with a wheel in an environment of its own. What it compiles is
+compiled for the levels of x86-64 in `hybridnav._base.jit.LEVELS` and packed, until it compiles
+nothing; the next Python begins with the kernels of the one before. Then, in a home that cannot be
+written, the answers of `tests.answers` must be those of a run that compiles for this processor, bit
+for bit, with nothing compiled. Exits with 1 where one fails.
 """
 
 from __future__ import annotations
@@ -13,26 +13,32 @@ import json
 import os
 import pickle
 import platform
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.common import ROOT, Refused, option
+from benchmarks.subjects.cold import PLAN
 from hybridnav._base.jit import LEVELS
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
 EXERCISE = (
-    *("tests/product/test_readme.py", "tests/product/test_examples.py"),
-    *("tests/product/test_notebooks.py", "tests/planner/test_named_plans.py"),
-    *("tests/cli", "tests/ext/page", "tests/ext/agent"),
+    *("tests/product/test_readme.py", "tests/product/test_notebooks.py"),
+    *("tests/planner/test_named_plans.py", "tests/cli/test_commands.py", "tests/cli/test_live.py"),
+    *("tests/cli/test_export.py", "tests/cli/test_check.py", "tests/cli/test_evaluate.py"),
+    *("tests/ext/page/test_answers.py", "tests/ext/page/test_edits.py", "tests/ext/agent"),
 )
-"""Tests that run what the pages and notebooks promise, and all presets."""
+"""Tests that run every command, all presets, the page, and what pages and notebooks promise."""
+PACKAGES = ("hypothesis", "pytest", "nbclient", "nbformat", "ipykernel", "rosbags", "playwright")
+"""What they need beside the extras of the page and the agent."""
+ROUNDS = 3
+"""Times that what was compiled is packed: the first wheel has nothing, the second should do."""
 TAG = f"manylinux_2_28_{platform.machine()}"
 """llvmlite's own wheels need as much."""
 COUNTED = """
@@ -50,6 +56,15 @@ try:
 finally:
     sys.stderr.write(f"compiled {compiled}\\n")
 """
+WARM = """
+from hybridnav.cli import warm
+for job in (*(warm.SEARCH + method for method in warm.SEARCHES), *warm.PRESETS):
+    warm.compile_job(job)
+"""
+"""What `python -m hybridnav.cli.warm` compiles, in one process."""
+
+Kernels = dict[tuple[str, str], list[Any]]
+"""Signatures by module and name."""
 
 
 def run(*words: Any, **settings: Any) -> str:
@@ -61,10 +76,11 @@ def run(*words: Any, **settings: Any) -> str:
     return str(done.stdout)
 
 
-def kernels_of(tree: Path) -> list[tuple[str, str, list[Any]]]:
-    """Return module, name and signatures of the kernels in the caches of a source tree."""
-    found: dict[tuple[str, str], list[Any]] = defaultdict(list)
-    for index in sorted((tree / "src").rglob("*.nbi")):
+def take_kernels(tree: Path, kernels: Kernels) -> list[str]:
+    """Take module, name and signatures of the kernels in the caches below a folder; return the
+    names of the new ones."""
+    new = []
+    for index in sorted(tree.rglob("__pycache__/*.nbi")):
         stem, _, _ = index.name.rpartition("-")
         module, _, name = stem.partition(".")
         if name.endswith("_inner"):  # linked into the others
@@ -72,10 +88,14 @@ def kernels_of(tree: Path) -> list[tuple[str, str, list[Any]]]:
         with index.open("rb") as file:
             pickle.load(file)  # noqa: S301 - numba's version, as all of its files
             _, entries = pickle.loads(file.read())  # noqa: S301
-        folder = index.parents[1].relative_to(tree / "src")
-        parts = folder.parts if module == "__init__" else (*folder.parts, module)
-        found[".".join(parts), name] += sorted((key[0] for key in entries), key=str)
-    return [(module, name, each) for (module, name), each in found.items()]
+        parts = index.parents[1].relative_to(tree).parts
+        key = ".".join(parts if module == "__init__" else (*parts, module)), name
+        known = kernels.setdefault(key, [])
+        signatures: list[Any] = sorted({key[0] for key in entries}, key=str)
+        if any(each not in known for each in signatures):
+            new.append(".".join(key))
+        known += [each for each in signatures if each not in known]
+    return new
 
 
 class Environment:
@@ -87,10 +107,11 @@ class Environment:
         self.python = folder / "bin" / "python"
         self.name = run(self.python, "-c", "import sys; print('cp%d%d' % sys.version_info[:2])")
         self.name = self.name.strip()
+        (self.packages,) = folder.glob("lib/python*/site-packages")
 
     def install(self, *words: Any) -> None:
         """Install packages."""
-        run(self.python, "-m", "pip", "install", "--quiet", *words)
+        run(self.python, "-m", "pip", "install", "--quiet", "--no-compile", *words)
 
 
 def compile_for(environment: Environment, listed: Path, folder: Path) -> None:
@@ -108,16 +129,29 @@ def compile_for(environment: Environment, listed: Path, folder: Path) -> None:
 
 
 def build(environment: Environment, tree: Path, listed: Path) -> Path:
-    """Build the wheel of one Python in a clean tree."""
-    environment.install("hatchling", "wheel", tree)
+    """Build the wheel of one Python in a clean tree, and install it."""
     compile_for(environment, listed, tree / "src" / "hybridnav" / "compiled")
     dist = tree / "dist"
+    shutil.rmtree(dist, ignore_errors=True)
     run(environment.python, "-m", "hatchling", "build", "-t", "wheel", "-d", dist, cwd=tree)
     (plain,) = dist.glob("*-none-any.whl")
     tags = [f"--python-tag={environment.name}", f"--abi-tag={environment.name}"]
     run(environment.python, "-m", "wheel", "tags", *tags, f"--platform-tag={TAG}", plain)
     (made,) = dist.glob(f"*-{environment.name}-*.whl")
+    shutil.rmtree(environment.packages / "hybridnav")
+    environment.install("--no-deps", "--force-reinstall", made)
     return made
+
+
+def exercise(environment: Environment, tree: Path) -> None:
+    """Run the tests with an installed wheel, in one process: two may lose what they keep."""
+    clean = {key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    clean |= {"PYTHONPATH": str(tree), "HYBRIDNAV_DATA": ""}
+    clean["PATH"] = f"{environment.python.parent}{os.pathsep}{clean['PATH']}"
+    run(environment.python, "-c", WARM, cwd=tree, env=clean)
+    run(environment.python, "-m", "tests.answers", cwd=tree, env=clean)
+    tests = "pytest", "-q", "-m", "not full", *EXERCISE
+    run(environment.python, "-m", *tests, cwd=tree, env=clean)
 
 
 def answers(python: Path, folder: Path, **settings: str) -> tuple[dict[str, Any], str]:
@@ -130,11 +164,25 @@ def answers(python: Path, folder: Path, **settings: str) -> tuple[dict[str, Any]
     return json.loads(done.stdout)["answers"], done.stderr.strip().splitlines()[-1]
 
 
+def seconds(environment: Environment, *words: str) -> float:
+    """Return the seconds of a processor that a command takes in an empty home, least of three."""
+    found = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = environment.python.with_name("hybridnav")
+        run(command, *words, env={"PATH": os.environ["PATH"], "HOME": os.devnull})
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(found)
+
+
 def judge(environment: Environment, tree: Path, folder: Path) -> bool:
-    """Print whether an installed wheel compiles nothing, and answers as compiled code does."""
+    """Print whether an installed wheel answers as compiled code does, in a home of no use."""
+    packages = environment.packages
+    for words in (("--help",), PLAN, (*PLAN, "--preset", "paper")):
+        print(f"  {seconds(environment, *words):.2f} s of a processor: {' '.join(words)}")
     for part in ("tests", "benchmarks", "maps"):
         shutil.copytree(tree / part, folder / part)
-    (packages,) = environment.folder.glob("lib/python*/site-packages")
     for place in (packages / "hybridnav").rglob("__pycache__"):
         shutil.rmtree(place)
     for place in [packages / "hybridnav", *(packages / "hybridnav").rglob("*/")]:
@@ -163,27 +211,31 @@ def main(given: Namespace) -> int:
     if run("git", "status", "--porcelain", cwd=ROOT):
         raise Refused("the tree is not clean: commit first, kernels are built from commits")
     given.out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as scratch:
-        tree, listed = Path(scratch) / "tree", Path(scratch) / "kernels.pickle"
-        run("git", "clone", "--quiet", ROOT, tree)
-        paths = f"{tree / 'src'}{os.pathsep}{tree}"
-        clean = {key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-        clean |= {"PYTHONPATH": paths, "HYBRIDNAV_DATA": ""}
-        # One process: two that keep versions of one kernel may lose one.
-        run(sys.executable, "-m", "hybridnav.cli.warm", cwd=tree, env=clean)
-        run(sys.executable, "-m", "pytest", "-q", "-m", "not full", *EXERCISE, cwd=tree, env=clean)
-        run(sys.executable, "-m", "tests.answers", cwd=tree, env=clean)
-        kernels = kernels_of(tree)
-        listed.write_bytes(pickle.dumps(kernels))
-        print(f"{len(kernels)} kernels, {sum(len(each) for _, _, each in kernels)} signatures")
-        is_fine = []
-        for at, python in enumerate(given.python):
-            work = Path(scratch) / str(at)
-            run("git", "clone", "--quiet", ROOT, work / "tree")
-            made = build(Environment(python, work / "build"), work / "tree", listed)
-            shutil.copy(made, given.out)
-            print(f"{made.name}: {made.stat().st_size / 1e6:.1f} MB", flush=True)
-            environment = Environment(python, work / "empty")
-            environment.install(made, "h11")
-            is_fine.append(judge(environment, work / "tree", work / "elsewhere"))
+    kernels: Kernels = {}
+    is_fine = []
+    for python in given.python:
+        with tempfile.TemporaryDirectory() as scratch:
+            is_fine.append(make(python, Path(scratch), kernels, given.out))
     return 0 if all(is_fine) else 1
+
+
+def make(python: str, folder: Path, kernels: Kernels, out: Path) -> bool:
+    """Build and try the wheel of one Python; return whether it is fine."""
+    tree, listed = folder / "tree", folder / "kernels.pickle"
+    run("git", "clone", "--quiet", ROOT, tree)
+    environment = Environment(python, folder / "environment")
+    environment.install("hatchling", "wheel", *PACKAGES, f"{tree}[agent,view]")
+    for _ in range(ROUNDS):
+        listed.write_bytes(pickle.dumps(kernels))
+        made = build(environment, tree, listed)
+        exercise(environment, tree)
+        missing = take_kernels(environment.packages, kernels)
+        n_signatures = sum(map(len, pickle.loads(listed.read_bytes()).values()))  # noqa: S301
+        print(
+            f"{made.name}: {made.stat().st_size / 1e6:.1f} MB, {n_signatures} versions of kernels"
+        )
+        print(f"  the exercise compiled {', '.join(missing) or 'nothing'}", flush=True)
+        if not missing:
+            shutil.copy(made, out)
+            return judge(environment, tree, folder / "elsewhere")
+    return False

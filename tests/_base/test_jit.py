@@ -122,7 +122,8 @@ if sys.argv[2:]:
     Path(cache._cache_file._cache_path).mkdir(parents=True)
 keys = np.full((4, 2), 7)
 arrays.push(keys, 0, 3, 5)
-print(keys[0].tolist(), jit.is_for_another_numba(), arrays.push.is_warm())
+print(keys[0].tolist(), jit.is_for_another_numba(), arrays.push.is_warm(), end=" ")
+print("scipy.linalg" in sys.modules)
 """
 
 
@@ -139,7 +140,7 @@ def test_code_that_a_wheel_brings_is_taken_and_only_by_its_numba(tmp_path: Path)
         assert (done.returncode, done.stderr) == (0, "")
         return done.stdout
 
-    compiled, told = "compiled push \n", "[3, 5] False True\n"
+    compiled, told = "compiled push \n", "[3, 5] False True False\n"
     shipped = [level for level in LEVELS if level in levels()]
     for level in shipped:
         filled = run("fill", NUMBA_CPU_NAME=level, NUMBA_CPU_FEATURES="")
@@ -151,6 +152,6 @@ def test_code_that_a_wheel_brings_is_taken_and_only_by_its_numba(tmp_path: Path)
     assert not list((tmp_path / "cache").rglob("push*.nbi"))
     (tmp_path / level).rename(version / level)
     version.rename(tmp_path / "compiled" / "0.0")
-    another = told.replace("False", "True")
+    another = told.replace("False", "True", 1)
     assert run() == compiled + another
     assert run() == another  # kept in the user's folder

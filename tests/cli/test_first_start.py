@@ -88,9 +88,9 @@ def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
 @pytest.mark.parametrize(
     ("preset", "processors", "start", "jobs"),
     [
-        ("shortest", 2, "cold", ["shortest"]),
-        ("ompl", 2, "cold", ["shortest"]),
-        ("octile", 2, "cold", ["octile"]),
+        ("shortest", 2, "cold", ["search-shortest"]),
+        ("ompl", 2, "cold", ["search-shortest"]),
+        ("octile", 2, "cold", ["search-octile"]),
         ("robot", 2, "cold", []),
         ("shortest", 1, "cold", []),
         ("shortest", 2, "warm", []),
@@ -134,8 +134,20 @@ def test_a_first_plan_leaves_nothing_to_compile(tmp_path: Path) -> None:
     assert not compilers(tmp_path)
 
 
+def test_set_up_compiles_whole_plans_not_their_searches_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done: dict[str, list[str]] = {"compile_plan": [], "compile_search": []}
+    for name, jobs in done.items():
+        monkeypatch.setattr(warm, name, jobs.append)
+    monkeypatch.setattr(warm, "start", warm.compile_job)
+    warm.main([])
+    assert done["compile_plan"] == ["pyramid", *warm.PRESETS]
+    assert done["compile_search"] == ["shortest", "octile", "grid-astar"]
+
+
 @pytest.mark.full
-@pytest.mark.parametrize("preset", ["shortest", "grid-astar"])
+@pytest.mark.parametrize("preset", warm.PRESETS)
 def test_a_plan_on_the_small_map_compiles_what_one_in_a_building_needs(
     tmp_path: Path, preset: str
 ) -> None:

@@ -4,11 +4,13 @@ import importlib.util
 import math
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import networkx as nx
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_typestore
 
 import hybridnav as hn
 from hybridnav._base.messages import fill_message
@@ -307,3 +309,48 @@ def test_messages_are_filled_as_rosidl_fills_them(node: Any) -> None:
         assert plain(fill_message(ros_stand_in.message(kind)(), values[name])) == plain(judge)
     with pytest.raises(AttributeError):
         fill_message(ros_stand_in.message("nav_msgs/Path")(), {"points": []})
+
+
+def true_message(store: Any, kind: str, given: Any) -> Any:
+    """A message of rosbags, made of the true definitions of a release, with the same values."""
+
+    def part(kind: str, value: Any) -> Any:
+        if kind.startswith("list["):
+            return [part(kind[5:-1], each) for each in value]
+        return true_message(store, kind.replace("__", "/"), value) if "__" in kind else value
+
+    made = store.types[kind]
+    kinds = {name: kind for name, kind in made.__annotations__.items() if name != "__msgtype__"}
+    assert kinds.keys() == given.fields.keys()
+    return made(**{name: part(kind, getattr(given, name)) for name, kind in kinds.items()})
+
+
+def sent(store: Any, kind: str, given: Any) -> Any:
+    """What arrives of a message that is sent."""
+    sent = store.serialize_cdr(true_message(store, kind, given), kind)
+    return store.deserialize_cdr(sent, kind)
+
+
+@pytest.mark.parametrize("release", ["HUMBLE", "JAZZY", "KILTED", "LYRICAL"])
+def test_the_node_takes_and_makes_messages_of_each_release(
+    actions: Any, node: Any, release: str
+) -> None:
+    """Those of common_interfaces, whose definitions rosbags has; of Nav2's it has none."""
+    store, posed_kind = get_typestore(Stores[f"ROS2_{release}"]), "geometry_msgs/msg/PoseStamped"
+    ends = [
+        sent(store, posed_kind, posed(node, at, yaw))
+        for at, yaw in ((LEFT, START_YAW), (RIGHT, GOAL_YAW))
+    ]
+    asked_for = SimpleNamespace(use_start=True, start=ends[0], goal=ends[1])
+    handle = ros_stand_in.GoalHandle(asked_for)
+    result = node.answer(handle)
+    assert (handle.status, result.error_code) == ("succeeded", 0)
+    path = sent(store, "nav_msgs/msg/Path", result.path)
+    own = call(node, "compute_path_to_pose", asked(actions.ComputePathToPose, node, LEFT, RIGHT))[1]
+    assert [place(pose.pose.position) for pose in path.poses] == [
+        place(pose.pose.position) for pose in own.path.poses
+    ]
+    assert (path.header.frame_id, path.poses[-1].header.frame_id) == ("map", "map")
+    assert path.header.stamp.sec == 1_700_000_000
+    took = sent(store, "builtin_interfaces/msg/Duration", result.planning_time)
+    assert (took.sec, took.nanosec) == (0, 10**6)

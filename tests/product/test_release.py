@@ -81,8 +81,14 @@ def test_facts_that_disagree_are_told(copied, name, old, new, fault):
 class Quiet(http.server.SimpleHTTPRequestHandler):
     """Serves files and says nothing."""
 
+    cut = False
+
     def log_message(self, *_):
         """Say nothing."""
+
+    def copyfile(self, source, outputfile):
+        """Send a file, or hang up in the middle of it."""
+        outputfile.write(source.read()[: 5 if self.cut else None])
 
 
 @pytest.fixture
@@ -139,3 +145,29 @@ def test_a_study_without_some_maps_says_which_and_one_without_all_is_refused(dat
     (tmp_path / "nav2").symlink_to(data / "nav2")
     assert len(maps_of(tmp_path)) == 2
     assert len(lost_of(tmp_path)) == 15
+
+
+def test_a_transfer_that_is_cut_and_a_host_that_is_not_there_leave_nothing(
+    host, tmp_path, capsys, monkeypatch
+):
+    address, served, listing, lost = host
+    entry = fetch.listed()[0]
+    digest = hashlib.sha256(served.read_bytes()).hexdigest()
+    listing.write_text(listing.read_text().replace(entry["sha256"], digest))
+    maps = tmp_path / "maps"
+    monkeypatch.setattr(Quiet, "cut", True)
+    assert main(["fetch", str(maps), "--host", address]) == 1
+    told = capsys.readouterr()
+    assert f"{entry['file']}: IncompleteRead(5 bytes read" in told.err
+    assert f"0 of 2 files are in {maps}" in told.out
+    monkeypatch.setattr(Quiet, "cut", False)
+    for nowhere in ("http://127.0.0.1:1", "http://maps.invalid"):
+        assert main(["fetch", str(maps), "--host", nowhere]) == 1
+        told = capsys.readouterr().err
+        assert f"{entry['file']}: " in told
+        assert f"{lost['file']}: " in told
+    assert not maps.exists()
+    assert main(["fetch", str(maps), "--host", address]) == 1  # it goes on
+    assert (maps / entry["file"]).read_bytes() == served.read_bytes()
+    assert main(["fetch", str(maps), "--host", "http://127.0.0.1:1"]) == 1  # and keeps what it has
+    assert "1 of 2 files" in capsys.readouterr().out

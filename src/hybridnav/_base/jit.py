@@ -8,6 +8,7 @@ import sys
 import time
 import warnings
 from functools import cache, cached_property
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -188,7 +189,7 @@ def _load_arrays() -> None:
         return
     sys.modules[blas] = None  # type: ignore[assignment]
     try:
-        pass
+        vars(import_module("numba.np.arraymath"))["_HAVE_BLAS"] = True  # scipy has it
     finally:
         del sys.modules[blas]
 
@@ -248,7 +249,12 @@ class _Kernel(_Renewed):
 
     def enable_caching(self) -> None:
         """Keep what is compiled, and look for what is kept."""
-        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
+        del self._cache
+
+    @cached_property
+    def _cache(self) -> _Cache:
+        """The cache of a kernel that is called: a plan calls one of eight that it imports."""
+        return _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or load it from the cache."""

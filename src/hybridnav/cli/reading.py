@@ -96,13 +96,13 @@ def with_map(
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        hints = get_type_hints(command, include_extras=True)
         group = get_type_hints(MapOptions, include_extras=True)
         added = [each for each in fields(MapOptions) if each.name not in without]
 
+        # `get_type_hints` of Python 3.10 hides what is annotated where the default is None.
         own = [
-            each.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
-            for name, each in inspect.signature(command).parameters.items()
+            each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            for name, each in inspect.signature(command, eval_str=True).parameters.items()
             if name != "reading"
         ]
 

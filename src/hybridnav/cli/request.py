@@ -108,7 +108,7 @@ class Request:
         if self.bag is not None:
             hn.ext.live.save_bag(self.bag, [outcome], grid=grid)
         if self.proof is not None:
-            result = outcome.results[0] if isinstance(outcome, hn.Tour) else outcome
+            result = outcome if isinstance(outcome, hn.PlanResult) else outcome.results[0]
             text = json.dumps(result.proof(), separators=(",", ":"), allow_nan=False)
             replace_file(self.proof, text.encode())
         if self.plot is not None:
@@ -191,7 +191,7 @@ class Request:
         """Explain why there is no path, or, if asked, where a path is tightest."""
         if (outcome.solved and not self.why) or "outside" in outcome.status:
             return {}
-        results = outcome.results if isinstance(outcome, hn.Tour) else (outcome,)
+        results = (outcome,) if isinstance(outcome, hn.PlanResult) else outcome.results
         with stage("explaining", seconds, "why"):
             found = [
                 planner.explain(one.start, one.goal, blocked=closed)
@@ -235,7 +235,7 @@ class Request:
         seconds: dict[str, float],
     ) -> None:
         figures = outcome.to_dict() | {"map": str(self.map_file)}
-        if isinstance(outcome, hn.Tour):
+        if not isinstance(outcome, hn.PlanResult):  # `hn.Tour` would load the words
             figures["words"] = outcome.words(self.language)
         islands, closed = islands_figures(grid), self.closing.to_dict()
         if self.is_tour:

@@ -32,6 +32,8 @@ _PATIENCE_S = 2.0
 """Seconds of compiling after which a line informs the user."""
 SEARCHES = ("shortest", "octile", "grid-astar", "paper")
 """Methods whose search can be compiled without a pyramid."""
+SEARCH = "search-"
+"""Beginning of the job of a search: a preset of the method's name is a job of its own."""
 _FIRST = "compiling kernels, each once, when a command first needs it; the next start is quick"
 _NOT_MINE = " (those of this package are for another version of numba)"
 
@@ -90,7 +92,7 @@ def compiling_beside(preset: Preset) -> Iterator[Callable[[], None]]:
     if job not in SEARCHES or cores() == 1 or not _is_cold(job):
         yield lambda: None
         return
-    process = start(job)
+    process = start(SEARCH + job)
     try:
         yield lambda: _wait_for(process)
     finally:
@@ -112,7 +114,7 @@ def _is_cold(job: str) -> bool:
 
     if _is_kept(decimation.KERNEL):
         return False
-    home = {"mesh": "search.mesh.search", "jumps": "search.octile.jumps"}.get(
+    home = {"shortest": "search.mesh.search", "octile": "search.octile.jumps"}.get(
         job, "search.grid_search"
     )
     return not _is_kept(import_module(f"hybridnav.{home}").KERNEL)
@@ -133,7 +135,7 @@ def start(*jobs: str) -> subprocess.Popen[bytes] | None:
 
 # What is compiled.
 
-_PLANS = ("shortest", "grid-astar", "octile", "paper", "robot")
+PRESETS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
 _ENDPOINTS = ((2, 2), (60, 60))
 _CHANGED = (1.0, 1.0, 2.0, 2.0)
@@ -177,13 +179,13 @@ def compile_search(method: str) -> None:
 
 
 def compile_plan(preset: str) -> None:
-    """Compile all kernels of a plan, by one on a small map; without a preset those of the pyramid
-    alone."""
+    """Compile all kernels of a plan, by one on a small map; without one of `PRESETS` those of the
+    pyramid alone."""
     import numpy as np  # noqa: PLC0415
 
     grid = small_grid()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    if preset in _PLANS:
+    if preset in PRESETS:
         endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
         planner = hn.HybridPlanner(topology, preset=preset)
         planner.plan(*endpoints).to_dict()
@@ -206,7 +208,7 @@ def compile_all() -> None:
     from rich.progress import Progress  # noqa: PLC0415
 
     # What all plans share first: processes that compile the same do it twice.
-    waves = (("mesh", "pyramid", "jumps", "none"), _PLANS)
+    waves = ([SEARCH + "shortest", "pyramid", SEARCH + "octile", SEARCH + "grid-astar"], PRESETS)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("compiling kernels", total=sum(map(len, waves)))
         for wave in waves:
@@ -222,14 +224,22 @@ def compile_all() -> None:
                 time.sleep(0.1)
 
 
+def compile_job(job: str) -> None:
+    """Compile what a search, a preset or the pyramid needs."""
+    if job.startswith(SEARCH):
+        compile_search(job.removeprefix(SEARCH))
+    else:
+        compile_plan(job)
+
+
 def main(jobs: list[str]) -> None:
-    """Compile jobs, kinds of search or presets, or everything."""
+    """Compile jobs, or everything."""
     if not jobs:
         compile_all()
         return
     threading.Thread(target=_end_with_parent, daemon=True).start()
     for job in jobs:
-        compile_search(job) if job in SEARCHES else compile_plan(job)
+        compile_job(job)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.costs.factors import joined_cells
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner import Path
-from hybridnav.refine import CostLine
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.planner import PlannerSettings, Preset
+    from hybridnav.refine import CostLine
     from hybridnav.search.found import Query
 
 
@@ -225,4 +225,6 @@ class CostFinish:
 
     @cached_property
     def _line(self) -> CostLine:
+        from hybridnav.refine import CostLine  # noqa: PLC0415 - with costs alone
+
         return CostLine(self._grid, self.layer, allow_unexplored=self._allow_unexplored)

@@ -48,7 +48,7 @@ _Int = Annotated[int, BeforeValidator(no_boolean)]
 class Section(BaseModel):
     """Keys that are checked, and do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, allow_inf_nan=True)
 
 
 class PyramidSettings(Section):

@@ -54,7 +54,7 @@ Dtype = Literal["bool", "int8", "uint8", "int16", "uint16", "int32", "uint32", "
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, strict=True)
 
 
 _Count = Annotated[int, Field(ge=0, lt=1 << 62)]

@@ -28,7 +28,7 @@ _T = TypeVar("_T", bound=BaseModel)
 
 
 class _Values(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
 
 class _GridValues(_Values):

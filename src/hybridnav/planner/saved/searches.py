@@ -45,7 +45,7 @@ _SIDES = 3
 
 
 class _Values(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="ignore", frozen=True)
 
 
 class _MeshValues(_Values):

@@ -147,7 +147,7 @@ class OmplSettings(BaseModel):
     'r2'
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     planner: str = "RRTConnect"
     """OMPL's name of the planner, one of `PARAMETERS`."""
