@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -35,6 +35,17 @@ if sys.path[:1] == [""]:
     del sys.path[0]
 import runpy
 runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)"""
+
+
+def behind(work: Callable[[], object]) -> None:
+    """Do work in a thread that nothing waits for: a process may end before it, and if memory does
+    not suffice, it stays undone."""
+
+    def alone() -> None:
+        with suppress(MemoryError):
+            work()
+
+    threading.Thread(target=alone, name="hybridnav-behind", daemon=True).start()
 
 
 def start_module(module: str, *arguments: str, **pipes: Any) -> subprocess.Popen[bytes]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+import threading
 import warnings
 import zlib
 from dataclasses import dataclass
@@ -15,7 +16,6 @@ from PIL import Image, UnidentifiedImageError
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import open_file
 from hybridnav.errors import MapError, MapNotFoundError
-from hybridnav.maps import MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,6 +33,8 @@ _MOST_PIXELS_PER_BYTE = {"PPM": 8, "PNG": 8 * 1032}
 memory is taken for them."""
 _MOST_COMMENTS = 10_000
 """Most comments of an ASCII PNM: Pillow copies up to a megabyte for each, in hours for many."""
+_OPENING = threading.Lock()
+"""Held while Pillow's limit is lifted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +111,13 @@ class _UnsupportedPixelsError(Exception):
 
 def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
     try:
-        image = Image.open(stream, formats=_FORMATS)
-    except Image.DecompressionBombError:
-        raise MapError(
-            f"{where}: too large, more than {MAX_CELLS:,} pixels, the most that a grid holds "
-            "whatever the limit: make the image smaller, or cut it"
-        ) from None
+        # The caller checks the size, and Pillow's own limit is below that of a grid.
+        with _OPENING:
+            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+            try:
+                image = Image.open(stream, formats=_FORMATS)
+            finally:
+                Image.MAX_IMAGE_PIXELS = limit
     except UnidentifiedImageError:
         problem = "not an image of a known format, or its header is damaged or says 0 pixels"
         raise MapError(f"{where}: {problem}") from None
