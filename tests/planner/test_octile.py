@@ -172,9 +172,9 @@ def test_costs_equal_those_of_the_whole_grid_on_real_maps(data: Path, name: str)
 
 def test_queries_of_a_large_map_do_not_wait_for_the_graph(monkeypatch: pytest.MonkeyPatch) -> None:
     """A* answers until the graph is built behind them, which begins once."""
-    work: list[Any] = []
+    started: list[Any] = []
     monkeypatch.setattr("hybridnav.planner.methods.octile.MANY_CELLS", 0)
-    monkeypatch.setattr("hybridnav.planner.methods.octile.behind", work.append)
+    monkeypatch.setattr(threading.Thread, "start", lambda self: started.append(self))
     grid = office_world().grid(robot_radius_m=0.25)
     octile, whole = both(topology_of(grid))
     pairs = [
@@ -185,6 +185,5 @@ def test_queries_of_a_large_map_do_not_wait_for_the_graph(monkeypatch: pytest.Mo
         assert (octile.prepared is None) == (number < 6)
         assert_same(octile.plan(start, goal), whole.plan(start, goal), grid.enterable())
         if number == 5:
-            assert len(work) == 1
-            work[0]()
-    assert len(work) == 1
+            started[0].run()
+    assert len(started) == 1

@@ -37,15 +37,25 @@ import runpy
 runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)"""
 
 
-def behind(work: Callable[[], object]) -> None:
-    """Do work in a thread that nothing waits for: a process may end before it, and if memory does
-    not suffice, it stays undone."""
+def behind(begun: threading.Lock, work: Callable[[], object]) -> None:
+    """Do work in a thread that nothing waits for, the first time that it is asked for.
+
+    A process may end before it; if memory does not suffice, it stays undone.
+
+    Parameters
+    ----------
+    begun
+        A lock that is held from now on; a copy, which has a lock of its own, begins anew.
+    work
+        The work.
+    """
 
     def alone() -> None:
         with suppress(MemoryError):
             work()
 
-    threading.Thread(target=alone, name="hybridnav-behind", daemon=True).start()
+    if begun.acquire(blocking=False):
+        threading.Thread(target=alone, name="hybridnav-behind", daemon=True).start()
 
 
 def start_module(module: str, *arguments: str, **pipes: Any) -> subprocess.Popen[bytes]:

@@ -120,11 +120,8 @@ def test_a_tiff_whose_strips_do_not_cover_it_is_truncated(load):
 def test_the_limit_of_a_grid_holds_for_images_and_not_that_of_pillow(load, monkeypatch):
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 5)
     assert load(b"P5\n4 4\n255\n" + bytes(16)).shape == (4, 4)
+    assert "too large" in load(b"P5\n20000 15000\n255\n" + bytes(100))
     assert Image.MAX_IMAGE_PIXELS == 5
-    assert "truncated, 20000 x 15000" in load(b"P5\n20000 15000\n255\n" + bytes(100))
-    whole = io.BytesIO()
-    Image.new("1", (20000, 15000)).save(whole, "PNG")
-    assert "20000 x 15000 cells, a grid holds at most" in load(whole.getvalue(), "i.png")
 
 
 SAMPLES = [

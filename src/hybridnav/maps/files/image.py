@@ -16,6 +16,7 @@ from PIL import Image, UnidentifiedImageError
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import open_file
 from hybridnav.errors import MapError, MapNotFoundError
+from hybridnav.maps import MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +35,7 @@ memory is taken for them."""
 _MOST_COMMENTS = 10_000
 """Most comments of an ASCII PNM: Pillow copies up to a megabyte for each, in hours for many."""
 _OPENING = threading.Lock()
-"""Held while Pillow's limit is lifted."""
+"""Held while Pillow's limit is that of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +112,18 @@ class _UnsupportedPixelsError(Exception):
 
 def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
     try:
-        # The caller checks the size, and Pillow's own limit is below that of a grid.
+        # Pillow refuses twice its limit, which is less than a grid holds.
         with _OPENING:
-            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, MAX_CELLS // 2
             try:
                 image = Image.open(stream, formats=_FORMATS)
             finally:
                 Image.MAX_IMAGE_PIXELS = limit
+    except Image.DecompressionBombError:
+        raise MapError(
+            f"{where}: too large, more than {MAX_CELLS:,} pixels, the most that a grid holds "
+            "whatever the limit: make the image smaller, or cut it"
+        ) from None
     except UnidentifiedImageError:
         problem = "not an image of a known format, or its header is damaged or says 0 pixels"
         raise MapError(f"{where}: {problem}") from None

@@ -56,7 +56,7 @@ class OverJumps(Method):
         self._refiner, _ = self._whole_map.refiners
         self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
         self._building = threading.RLock()  # a progress callback may plan
-        self._is_begun = False
+        self._begun = threading.Lock()
         self._frame = known.grid.frame.for_kernels
 
     @property
@@ -106,9 +106,7 @@ class OverJumps(Method):
         seconds = {}
         if self._search is None:
             if self._grid.classes.size >= MANY_CELLS:
-                if not self._is_begun:
-                    self._is_begun = True
-                    behind(self.prepare)
+                behind(self._begun, self.prepare)
                 return self._whole_map.find(query)
             self.prepare()
             seconds["graph"] = time.perf_counter() - began

@@ -219,7 +219,7 @@ class MeshSearch:
         self._hub_works: Pool[Any] = Pool(partial(_HubWork, mesh))
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
-        self._lock, self._is_begun = threading.Lock(), False
+        self._lock, self._begun = threading.Lock(), threading.Lock()
         self.expanded = 0
         """Number of intervals that queries have expanded so far."""
 
@@ -250,14 +250,6 @@ class MeshSearch:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
             progress(2, 2)
-
-    def _prepare_in_time(self) -> None:
-        """Build the graph of corners, where that takes seconds behind the queries."""
-        if len(self.mesh.corners) < MANY_CORNERS:
-            self.prepare()
-        elif not self._is_begun:
-            self._is_begun = True
-            behind(self.prepare)
 
     def adopt(
         self, edges: tuple[LongArray, IntArray] | None, graph: CornerGraph | CornerHierarchy | None
@@ -338,7 +330,10 @@ class MeshSearch:
         """
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
-            self._prepare_in_time()
+            if len(self.mesh.corners) < MANY_CORNERS:
+                self.prepare()
+            else:
+                behind(self._begun, self.prepare)
         upper = math.inf
         if known is not None:
             first, last = (round_into(*end) for end in zip(cells, positions, strict=True))
