@@ -27,6 +27,7 @@ import sys
 import tempfile
 import time
 from argparse import SUPPRESS
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,7 +134,7 @@ def measure(yaml: Path, seed: int, presets: list[str]) -> dict[str, Any]:
     topology, told["places"] = step(lambda: hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
     for preset in presets:
         planner = hn.HybridPlanner(topology, preset=preset)
-        _, told[f"{preset}, first"] = step(lambda: solved_ms(planner, ends[0]))  # noqa: B023
+        _, told[f"{preset}, first"] = step(partial(solved_ms, planner, ends[0]))
         early = [solved_ms(planner, ends[k]) for k in range(1, 1 + N_EARLY)]
         _, told[f"{preset}, rest"] = step(planner.prepare, time.process_time)
         ms = np.min([[solved_ms(planner, pair) for pair in ends] for _ in range(3)], axis=0)

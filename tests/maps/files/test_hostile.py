@@ -388,7 +388,7 @@ def test_the_message_says_what_is_damaged(tmp_path, content, words):
         read_raster(path, what="image", check_size=_any_size)
 
 
-LIMIT = "more than the limit of 20,000,000; reading them takes about 1.2 GB of memory, planning "
+LIMIT = "more than the limit of 20,000,000; reading them takes about 0.4 GB of memory, planning "
 
 
 @pytest.fixture

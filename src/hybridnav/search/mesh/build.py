@@ -233,7 +233,7 @@ def merge_triangles(
 # --- the graph of its corners ---------------------------------------------------------------------
 
 MANY_CORNERS = 100_000
-"""Least number of corners for which queries do not wait: a thread builds their graph, in seconds."""
+"""Least number of corners for which a thread builds their graph: queries do not wait for it."""
 _LANDMARKS, _MORE_LANDMARKS = 8, 32
 """Landmarks of a map, and those of a map with many corners. On 49 offices side by side, queries
 expand 40 % fewer corners with 32 of them than with 16, in 20 % less time."""
