@@ -8,11 +8,12 @@ the kernels loaded by a small map. It prints, for each step,
                 over those of the row before
     GB          peak of the resident set (Linux only)
 
+    read        from the file to the classes of its cells
     places      the pyramid and its places
     first       the first `planner.plan`, with what it waits for
-    early       median of the next ones, ms, while nothing else is built
-    rest        what is built behind them, or by `planner.prepare`
-    ms          median and 95 % quantile of later answers, each the least of three
+    rest        what is built behind the first ones, or by `planner.prepare`
+    ms          median of the next plans, before the rest is built; then median and 95 % quantile of
+                later ones, each the least of three
 
 Pairs are drawn from the largest part of free space, all over it.
 """
@@ -43,7 +44,6 @@ from benchmarks.common import (
     option,
     prepared,
     print_head,
-    print_load,
     print_row,
     read,
 )
@@ -143,6 +143,17 @@ def measure(yaml: Path, seed: int, presets: list[str]) -> dict[str, Any]:
     return told
 
 
+def measured(given: Namespace, side: int) -> dict[str, Any]:
+    """Measure a map of a size in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        yaml = write_map(given.data, side, Path(folder))
+        words = "--presets", given.presets, "--most-gb", str(given.most_gb)
+        command = [sys.executable, "-m", "benchmarks", "scale", "--one", str(yaml), *words]
+        run = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    told: dict[str, Any] = json.loads(run.stdout)
+    return told
+
+
 OPTIONS = [
     NEEDED_DATA,
     SEED,
@@ -162,41 +173,29 @@ def main(given: Namespace) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
         sys.stdout.write(json.dumps(measure(given.one, given.seed, presets)))
         return
-    steps = ["read", "places"] + [
-        f"{name}, {part}" for name in presets for part in ("first", "rest")
+    steps = [
+        "read",
+        "places",
+        *(f"{name}, {part}" for name in presets for part in ("first", "rest")),
     ]
-    print_load()
-    print_head(
-        "cells",
-        *(f"{name} s, GB" for name in steps),
-        *(f"{name} early, ms" for name in presets),
-        "load",
-    )
+    print_head("cells", *steps)
     before: dict[str, float] = {}
+    answers = []
     for side in SIDES:
         if not given.least <= side * side / 2**20 <= given.most:
             continue
-        with tempfile.TemporaryDirectory() as folder:
-            yaml = write_map(given.data, side, Path(folder))
-            words = [
-                "--one",
-                str(yaml),
-                "--presets",
-                given.presets,
-                "--most-gb",
-                str(given.most_gb),
-            ]
-            command = [sys.executable, "-m", "benchmarks", "scale", *words]
-            run = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-        told = json.loads(run.stdout)
-        row = []
+        told = measured(given, side)
+        row = [f"{told['cells']:,}"]
         for name in steps:
             seconds, peak = told[name]
             of_cell = seconds / told["cells"]
             ratio = f" ({of_cell / before[name]:.2f})" if name in before else ""
-            row.append(f"{seconds:.2f}{ratio}, {peak:.1f}")
+            row.append(f"{seconds:.2f} s{ratio}, {peak:.1f} GB")
             before[name] = of_cell
-        for name in presets:
-            early, middle, high = told[f"{name}, ms"]
-            row.append(f"{early:.1f}, {middle:.2f} / {high:.2f}")
-        print_row(f"{told['cells']:,}", *row, f"{told['load']:.1f}")
+        print_row(*row)
+        answers.append([row[0], *(told[f"{name}, ms"] for name in presets), f"{told['load']:.1f}"])
+    print()
+    print_head("cells", *(f"{name}, ms" for name in presets), "load")
+    for cells, *answered, load in answers:
+        words = (f"{one:.1f}, then {middle:.2f} / {high:.2f}" for one, middle, high in answered)
+        print_row(cells, *words, load)
