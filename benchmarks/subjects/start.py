@@ -18,24 +18,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import OFFICE, ROOT, option, prepared, read
 from benchmarks.subjects.cold import PLAINLY
+from benchmarks.subjects.scale import tile_of
+from benchmarks.worlds import World
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from hybridnav._base.typing import BoolArray
     from hybridnav.harness.tables import Row
 
 FIGURE = ROOT / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("--start", "1.0,13.2", "--goal", "40.6,19.4")
-
-DOOR_CELLS = 9
-"""Width of the doors between tiles."""
 
 _FIRST = """
 import json, sys, time
@@ -66,27 +63,6 @@ def seconds(command: list[str], runs: int) -> float:
 def hybridnav(*arguments: object) -> list[str]:
     """Return the command line of the program."""
     return [sys.executable, "-m", "hybridnav", *map(str, arguments)]
-
-
-def tiled_building(free: BoolArray, cells: float) -> BoolArray:
-    """The largest component of a building, as often as it takes to have so many cells. Tiles are
-    mirror images of their neighbours, so that a door in each side leads on into the next."""
-    labels, _ = ndimage.label(free)
-    sizes = np.bincount(labels.ravel())[1:]
-    inside = labels == sizes.argmax() + 1
-    rows, cols = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    inside = inside[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-    for axis in (0, 1):
-        for line in (0, -1):
-            # In a side there is a free cell of the building: its door.
-            at = int(np.take(inside, line, axis=axis).argmax())
-            door = np.s_[max(at - DOOR_CELLS // 2, 0) : at + DOOR_CELLS // 2 + 1]
-            edge = inside[line] if axis == 0 else inside[:, line]
-            edge[door] = True
-    n = max(math.ceil(math.sqrt(cells / inside.size)), 2)
-    row_of = [inside if k % 2 == 0 else inside[:, ::-1] for k in range(n)]
-    strip = np.concatenate(row_of, axis=1)
-    return np.concatenate([strip if k % 2 == 0 else strip[::-1] for k in range(n)])
 
 
 def bytes_a_cell(planner: hn.HybridPlanner, path: Path, *, compress: bool) -> float:
@@ -139,10 +115,10 @@ def rows_of(cells: float, runs: int, folder: Path) -> list[Row]:
     add("model of the office, memory-mapped", f"{mapped:.1f} bytes a cell", "60")
     add("model of the office, compressed", f"{packed:.1f} bytes a cell", "20")
 
-    free = tiled_building(office.topology.grid.classes == hn.CellClass.FREE, cells)
-    grid = hn.OccupancyGrid((~free).astype(np.float32), hn.Frame(0.05), robot_radius_m=0.0)
+    pixels = tile_of(office.topology.grid, math.isqrt(int(cells)))
+    grid = World(pixels, hn.Frame(0.05), "offices").grid()
     planner = prepared(grid)
-    large, size = folder / "large.hnm", f"{free.size / 1e6:.1f} M cells"
+    large, size = folder / "large.hnm", f"{pixels.size / 1e6:.1f} M cells"
     mapped = bytes_a_cell(planner, large, compress=False)
     load_s, answer_s = first_answer(large, far_apart(planner), folder, runs)
     add(f"load a model of {size}", f"{load_s:.3f} s", "0.3 s")

@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 import hybridnav as hn
+from benchmarks.common import largest_part
 from benchmarks.subjects import queries
 from benchmarks.subjects._queries_measure import presets_of
 from benchmarks.subjects._queries_tables import page
-from benchmarks.subjects.start import tiled_building
+from benchmarks.subjects.scale import tile_of
+from benchmarks.worlds import World, figure1_world
 from hybridnav.harness.tables import Row
+from hybridnav.search.mesh import MeshSearch
+from tests.oracle.grid import distances, move_graph
 
 MAP = "figure1/figure1.yaml"
 FILES = {MAP: Path(__file__).parents[2] / "maps" / MAP}
@@ -93,9 +96,33 @@ def test_a_broken_promise_is_counted_and_named(
     assert sum("paper: " in line and "lower bound above" in line for line in lines) == 12
 
 
-def test_a_tiled_building_is_connected() -> None:
-    free = np.zeros((9, 14), np.bool_)
-    free[2:7, 3:9] = free[4, 9:13] = free[0, 0] = True
-    whole = tiled_building(free, 1000)
-    assert whole.size >= 1000
-    assert ndimage.label(whole)[1] == 1
+@pytest.mark.parametrize("kind", ["small", "large"])
+def test_plans_on_tiles_are_as_long_as_scipy_finds(
+    monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """Tiles of a building and its mirror images, joined by streets; as a large map is planned on
+    too, whose graphs are built behind the queries."""
+    if kind == "large":
+        monkeypatch.setattr("hybridnav.planner.methods.octile.MANY_CELLS", 0)
+        monkeypatch.setattr("hybridnav.search.mesh.search.MANY_CORNERS", 0)
+        monkeypatch.setattr("hybridnav.search.mesh.search._WORTH", 0)
+    tile = tile_of(figure1_world().grid(robot_radius_m=0.1), 140)
+    grid = World(np.tile(tile, (2, 2)), hn.Frame(0.1), "tiles").grid(robot_radius_m=0.1)
+    free = grid.enterable()
+    inside = largest_part(free)
+    assert len(inside) > 0.8 * free.sum()
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    octile, shortest = (hn.HybridPlanner(topology, preset=name) for name in ("octile", "shortest"))
+    chosen = inside[np.random.default_rng(2).integers(len(inside), size=(4, 11))]
+    for source, *goals in chosen:
+        expected = distances(move_graph(free), grid.shape, tuple(source.tolist()))
+        for goal in goals:
+            ends = grid.frame.points_of(np.array([source, goal]))
+            found = octile.plan(*ends)
+            assert found.cost == pytest.approx(expected[tuple(goal)] * grid.resolution_m)
+            taut = shortest.plan(*ends)
+            assert taut.gap == 0
+            assert taut.cost <= found.cost * (1 + 1e-12)
+    shortest.prepare()
+    assert isinstance(shortest.prepared, MeshSearch)
+    assert shortest.prepared.graph is not None

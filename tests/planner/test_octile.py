@@ -168,3 +168,26 @@ def test_costs_equal_those_of_the_whole_grid_on_a_real_map(data: Path, name: str
 @pytest.mark.parametrize("name", MAPS)
 def test_costs_equal_those_of_the_whole_grid_on_real_maps(data: Path, name: str) -> None:
     assert_equal_on(data / name, 1000)
+
+
+def test_queries_of_a_large_map_do_not_wait_for_the_graph(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A* answers until the graph is built behind them, which begins once."""
+    started: list[threading.Thread] = []
+
+    def keep(thread: threading.Thread) -> None:
+        started.append(thread)
+
+    grid = office_world().grid(robot_radius_m=0.25)
+    octile, whole = both(topology_of(grid))
+    monkeypatch.setattr("hybridnav.planner.methods.octile.MANY_CELLS", 0)
+    monkeypatch.setattr(threading.Thread, "start", keep)
+    pairs = [
+        grid.frame.points_of(np.array([pair.start, pair.goal]))
+        for pair in sample_pairs(grid, 12, seed=4)
+    ]
+    for number, (start, goal) in enumerate(pairs[:12]):
+        assert (octile.prepared is None) == (number < 6)
+        assert_same(octile.plan(start, goal), whole.plan(start, goal), grid.enterable())
+        if number == 5:
+            started[0].run()
+    assert len(started) == 1

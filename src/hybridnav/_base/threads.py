@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -35,6 +35,27 @@ if sys.path[:1] == [""]:
     del sys.path[0]
 import runpy
 runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)"""
+
+
+def behind(begun: threading.Lock, work: Callable[[], object]) -> None:
+    """Do work in a thread that nothing waits for, the first time that it is asked for.
+
+    A process may end before it; if memory does not suffice, it stays undone.
+
+    Parameters
+    ----------
+    begun
+        A lock that is held from now on; a copy, which has a lock of its own, begins anew.
+    work
+        The work.
+    """
+
+    def alone() -> None:
+        with suppress(MemoryError):
+            work()
+
+    if begun.acquire(blocking=False):
+        threading.Thread(target=alone, name="hybridnav-behind", daemon=True).start()
 
 
 def start_module(module: str, *arguments: str, **pipes: Any) -> subprocess.Popen[bytes]:

@@ -54,7 +54,8 @@ class HybridPlanner(Questions):
 
     Threads may share a planner; queries with OMPL run one after the other. The structures of a
     preset are built at the first query, or by `prepare`; with OMPL they are built at once, so that
-    no query's time includes them.
+    no query's time includes them. Of millions of cells, a thread builds what only speed needs, and
+    of paths of equal length, one may come before and another after that.
 
     Parameters
     ----------

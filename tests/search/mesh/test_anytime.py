@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -186,6 +187,33 @@ def test_a_search_prepares_itself_when_that_has_paid(monkeypatch: pytest.MonkeyP
         expanded[has_paid][1] += alone.expanded
     assert expanded[False][0] == expanded[False][1] > 0
     assert 0 < 2 * expanded[True][0] < expanded[True][1]
+
+
+def test_queries_of_a_large_map_do_not_wait_for_the_graph(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is built behind them, once; if memory does not suffice, they go on without it."""
+    begun, may_end = [], threading.Event()
+
+    def prepare(search: MeshSearch) -> None:
+        begun.append(search)
+        may_end.wait(60)
+        raise MemoryError
+
+    monkeypatch.setattr("hybridnav.search.mesh.search._WORTH", 0)
+    monkeypatch.setattr("hybridnav.search.mesh.search.MANY_CORNERS", 0)
+    monkeypatch.setattr(MeshSearch, "prepare", prepare)
+    free = scattered()
+    search, plain = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(free))
+    for seed in range(30):
+        ends = some_cells(free, seed, 2)
+        alone = between(plain, *ends, budget_s=100.0)
+        assert between(search, *ends).length_cells == alone.length_cells
+    assert search.expanded > len(search.mesh.corners)
+    behind = [each for each in threading.enumerate() if each.name == "hybridnav-behind"]
+    may_end.set()
+    for each in behind:
+        each.join()
+    assert begun == [search]
+    assert search.graph is None
 
 
 def test_a_search_with_a_budget_does_not_prepare_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,7 +52,7 @@ def load_map(
         U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default those of the file.
     max_cells
         The most cells of the map, checked in the header before memory is taken: a small file may
-        hold a huge map. A cell takes about 50 bytes while the map is read, and up to 300 for
+        hold a huge map. A cell takes about 16 bytes while the map is read, and up to 300 for
         planning.
 
     Returns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+import threading
 import warnings
 import zlib
 from dataclasses import dataclass
@@ -33,6 +34,8 @@ _MOST_PIXELS_PER_BYTE = {"PPM": 8, "PNG": 8 * 1032}
 memory is taken for them."""
 _MOST_COMMENTS = 10_000
 """Most comments of an ASCII PNM: Pillow copies up to a megabyte for each, in hours for many."""
+_OPENING = threading.Lock()
+"""Held while Pillow's limit is that of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +112,13 @@ class _UnsupportedPixelsError(Exception):
 
 def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
     try:
-        image = Image.open(stream, formats=_FORMATS)
+        # Pillow refuses twice its limit, which is less than a grid holds.
+        with _OPENING:
+            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, MAX_CELLS // 2
+            try:
+                image = Image.open(stream, formats=_FORMATS)
+            finally:
+                Image.MAX_IMAGE_PIXELS = limit
     except Image.DecompressionBombError:
         raise MapError(
             f"{where}: too large, more than {MAX_CELLS:,} pixels, the most that a grid holds "

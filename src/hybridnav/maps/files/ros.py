@@ -293,7 +293,9 @@ def _probability(raster: Raster, description: _Description) -> NDArray[np.float3
         table = level / raster.white
     else:
         table = (raster.white - level) / raster.white
-    probability = table.astype(np.float32)[raster.level[::-1]]
+    probability = np.empty(raster.level.shape, np.float32)
+    for row, of_row in zip(probability, raster.level[::-1], strict=True):
+        row[:] = table[of_row]  # for all at once, numpy makes indices of 8 bytes a cell
     if raster.opaque is not None and description.mode != "raw":  # Nav2: raw ignores opacity
         probability[~raster.opaque[::-1]] = math.nan
     return probability

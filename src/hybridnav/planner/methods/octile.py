@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
+from hybridnav._base.threads import behind
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
@@ -24,13 +25,17 @@ if TYPE_CHECKING:
 
 CONTRACTED_FROM = 2000
 """Least number of corner cells for contraction: in smaller graphs a direct search is as fast."""
+MANY_CELLS = 1 << 22
+"""Least number of cells of a map for which queries do not wait: A* answers them while a thread
+builds the graph, in seconds."""
 
 
 @copies_alike
 class OverJumps(Method):
     """Shortest paths of cells; the graph is built when the first query needs it.
 
-    It is contracted at once, so that a query always gets the same one of several shortest paths.
+    It is contracted at once, so that a query gets the same one of several shortest paths: always on
+    a map of fewer than `MANY_CELLS`, on a larger one as soon as the graph is there.
 
     If corners may be cut, the graph lacks some moves: then A* searches the whole map.
 
@@ -51,6 +56,7 @@ class OverJumps(Method):
         self._refiner, _ = self._whole_map.refiners
         self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
         self._building = threading.RLock()  # a progress callback may plan
+        self._begun = threading.Lock()
         self._frame = known.grid.frame.for_kernels
 
     @property
@@ -68,6 +74,7 @@ class OverJumps(Method):
                     if graph.n_corners >= CONTRACTED_FROM:
                         graph = contract_graph(graph)
                     self._search = JumpSearch(graph)
+                    vars(self._refiner).pop("search", None)  # of the first answers, 5 bytes a cell
                     progress(2, 2)
         return self._search
 
@@ -98,6 +105,9 @@ class OverJumps(Method):
         began = time.perf_counter()
         seconds = {}
         if self._search is None:
+            if self._grid.classes.size >= MANY_CELLS:
+                behind(self._begun, self.prepare)
+                return self._whole_map.find(query)
             self.prepare()
             seconds["graph"] = time.perf_counter() - began
         now = time.perf_counter()

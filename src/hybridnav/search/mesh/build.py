@@ -232,10 +232,11 @@ def merge_triangles(
 
 # --- the graph of its corners ---------------------------------------------------------------------
 
-_LANDMARKS, _MORE_LANDMARKS, _MANY_CORNERS = 8, 32, 200_000
-"""Landmarks of a map, those of a map with many corners, and the least number of such corners. On 49
-offices side by side, queries expand 40 % fewer corners with 32 of them than with 16, in 20 % less
-time."""
+MANY_CORNERS = 100_000
+"""Least number of corners for which a thread builds their graph: queries do not wait for it."""
+_LANDMARKS, _MORE_LANDMARKS = 8, 32
+"""Landmarks of a map, and those of a map with many corners. On 49 offices side by side, queries
+expand 40 % fewer corners with 32 of them than with 16, in 20 % less time."""
 _MOST_EDGES = 200
 """Mean number of edges a corner above which the graph is not worth its memory: real maps have 13 to
 35."""
@@ -315,7 +316,7 @@ def add_landmarks(
     """
     (first, heads), n = edges, len(mesh.corners)
     degrees = first[2::2] - first[:-2:2]
-    number = _LANDMARKS if n < _MANY_CORNERS else _MORE_LANDMARKS
+    number = _LANDMARKS if n < MANY_CORNERS else _MORE_LANDMARKS
     table = np.empty((n, number if len(heads) else 0))
     if len(heads):
         # In the part of the map that has the most edges.
@@ -334,9 +335,10 @@ def add_landmarks(
 _SETTLED = 1
 """Most corners that a witness search settles, so that it sees single arcs. With 10 there are up to
 2 % fewer shortcuts, in five times the time."""
-_MOST_LOOKED = 100
-"""Arcs per free cell that the contraction may examine before it is given up: some 0.7 microseconds
-a cell. Buildings need 20 to 100; raw scans full of speckle would need 1,000."""
+_MOST_LOOKED, _MORE_LOOKED = 100, 400
+"""Arcs per free cell that the contraction may examine before it is given up, and those on a map
+with many corners: some 0.7 microseconds a cell for 100. Buildings need 20 to 100; side by side they
+need more, some 85 on 16 million cells and 115 on 64; raw scans full of speckle would need 1,000."""
 _LOOKED_AN_EDGE = 110
 """Expected number of arcs to examine per edge of the graph. If that exceeds the limit, contraction
 does not begin: on five of the six real maps on which it would be given up."""
@@ -392,9 +394,10 @@ def contract_corners(
     hierarchical routing in road networks, 2008. A shortcut is added only if a path may bend at both
     its corners; otherwise there are five times as many, in 60 times the time.
     """
-    most = _MOST_LOOKED * np.count_nonzero(mesh.polygon_at >= 0)
-    if _LOOKED_AN_EDGE * len(edges[1]) > most:
+    n_free = np.count_nonzero(mesh.polygon_at >= 0)
+    if _LOOKED_AN_EDGE * len(edges[1]) > _MOST_LOOKED * n_free:
         return None
+    most = n_free * (_MOST_LOOKED if len(mesh.corners) < MANY_CORNERS else _MORE_LOOKED)
     first, arcs = arcs_of(arrays, *edges)
     follow = classes_that_follow()
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))

@@ -14,8 +14,14 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import no_progress
-from hybridnav._base.threads import Pool
-from hybridnav.search.mesh.build import CornerHierarchy, add_landmarks, contract_corners, find_edges
+from hybridnav._base.threads import Pool, behind
+from hybridnav.search.mesh.build import (
+    MANY_CORNERS,
+    CornerHierarchy,
+    add_landmarks,
+    contract_corners,
+    find_edges,
+)
 from hybridnav.search.mesh.hubs import HubLabels, label_corners
 from hybridnav.search.mesh.kernels import hubs, polyanya
 from hybridnav.search.mesh.kernels.queries import answer
@@ -175,7 +181,8 @@ class MeshSearch:
     The first queries search intervals of the mesh (Polyanya). Once these have taken about as long
     as the graph of corners takes to build, it is built, and contracted if that is quick. All later
     queries use it, up to ten times as fast, and in large buildings far more than that. The two may
-    find different paths of equal length.
+    find different paths of equal length. From 100,000 corners on, a thread builds it, and queries
+    do not wait for it.
 
     Parameters
     ----------
@@ -212,7 +219,7 @@ class MeshSearch:
         self._hub_works: Pool[Any] = Pool(partial(_HubWork, mesh))
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
-        self._lock = threading.Lock()
+        self._lock, self._begun = threading.Lock(), threading.Lock()
         self.expanded = 0
         """Number of intervals that queries have expanded so far."""
 
@@ -323,7 +330,10 @@ class MeshSearch:
         """
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
-            self.prepare()
+            if len(self.mesh.corners) < MANY_CORNERS:
+                self.prepare()
+            else:
+                behind(self._begun, self.prepare)
         upper = math.inf
         if known is not None:
             first, last = (round_into(*end) for end in zip(cells, positions, strict=True))
