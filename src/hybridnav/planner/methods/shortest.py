@@ -317,7 +317,7 @@ class OverMesh(Method):
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            known = search.mesh, self._free, closed.flat, self._scratch
+            known = search, self._free, closed.flat, self._scratch
             found = self._detours[closed] = DetourSearch(*known)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)

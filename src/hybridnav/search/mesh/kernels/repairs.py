@@ -1,0 +1,599 @@
+"""Kernels that repair a hierarchy of corners round closed cells, without a look at the rest of it.
+
+An arc is *stale* if the path that it stands for meets a closed cell. Corners whose arcs change get
+a *patch*, a list of arcs of their own: those of the hierarchy at their positions, then new ones.
+The hierarchy itself stays, and so do queries of others that use it. What a contraction in the same
+order would find for the patched corners is found again, and the corners of the closed cells are
+contracted before all others.
+
+J. Dibbelt, B. Strasser, D. Wagner: Customizable contraction hierarchies, 2016 (lower triangles).
+"""
+
+import numpy as np
+from numba.extending import overload
+
+from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.exact import turn_of
+from hybridnav._base.moves import FAR
+from hybridnav.search.contraction import HEAD_SHIFT, grow_rows, pack
+from hybridnav.search.mesh.kernels.closures import crosses, is_beside
+from hybridnav.search.mesh.kernels.corner_search import (
+    APART,
+    MET,
+    polygon_in,
+    polygons_of_endpoints,
+    polygons_with,
+)
+from hybridnav.search.mesh.kernels.polyanya import DONE, PAUSED, WORK_FULL
+from hybridnav.search.mesh.kernels.views import (
+    class_of,
+    cost_of,
+    distance,
+    has_target,
+    see_from_point,
+    touches,
+)
+
+CHANGED, DEAD = 4, 8
+"""Bits of a kind: the corner touches a closed cell, so that no path bends there; all cells at it
+are closed or blocked, or two that meet there alone, so that no path passes it."""
+_KIND = 3
+_GROUP = 64
+"""Corners, neighbours on the map, that have a box in common."""
+_ROOM = 4
+"""Room for new arcs in a patch."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def footing_of(mesh, hierarchy):
+    """Find what repairs need of a hierarchy.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    hierarchy
+        See `query_hierarchy`.
+
+    Returns
+    -------
+    tuple
+        int32 (n,), numbers of corners in an order in which all arcs lead upwards; int32 (n + 1,)
+        and (u,), the arcs that end at each corner; int32 (u,), where each begins; float32 (n, 4)
+        and (groups, 4), least x and y, greatest x and y of the edges that are arcs from a corner,
+        and from the corners of a group.
+    """
+    cx, cy = mesh[0], mesh[1]
+    first, arcs, middles = hierarchy[0], hierarchy[1], hierarchy[2]
+    n = len(first) - 1
+    begin = np.zeros(n + 1, np.int32)
+    tails = np.empty(len(arcs), np.int32)
+    boxes = np.empty((n, 4), np.float32)
+    groups = np.empty(((n + _GROUP - 1) // _GROUP, 4), np.float32)
+    for box in (boxes, groups):
+        box[:, :2], box[:, 2:] = np.inf, -np.inf
+    for node in range(n):
+        for arc in range(first[node], first[node + 1]):
+            head = arcs[arc, 1] >> HEAD_SHIFT
+            tails[arc] = node
+            begin[head + 1] += 1
+            if middles[arc] < 0:
+                for box in (boxes[node], groups[node // _GROUP]):
+                    box[0] = min(box[0], cx[node], cx[head])
+                    box[1] = min(box[1], cy[node], cy[head])
+                    box[2] = max(box[2], cx[node], cx[head])
+                    box[3] = max(box[3], cy[node], cy[head])
+    below = begin[1:].copy()
+    for node in range(n):
+        begin[node + 1] += begin[node]
+    into, at = np.empty(len(arcs), np.int32), begin.copy()
+    for arc in range(len(arcs)):
+        head = arcs[arc, 1] >> HEAD_SHIFT
+        into[at[head]] = arc
+        at[head] += 1
+    rank, order, count = np.empty(n, np.int32), np.empty(n, np.int32), 0
+    for node in range(n):
+        if below[node] == 0:
+            order[count] = node
+            count += 1
+    for k in range(n):
+        node = order[k]
+        rank[node] = k
+        for arc in range(first[node], first[node + 1]):
+            head = arcs[arc, 1] >> HEAD_SHIFT
+            below[head] -= 1
+            if below[head] == 0:
+                order[count] = head
+                count += 1
+    return rank, begin, into, tails, boxes, groups
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def corners_round(mesh, closure, closed, left, place):
+    """Find the corners that closed cells have, and those at which paths bend no more.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    closure, closed
+        See `closure_of`; the flat cells.
+    left
+        bool (rows, cols), free cells that are not closed.
+    place
+        Component of polygons, and the polygon of each cell.
+
+    Returns
+    -------
+    tuple
+        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32 polygons
+        that contain a new corner, sorted, and which.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    box = closure[0]
+    rows, cols = left.shape
+    n, n_new = len(kinds), 0
+    found = np.empty((64, 3), np.int64)
+    for cell in closed:
+        row, col = cell // cols, cell % cols
+        for k in range(4):
+            down, side = row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1
+            if not (0 <= down < rows and 0 <= side < cols):
+                continue
+            if left[down, col] and left[row, side] and left[down, side]:
+                if n_new == len(found):
+                    found = grow_rows(found)
+                # Seen from the corner, the cell lies on the other side than the corner from it.
+                found[n_new, 0], found[n_new, 1] = col + (k & 1), row + (k >> 1)
+                found[n_new, 2] = 3 - k
+                n_new += 1
+    xs, ys = np.empty(n + n_new), np.empty(n + n_new)
+    every = np.empty(n + n_new, np.uint8)
+    xs[:n], ys[:n], every[:n] = cx, cy, kinds
+    for k in range(n_new):
+        xs[n + k], ys[n + k], every[n + k] = found[k, 0], found[k, 1], found[k, 2]
+    for corner in range(n):
+        x, y = cx[corner], cy[corner]
+        if y < box[0] or y > box[1] + 1 or x < box[2] or x > box[3] + 1 or kinds[corner] > _KIND:
+            continue
+        row, col = int(y), int(x)
+        a = row > 0 and col > 0 and left[row - 1, col - 1]
+        b = row > 0 and col < cols and left[row - 1, col]
+        c = row < rows and col > 0 and left[row, col - 1]
+        d = row < rows and col < cols and left[row, col]
+        n_free = int(a) + int(b) + int(c) + int(d)
+        if n_free < 3:
+            every[corner] |= CHANGED
+        if n_free == 0 or (n_free == 2 and a == d):
+            every[corner] |= DEAD
+    room, listed = np.empty(len(place[0]), np.int32), np.empty((64, 2), np.int64)
+    n_listed = 0
+    for k in range(n_new):
+        x, y = found[k, 0], found[k, 1]
+        inner = polygon_in(mesh, place[0], place[1], y, x)
+        for polygon in room[: polygons_with(mesh, inner, y, x, float(x), float(y), room)]:
+            if n_listed == len(listed):
+                listed = grow_rows(listed)
+            listed[n_listed, 0], listed[n_listed, 1] = polygon, k
+            n_listed += 1
+    order = np.argsort(listed[:n_listed, 0])
+    polygons, members = np.empty(n_listed, np.int32), np.empty(n_listed, np.int32)
+    for k in range(n_listed):
+        polygons[k], members[k] = listed[order[k], 0], listed[order[k], 1]
+    return xs, ys, every, polygons, members
+
+
+# Views round closed cells.
+
+
+@overload(has_target)
+def _has_new_corners(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
+    """Return what stands for `has_target` for new corners, which are marked, and one point."""
+
+    def mark(target, polygon, x, y, rays):
+        polygons, members, xs, ys, is_seen, tx, ty, goals = target
+        lx, ly, rx, ry = rays
+        k = np.searchsorted(polygons, polygon)
+        while k < len(polygons) and polygons[k] == polygon:
+            one = members[k]
+            if turn_of(x, y, rx, ry, xs[one], ys[one]) >= 0:
+                is_seen[one] |= turn_of(x, y, lx, ly, xs[one], ys[one]) <= 0
+            k += 1
+        for goal in goals:
+            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
+                return turn_of(x, y, lx, ly, tx, ty) <= 0
+        return False
+
+    return mark if len(target) == 8 else None
+
+
+@njit(cache=True, nogil=True)
+def _see_round(mesh, around, place, goal, room, found):
+    """Find the corners seen from a point, past closed cells; see `see_from_point`.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`, with the corners and kinds of `corners_round`.
+    around
+        Closure, free cells, polygons of new corners, and which; see `look_round`.
+    place
+        x and y of the point, and int32 polygons that contain it.
+    goal
+        x and y of another point, and int32 polygons that contain it.
+    room, found
+        See `see_from_point`.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    closure, free, polygons, members, n_old = around
+    x, y, starts = place
+    seen = room[2]
+    is_seen = np.zeros(len(cx) - n_old, np.bool_)
+    for polygon in starts:
+        k = np.searchsorted(polygons, polygon)
+        while k < len(polygons) and polygons[k] == polygon:
+            is_seen[members[k]] = True
+            k += 1
+    target = (polygons, members, cx[n_old:], cy[n_old:], is_seen, *goal)
+    n, is_goal_seen = see_from_point(mesh, x, y, starts, target, room, found)
+    if n < 0 or n + len(is_seen) > len(seen):
+        return -1, False
+    kept = found
+    for k in range(found, n):
+        corner = seen[k]
+        if not crosses(closure, free, x, y, cx[corner], cy[corner]):
+            seen[kept] = corner
+            kept += 1
+    for corner in range(n_old, len(cx)):
+        if (
+            is_seen[corner - n_old]
+            and touches(kinds[corner], cx[corner] - x, cy[corner] - y)
+            and not crosses(closure, free, x, y, cx[corner], cy[corner])
+        ):
+            seen[kept] = corner
+            kept += 1
+    return kept, is_goal_seen
+
+
+@njit(cache=True, nogil=True)
+def look_round(mesh, where, endpoints, rooms, bounds, around):
+    """Do the same as `look_from_endpoints` past closed cells.
+
+    Neither end is a corner of a closed cell. `around` holds the closure (see `closure_of`), the
+    free cells before, int32 polygons of new corners, and which corners these are; the number of
+    corners before.
+    """
+    sx, sy, tx, ty = endpoints
+    component, polygon_at, cells = where
+    starts, goals, room = rooms
+    how, n_starts, n_goals = polygons_of_endpoints(
+        mesh, component, polygon_at, cells, endpoints, starts, goals
+    )
+    if how == APART:
+        bounds[:] = np.inf
+        return DONE, 0, 0
+    nowhere = (0.0, 0.0, starts[:0])
+    n, _ = _see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
+    if n < 0:
+        return WORK_FULL, 0, 0
+    target = (tx, ty, goals[:n_goals] if how != MET else starts[:0])
+    n_all, is_seen = _see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
+    if n_all < 0:
+        return WORK_FULL, 0, 0
+    if (is_seen or how == MET) and not crosses(around[0], around[1], sx, sy, tx, ty):
+        bounds[:] = distance(sx, sy, tx, ty)
+        return DONE, 0, 0
+    return PAUSED, n, n_all
+
+
+# The patches. `patches` holds int32 (n,), the number of each corner's patch, 0 for none; int64 (p,
+# 4) begin, size, room and corner of each; int64 (m, 4) cost, head and classes, middle, and whether
+# an arc has changed. Number 0 of the second counts patches and used rows.
+
+
+@njit(cache=True, nogil=True)
+def _patch(hierarchy, patches, node):
+    """Give a corner a patch with its arcs, unless it has one; return the patches."""
+    at, lists, pool = patches
+    if at[node]:
+        return patches
+    first, arcs, middles = hierarchy[0], hierarchy[1], hierarchy[2]
+    low, high = (first[node], first[node + 1]) if node < len(first) - 1 else (0, 0)
+    size, begin = high - low, lists[0, 1]
+    if lists[0, 0] + 2 > len(lists):
+        lists = grow_rows(lists)
+    while begin + size + _ROOM > len(pool):
+        pool = grow_rows(pool)
+    lists[0, 0] += 1
+    lists[0, 1] += size + _ROOM
+    at[node] = lists[0, 0]
+    own = lists[lists[0, 0]]
+    own[0], own[1], own[2], own[3] = begin, size, size + _ROOM, node
+    for k in range(size):
+        pool[begin + k, 0], pool[begin + k, 1] = arcs[low + k, 0], arcs[low + k, 1]
+        pool[begin + k, 2], pool[begin + k, 3] = middles[low + k], 0
+    return at, lists, pool
+
+
+@njit(cache=True, nogil=True)
+def _write(row, cost, packed, middle):
+    """Write an arc that has changed."""
+    row[0], row[1], row[2], row[3] = cost, packed, middle, 1
+
+
+@njit(cache=True, nogil=True)
+def _offer(hierarchy, patches, tail, arc):
+    """Put an arc into a corner's list, unless one that costs no more has its head.
+
+    Return the patches, and whether the list has changed.
+    """
+    cost, packed, middle = arc
+    first, arcs = hierarchy[0], hierarchy[1]
+    head = packed >> HEAD_SHIFT
+    if not patches[0][tail]:
+        if tail < len(first) - 1:
+            for k in range(first[tail], first[tail + 1]):
+                if arcs[k, 1] >> HEAD_SHIFT == head and arcs[k, 0] <= cost:
+                    return patches, False
+        patches = _patch(hierarchy, patches, tail)
+    at, lists, pool = patches
+    own = lists[at[tail]]
+    for k in range(own[0], own[0] + own[1]):
+        if pool[k, 1] >> HEAD_SHIFT == head:
+            if pool[k, 0] <= cost:
+                return patches, False
+            _write(pool[k], cost, packed, middle)
+            return patches, True
+    if own[1] == own[2]:
+        begin, room = lists[0, 1], 2 * own[2]
+        while begin + room > len(pool):
+            pool = grow_rows(pool)
+        pool[begin : begin + own[1]] = pool[own[0] : own[0] + own[1]]
+        own[0], own[2] = begin, room
+        lists[0, 1] += room
+    _write(pool[own[0] + own[1]], cost, packed, middle)
+    own[1] += 1
+    return (at, lists, pool), True
+
+
+@njit(cache=True, nogil=True)
+def _spoil(hierarchy, patches, stack, n, tail, position):
+    """Mark an arc as stale, and stack it; return the patches, the stack and its size."""
+    patches = _patch(hierarchy, patches, tail)
+    at, lists, pool = patches
+    row = lists[at[tail], 0] + position
+    if pool[row, 3] == 0:
+        pool[row, 0], pool[row, 3] = FAR, 1
+        if n == len(stack):
+            stack = grow_rows(stack)
+        stack[n, 0], stack[n, 1] = tail, position
+        n += 1
+    return patches, stack, n
+
+
+@njit(cache=True, nogil=True)
+def _spoil_all(mesh, hierarchy, footing, around, patches):
+    """Mark all arcs as stale whose path meets a closed cell; return the patches."""
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    first, arcs, middles, follow = hierarchy
+    rank, begin, into, tails, boxes, groups = footing
+    closure, free = around[0], around[1]
+    low_y, high_y = closure[0][0], closure[0][1] + 1
+    low_x, high_x = closure[0][2], closure[0][3] + 1
+    stack, n = np.empty((256, 2), np.int64), 0
+    for group in range(len(groups)):
+        box = groups[group]
+        if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
+            continue
+        for node in range(group * _GROUP, min(group * _GROUP + _GROUP, len(boxes))):
+            box = boxes[node]
+            if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
+                continue
+            for arc in range(first[node], first[node + 1]):
+                head = arcs[arc, 1] >> HEAD_SHIFT
+                if middles[arc] >= 0 or not is_beside(
+                    closure[0], cx[node], cy[node], cx[head], cy[head]
+                ):
+                    continue
+                is_dead = (kinds[node] | kinds[head]) & DEAD
+                if is_dead or crosses(closure, free, cx[node], cy[node], cx[head], cy[head]):
+                    patches, stack, n = _spoil(
+                        hierarchy, patches, stack, n, node, arc - first[node]
+                    )
+
+    # A shortcut is stale if one of the two arcs that it stands for is.
+    while n > 0:
+        n -= 1
+        node, position = stack[n, 0], stack[n, 1]
+        stale = arcs[first[node] + position, 1]
+        may_follow = follow[kinds[node] & _KIND, stale >> 6 & 63]
+        one = stale >> HEAD_SHIFT
+        for arc in range(first[node], first[node + 1]):
+            other = arcs[arc, 1] >> HEAD_SHIFT
+            if may_follow >> (arcs[arc, 1] >> 6 & 63) & 1 == 0 or other == one:
+                continue
+            low, high = (one, other) if rank[one] < rank[other] else (other, one)
+            for k in range(first[low], first[low + 1]):
+                if arcs[k, 1] >> HEAD_SHIFT == high:
+                    if middles[k] >> 32 == node:
+                        patches, stack, n = _spoil(
+                            hierarchy, patches, stack, n, low, k - first[low]
+                        )
+                    break
+    return patches
+
+
+@njit(cache=True, nogil=True)
+def _mend(mesh, hierarchy, footing, around, edges, patches, node):
+    """Find the least costs of the stale arcs of a corner, by corners below; return the patches."""
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    first, arcs, middles, follow = hierarchy
+    _, begin, into, tails, _, _ = footing
+    closure, free = around[0], around[1]
+    at, lists, pool = patches
+    base = lists[at[node], 0]
+    for position in range(first[node + 1] - first[node]):
+        row = base + position
+        head = pool[row, 1] >> HEAD_SHIFT
+        if pool[row, 3] == 0 or (kinds[node] | kinds[head]) & DEAD:
+            continue
+        # A shortcut may stand for an edge as long as it.
+        if middles[first[node] + position] >= 0:
+            for k in range(edges[0][2 * node], edges[0][2 * node + 2]):
+                if edges[1][k] == head:
+                    cost = cost_of(cx[node], cy[node], cx[head], cy[head])
+                    if cost < pool[row, 0] and not crosses(
+                        closure, free, cx[node], cy[node], cx[head], cy[head]
+                    ):
+                        dx, dy = cx[head] - cx[node], cy[head] - cy[node]
+                        near = class_of(kinds[node], dx, dy)
+                        far = class_of(kinds[head], -dx, -dy)
+                        _write(pool[row], cost, pack(head, near, far), -1)
+        for k in range(begin[node], begin[node + 1]):
+            low = tails[into[k]]
+            here = into[k] - first[low]
+            other = here
+            for arc in range(first[low], first[low + 1]):
+                if arcs[arc, 1] >> HEAD_SHIFT == head:
+                    other = arc - first[low]
+            if other == here:
+                continue
+            if at[low]:
+                a, b = lists[at[low], 0] + here, lists[at[low], 0] + other
+                cost, one = pool[a, 0] + pool[b, 0], pool[a, 1]
+                two = pool[b, 1]
+            else:
+                a, b = first[low] + here, first[low] + other
+                cost, one = arcs[a, 0] + arcs[b, 0], arcs[a, 1]
+                two = arcs[b, 1]
+            if cost >= pool[row, 0]:
+                continue
+            if follow[kinds[low] & _KIND, one >> 6 & 63] >> (two >> 6 & 63) & 1:
+                past = np.int64(low) << 32 | here << 16 | other
+                _write(pool[row], cost, pack(head, one & 63, two & 63), past)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def repair(mesh, hierarchy, footing, around, edges, place):
+    """Find the patches of a hierarchy round closed cells.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`, with the corners and kinds of `corners_round`.
+    hierarchy
+        See `query_hierarchy`; the first four.
+    footing
+        Result of `footing_of`.
+    around
+        See `look_round`.
+    edges
+        Result of `edges_of`.
+    place
+        Component of polygons, and the polygon of each cell.
+
+    Returns
+    -------
+    tuple
+        int32 (n,), the number of each corner's patch, 0 for none; int64 (p, 4), where it begins and
+        its size; int64 (m, 4), the arcs.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    rank, follow = footing[0], hierarchy[3]
+    n_old, n_all = around[4], len(cx)
+    patches = (
+        np.zeros(n_all, np.int32),
+        np.zeros((256, 4), np.int64),
+        np.empty((8192, 4), np.int64),
+    )
+    patches = _spoil_all(mesh, hierarchy, footing, around, patches)
+
+    # Arcs between the new corners, and to those that they see.
+    room = (np.empty((256, 2), np.int32), np.empty((256, 4)), np.empty(256, np.int32))
+    polygons = np.empty(len(place[0]), np.int32)
+    for corner in range(n_old, n_all):
+        x, y, kind = cx[corner], cy[corner], kinds[corner]
+        patches = _patch(hierarchy, patches, corner)
+        inner = polygon_in(mesh, place[0], place[1], int(y), int(x))
+        starts = polygons[: polygons_with(mesh, inner, int(y), int(x), x, y, polygons)]
+        nowhere = (0.0, 0.0, starts[:0])
+        n = -1
+        while n < 0:
+            n, _ = _see_round(mesh, around, (x, y, starts), nowhere, room, 0)
+            if n < 0:
+                size = 2 * len(room[2])
+                room = (
+                    np.empty((size, 2), np.int32),
+                    np.empty((size, 4)),
+                    np.empty(size, np.int32),
+                )
+        for k in range(n):
+            other = np.int64(room[2][k])
+            dx, dy = cx[other] - x, cy[other] - y
+            if n_old <= other <= corner or not touches(kind, dx, dy) or kinds[other] & CHANGED:
+                continue
+            near, far = class_of(kind, dx, dy), class_of(kinds[other], -dx, -dy)
+            arc = cost_of(x, y, cx[other], cy[other]), pack(other, near, far), -1
+            patches, _ = _offer(hierarchy, patches, corner, arc)
+
+    # Upwards, corner by corner: mend its stale arcs, and offer what joins two of its arcs of which
+    # one has changed. New corners come first.
+    queue, waiting = np.empty((1024, 2), np.int64), 0
+    is_queued = np.zeros(n_all, np.bool_)
+    for k in range(1, patches[1][0, 0] + 1):
+        node = patches[1][k, 3]
+        if waiting == len(queue):
+            queue = grow_rows(queue)
+        push(queue, waiting, _rank_of(rank, node, n_all), node)
+        waiting += 1
+        is_queued[node] = True
+    while waiting > 0:
+        node = pop(queue, waiting)
+        waiting -= 1
+        if node < n_old:
+            _mend(mesh, hierarchy, footing, around, edges, patches, node)
+        number = patches[0][node]
+        size = patches[1][number, 1]
+        for one in range(size):
+            for two in range(size):
+                # The lists of corners above change, and may move; this one stays as it is.
+                pool, base = patches[2], patches[1][number, 0]
+                a, b = base + one, base + two
+                if pool[a, 3] == 0 or pool[a, 0] == FAR:
+                    break
+                if one == two or pool[b, 0] == FAR or (pool[b, 3] and two < one):
+                    continue
+                if follow[kinds[node] & _KIND, pool[a, 1] >> 6 & 63] >> (
+                    pool[b, 1] >> 6 & 63
+                ) & 1 == 0:
+                    continue
+                low, high, to_low, to_high = a, b, one, two
+                if _rank_of(rank, pool[a, 1] >> HEAD_SHIFT, n_all) > _rank_of(
+                    rank, pool[b, 1] >> HEAD_SHIFT, n_all
+                ):
+                    low, high, to_low, to_high = b, a, two, one
+                tail, head = pool[low, 1] >> HEAD_SHIFT, pool[high, 1] >> HEAD_SHIFT
+                arc = (
+                    pool[a, 0] + pool[b, 0],
+                    pack(head, pool[low, 1] & 63, pool[high, 1] & 63),
+                    np.int64(node) << 32 | to_low << 16 | to_high,
+                )
+                patches, is_new = _offer(hierarchy, patches, tail, arc)
+                if is_new and not is_queued[tail]:
+                    if waiting == len(queue):
+                        queue = grow_rows(queue)
+                    push(queue, waiting, _rank_of(rank, tail, n_all), tail)
+                    waiting += 1
+                    is_queued[tail] = True
+    at, lists, pool = patches
+    return at, lists[: lists[0, 0] + 1], pool[: lists[0, 1]]
+
+
+@njit(cache=True, nogil=True)
+def _rank_of(rank, node, n_all):
+    """Return the place of a corner in the order; new ones come first."""
+    return np.int64(rank[node]) if node < len(rank) else np.int64(node) - n_all
