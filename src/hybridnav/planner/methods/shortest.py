@@ -182,13 +182,17 @@ class OverMesh(Method):
         if search is None:
             bound = math.dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
-        began = time.perf_counter()
-        found = search.path(query.cells, positions, epsilon=self._epsilon, budget_s=self._budget_s)
-        closed, expanded = query.closed, found.expanded
+        began, closed = time.perf_counter(), query.closed
+        detours = None if closed is None else self._round(search, closed)
+        effort = {"epsilon": self._epsilon, "budget_s": self._budget_s}
+        if detours is not None and detours.is_ready:
+            found = detours.path(query.cells, positions, **effort)
+            return found, found.expanded
+        found = search.path(query.cells, positions, **effort)
+        expanded = found.expanded
         is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
-        if closed is None or is_cut_off:
+        if detours is None or is_cut_off:
             return found, expanded
-        detours = self._round(search, closed)
         if found.positions is None or detours.is_met_by(found):
             bound = found.lower_bound_cells
             left_s = self._budget_s

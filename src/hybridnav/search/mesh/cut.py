@@ -50,6 +50,8 @@ _ROOM = 16
 """Initial room for positions, per path."""
 _LEAST = 64
 """Least number of queries that justifies a thread."""
+_PATCHED = 1 << 14
+"""Initial room for arcs of corners whose arcs change round closed cells."""
 _MANY = 1000
 """Least number of queries that justifies the graph of corners."""
 
@@ -398,6 +400,11 @@ class DetourSearch:
         self._scratch.give(left)
         return made
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether paths are found round the closed cells as quickly as with them open."""
+        return self._repaired is not None
+
     def repaired(self) -> tuple[Any, Any] | None:
         """Return the corners, and their hierarchy round the closed cells; None without one."""
         opened, graph = self._open, self._open.graph
@@ -414,7 +421,9 @@ class DetourSearch:
         corners = xs, ys, *read_only(kinds), *opened.arrays[3:]
         around = read_only(*self._closure), *read_only(self._free, *new), n_corners
         arrays = graph.arrays[:4]
-        patches = repair(corners, arrays, opened.footing, around, opened.edges, opened.place)
+        known, room = (opened.footing, around, opened.edges, opened.place), _PATCHED
+        while not len((patches := repair(corners, arrays, *known, room))[1]):
+            room *= 4
         self._repaired = corners, (*arrays, (read_only(*patches), around))
         return self._repaired
 

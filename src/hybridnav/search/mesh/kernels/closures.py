@@ -142,12 +142,14 @@ def is_beside(box, ax, ay, bx, by):
 
     `box` holds their first and last row, first and last column.
     """
-    return (
-        max(ay, by) >= box[0]
-        and min(ay, by) <= box[1] + 1
-        and max(ax, bx) >= box[2]
-        and min(ax, bx) <= box[3] + 1
-    )
+    low_y, high_y, low_x, high_x = box[0], box[1] + 1, box[2], box[3] + 1
+    if max(ay, by) < low_y or min(ay, by) > high_y or max(ax, bx) < low_x or min(ax, bx) > high_x:
+        return False
+    # The line may pass all four corners of the box on one side.
+    dx, dy = bx - ax, by - ay
+    left = max(dx * (low_y - ay), dx * (high_y - ay)) - min(dy * (low_x - ax), dy * (high_x - ax))
+    right = min(dx * (low_y - ay), dx * (high_y - ay)) - max(dy * (low_x - ax), dy * (high_x - ax))
+    return left >= -_MARGIN and right <= _MARGIN
 
 
 @njit(cache=True, nogil=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import HEAD_SHIFT, grow_rows, pack
@@ -291,99 +291,104 @@ def look_round(mesh, where, endpoints, rooms, bounds, around):
 
 # The patches. `patches` holds int32 (n,), the number of each corner's patch, 0 for none; int64 (p,
 # 4) begin, size, room and corner of each; int64 (m, 4) cost, head and classes, middle, and whether
-# an arc has changed. Number 0 of the second counts patches and used rows.
+# an arc has changed. Row 0 of the second counts patches and used rows of the third; its third number
+# is set if there was no room, and then nothing counts.
 
 
 @njit(cache=True, nogil=True)
 def _patch(hierarchy, patches, node):
-    """Give a corner a patch with its arcs, unless it has one; return the patches."""
+    """Give a corner a patch with its arcs, unless it has one; return whether it has one now."""
     at, lists, pool = patches
     if at[node]:
-        return patches
+        return True
     first, arcs, middles = hierarchy[0], hierarchy[1], hierarchy[2]
-    low, high = (first[node], first[node + 1]) if node < len(first) - 1 else (0, 0)
-    size, begin = high - low, lists[0, 1]
-    if lists[0, 0] + 2 > len(lists):
-        lists = grow_rows(lists)
-    while begin + size + _ROOM > len(pool):
-        pool = grow_rows(pool)
-    lists[0, 0] += 1
-    lists[0, 1] += size + _ROOM
-    at[node] = lists[0, 0]
-    own = lists[lists[0, 0]]
-    own[0], own[1], own[2], own[3] = begin, size, size + _ROOM, node
+    low = high = 0
+    if node < len(first) - 1:
+        low, high = first[node], first[node + 1]
+    size, begin, number = high - low, lists[0, 1], lists[0, 0] + 1
+    if number == len(lists) or begin + size + _ROOM > len(pool):
+        lists[0, 2] = 1
+        return False
+    lists[0, 0], lists[0, 1] = number, begin + size + _ROOM
+    lists[number, 0], lists[number, 1] = begin, size
+    lists[number, 2], lists[number, 3] = size + _ROOM, node
     for k in range(size):
         pool[begin + k, 0], pool[begin + k, 1] = arcs[low + k, 0], arcs[low + k, 1]
         pool[begin + k, 2], pool[begin + k, 3] = middles[low + k], 0
-    return at, lists, pool
+    at[node] = number
+    return True
 
 
 @njit(cache=True, nogil=True)
-def _write(row, cost, packed, middle):
+def _write(pool, row, cost, packed, middle):
     """Write an arc that has changed."""
-    row[0], row[1], row[2], row[3] = cost, packed, middle, 1
+    pool[row, 0], pool[row, 1], pool[row, 2], pool[row, 3] = cost, packed, middle, 1
 
 
 @njit(cache=True, nogil=True)
-def _offer(hierarchy, patches, tail, arc):
+def _offer(hierarchy, patches, tail, cost, packed, middle):
     """Put an arc into a corner's list, unless one that costs no more has its head.
 
-    Return the patches, and whether the list has changed.
+    Return whether the list has changed.
     """
-    cost, packed, middle = arc
     first, arcs = hierarchy[0], hierarchy[1]
-    head = packed >> HEAD_SHIFT
-    if not patches[0][tail]:
-        if tail < len(first) - 1:
-            for k in range(first[tail], first[tail + 1]):
-                if arcs[k, 1] >> HEAD_SHIFT == head and arcs[k, 0] <= cost:
-                    return patches, False
-        patches = _patch(hierarchy, patches, tail)
     at, lists, pool = patches
-    own = lists[at[tail]]
-    for k in range(own[0], own[0] + own[1]):
+    head = packed >> HEAD_SHIFT
+    if not at[tail]:
+        for k in range(first[tail], first[tail + 1]):
+            if arcs[k, 1] >> HEAD_SHIFT == head:
+                if arcs[k, 0] <= cost:
+                    return False
+                break
+        if not _patch(hierarchy, patches, tail):
+            return False
+    own = at[tail]
+    begin, size = lists[own, 0], lists[own, 1]
+    for k in range(begin, begin + size):
         if pool[k, 1] >> HEAD_SHIFT == head:
             if pool[k, 0] <= cost:
-                return patches, False
-            _write(pool[k], cost, packed, middle)
-            return patches, True
-    if own[1] == own[2]:
-        begin, room = lists[0, 1], 2 * own[2]
-        while begin + room > len(pool):
-            pool = grow_rows(pool)
-        pool[begin : begin + own[1]] = pool[own[0] : own[0] + own[1]]
-        own[0], own[2] = begin, room
-        lists[0, 1] += room
-    _write(pool[own[0] + own[1]], cost, packed, middle)
-    own[1] += 1
-    return (at, lists, pool), True
+                return False
+            _write(pool, k, cost, packed, middle)
+            return True
+    if size == lists[own, 2]:
+        to, room = lists[0, 1], 2 * size
+        if to + room > len(pool):
+            lists[0, 2] = 1
+            return False
+        for k in range(size):
+            for column in range(4):
+                pool[to + k, column] = pool[begin + k, column]
+        lists[own, 0], lists[own, 2], lists[0, 1] = to, room, to + room
+        begin = to
+    _write(pool, begin + size, cost, packed, middle)
+    lists[own, 1] += 1
+    return True
 
 
 @njit(cache=True, nogil=True)
 def _spoil(hierarchy, patches, stack, n, tail, position):
-    """Mark an arc as stale, and stack it; return the patches, the stack and its size."""
-    patches = _patch(hierarchy, patches, tail)
+    """Mark an arc as stale, and stack it; return the size of the stack, which has room."""
     at, lists, pool = patches
+    if not _patch(hierarchy, patches, tail):
+        return n
     row = lists[at[tail], 0] + position
     if pool[row, 3] == 0:
         pool[row, 0], pool[row, 3] = FAR, 1
-        if n == len(stack):
-            stack = grow_rows(stack)
         stack[n, 0], stack[n, 1] = tail, position
         n += 1
-    return patches, stack, n
+    return n
 
 
 @njit(cache=True, nogil=True)
 def _spoil_all(mesh, hierarchy, footing, around, patches):
-    """Mark all arcs as stale whose path meets a closed cell; return the patches."""
+    """Mark all arcs as stale whose path meets a closed cell."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, middles, follow = hierarchy
     rank, begin, into, tails, boxes, groups = footing
     closure, free = around[0], around[1]
     low_y, high_y = closure[0][0], closure[0][1] + 1
     low_x, high_x = closure[0][2], closure[0][3] + 1
-    stack, n = np.empty((256, 2), np.int64), 0
+    stack, n = np.empty((len(patches[2]), 2), np.int32), 0
     for group in range(len(groups)):
         box = groups[group]
         if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
@@ -400,9 +405,7 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
                     continue
                 is_dead = (kinds[node] | kinds[head]) & DEAD
                 if is_dead or crosses(closure, free, cx[node], cy[node], cx[head], cy[head]):
-                    patches, stack, n = _spoil(
-                        hierarchy, patches, stack, n, node, arc - first[node]
-                    )
+                    n = _spoil(hierarchy, patches, stack, n, node, arc - first[node])
 
     # A shortcut is stale if one of the two arcs that it stands for is.
     while n > 0:
@@ -419,66 +422,71 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
             for k in range(first[low], first[low + 1]):
                 if arcs[k, 1] >> HEAD_SHIFT == high:
                     if middles[k] >> 32 == node:
-                        patches, stack, n = _spoil(
-                            hierarchy, patches, stack, n, low, k - first[low]
-                        )
+                        n = _spoil(hierarchy, patches, stack, n, low, k - first[low])
                     break
-    return patches
 
 
 @njit(cache=True, nogil=True)
-def _mend(mesh, hierarchy, footing, around, edges, patches, node):
-    """Find the least costs of the stale arcs of a corner, by corners below; return the patches."""
+def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
+    """Find the least costs of the stale arcs of a corner, by corners below.
+
+    `row_of` is int32 (n,), 0, and so it is left.
+    """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, middles, follow = hierarchy
     _, begin, into, tails, _, _ = footing
     closure, free = around[0], around[1]
     at, lists, pool = patches
     base = lists[at[node], 0]
+    n_stale = 0
     for position in range(first[node + 1] - first[node]):
         row = base + position
         head = pool[row, 1] >> HEAD_SHIFT
         if pool[row, 3] == 0 or (kinds[node] | kinds[head]) & DEAD:
             continue
+        row_of[head] = row + 1
+        n_stale += 1
         # A shortcut may stand for an edge as long as it.
-        if middles[first[node] + position] >= 0:
-            for k in range(edges[0][2 * node], edges[0][2 * node + 2]):
-                if edges[1][k] == head:
-                    cost = cost_of(cx[node], cy[node], cx[head], cy[head])
-                    if cost < pool[row, 0] and not crosses(
-                        closure, free, cx[node], cy[node], cx[head], cy[head]
-                    ):
-                        dx, dy = cx[head] - cx[node], cy[head] - cy[node]
-                        near = class_of(kinds[node], dx, dy)
-                        far = class_of(kinds[head], -dx, -dy)
-                        _write(pool[row], cost, pack(head, near, far), -1)
-        for k in range(begin[node], begin[node + 1]):
-            low = tails[into[k]]
-            here = into[k] - first[low]
-            other = here
-            for arc in range(first[low], first[low + 1]):
-                if arcs[arc, 1] >> HEAD_SHIFT == head:
-                    other = arc - first[low]
-            if other == here:
+        if middles[first[node] + position] < 0:
+            continue
+        for k in range(edges[0][2 * node], edges[0][2 * node + 2]):
+            if edges[1][k] == head and not crosses(
+                closure, free, cx[node], cy[node], cx[head], cy[head]
+            ):
+                cost = cost_of(cx[node], cy[node], cx[head], cy[head])
+                if cost < pool[row, 0]:
+                    dx, dy = cx[head] - cx[node], cy[head] - cy[node]
+                    near = class_of(kinds[node], dx, dy)
+                    far = class_of(kinds[head], -dx, -dy)
+                    _write(pool, row, cost, pack(head, near, far), -1)
+    for k in range(begin[node], begin[node + 1] if n_stale else begin[node]):
+        low = tails[into[k]]
+        here = into[k] - first[low]
+        if at[low]:
+            rows = pool[lists[at[low], 0] : lists[at[low], 0] + first[low + 1] - first[low]]
+            to_node, by = rows[here, 0], rows[here, 1]
+        else:
+            to_node, by = arcs[into[k], 0], arcs[into[k], 1]
+        may_follow = follow[kinds[low] & _KIND, by >> 6 & 63]
+        for other in range(first[low + 1] - first[low]):
+            row = row_of[arcs[first[low] + other, 1] >> HEAD_SHIFT] - 1
+            if row < 0:
                 continue
             if at[low]:
-                a, b = lists[at[low], 0] + here, lists[at[low], 0] + other
-                cost, one = pool[a, 0] + pool[b, 0], pool[a, 1]
-                two = pool[b, 1]
+                cost, packed = to_node + rows[other, 0], rows[other, 1]
             else:
-                a, b = first[low] + here, first[low] + other
-                cost, one = arcs[a, 0] + arcs[b, 0], arcs[a, 1]
-                two = arcs[b, 1]
-            if cost >= pool[row, 0]:
-                continue
-            if follow[kinds[low] & _KIND, one >> 6 & 63] >> (two >> 6 & 63) & 1:
+                cost, packed = to_node + arcs[first[low] + other, 0], arcs[first[low] + other, 1]
+            if cost < pool[row, 0] and may_follow >> (packed >> 6 & 63) & 1:
                 past = np.int64(low) << 32 | here << 16 | other
-                _write(pool[row], cost, pack(head, one & 63, two & 63), past)
+                head = packed >> HEAD_SHIFT
+                _write(pool, row, cost, pack(head, by & 63, packed & 63), past)
+    for position in range(first[node + 1] - first[node]):
+        row_of[pool[base + position, 1] >> HEAD_SHIFT] = 0
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def repair(mesh, hierarchy, footing, around, edges, place):
+def repair(mesh, hierarchy, footing, around, edges, place, room):
     """Find the patches of a hierarchy round closed cells.
 
     Parameters
@@ -495,102 +503,113 @@ def repair(mesh, hierarchy, footing, around, edges, place):
         Result of `edges_of`.
     place
         Component of polygons, and the polygon of each cell.
+    room
+        Most arcs of patches.
 
     Returns
     -------
     tuple
         int32 (n,), the number of each corner's patch, 0 for none; int64 (p, 4), where it begins and
-        its size; int64 (m, 4), the arcs.
+        its size, without rows if the room is too small; int64 (m, 4), the arcs.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     rank, follow = footing[0], hierarchy[3]
     n_old, n_all = around[4], len(cx)
     patches = (
         np.zeros(n_all, np.int32),
-        np.zeros((256, 4), np.int64),
-        np.empty((8192, 4), np.int64),
+        np.empty((room // 8 + 1, 4), np.int64),
+        np.empty((room, 4), np.int64),
     )
-    patches = _spoil_all(mesh, hierarchy, footing, around, patches)
+    at, lists, pool = patches
+    lists[0] = 0
+    _spoil_all(mesh, hierarchy, footing, around, patches)
 
     # Arcs between the new corners, and to those that they see.
-    room = (np.empty((256, 2), np.int32), np.empty((256, 4)), np.empty(256, np.int32))
+    view = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
     polygons = np.empty(len(place[0]), np.int32)
     for corner in range(n_old, n_all):
         x, y, kind = cx[corner], cy[corner], kinds[corner]
-        patches = _patch(hierarchy, patches, corner)
+        if not _patch(hierarchy, patches, corner):
+            break
         inner = polygon_in(mesh, place[0], place[1], int(y), int(x))
         starts = polygons[: polygons_with(mesh, inner, int(y), int(x), x, y, polygons)]
         nowhere = (0.0, 0.0, starts[:0])
         n = -1
         while n < 0:
-            n, _ = _see_round(mesh, around, (x, y, starts), nowhere, room, 0)
+            n, _ = _see_round(mesh, around, (x, y, starts), nowhere, view, 0)
             if n < 0:
-                size = 2 * len(room[2])
-                room = (
-                    np.empty((size, 2), np.int32),
-                    np.empty((size, 4)),
-                    np.empty(size, np.int32),
-                )
+                more = 2 * len(view[2])
+                view = np.empty((more, 2), np.int32), np.empty((more, 4)), np.empty(more, np.int32)
         for k in range(n):
-            other = np.int64(room[2][k])
+            other = np.int64(view[2][k])
             dx, dy = cx[other] - x, cy[other] - y
             if n_old <= other <= corner or not touches(kind, dx, dy) or kinds[other] & CHANGED:
                 continue
             near, far = class_of(kind, dx, dy), class_of(kinds[other], -dx, -dy)
-            arc = cost_of(x, y, cx[other], cy[other]), pack(other, near, far), -1
-            patches, _ = _offer(hierarchy, patches, corner, arc)
+            cost = cost_of(x, y, cx[other], cy[other])
+            _offer(hierarchy, patches, corner, cost, pack(other, near, far), -1)
 
     # Upwards, corner by corner: mend its stale arcs, and offer what joins two of its arcs of which
     # one has changed. New corners come first.
-    queue, waiting = np.empty((1024, 2), np.int64), 0
-    is_queued = np.zeros(n_all, np.bool_)
-    for k in range(1, patches[1][0, 0] + 1):
-        node = patches[1][k, 3]
-        if waiting == len(queue):
-            queue = grow_rows(queue)
+    queue, waiting = np.empty((len(lists), 2), np.int64), 0
+    is_queued, row_of = np.zeros(n_all, np.bool_), np.zeros(n_all, np.int32)
+    heads, classes = np.empty(64, np.int32), np.empty(64, np.int32)
+    for k in range(1, lists[0, 0] + 1):
+        node = lists[k, 3]
         push(queue, waiting, _rank_of(rank, node, n_all), node)
         waiting += 1
         is_queued[node] = True
-    while waiting > 0:
+    after = np.empty(256, np.int32)
+    while waiting > 0 and not lists[0, 2]:
         node = pop(queue, waiting)
         waiting -= 1
         if node < n_old:
-            _mend(mesh, hierarchy, footing, around, edges, patches, node)
-        number = patches[0][node]
-        size = patches[1][number, 1]
+            _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of)
+
+        # Lists of its arcs by class: one arc in twenty may follow another. Its own patch stays as
+        # it is, those of corners above may move.
+        base, size, n_classes = lists[at[node], 0], lists[at[node], 1], 0
+        while size > len(after):
+            after = grow(after)
+        heads[:] = -1
         for one in range(size):
-            for two in range(size):
-                # The lists of corners above change, and may move; this one stays as it is.
-                pool, base = patches[2], patches[1][number, 0]
-                a, b = base + one, base + two
-                if pool[a, 3] == 0 or pool[a, 0] == FAR:
-                    break
-                if one == two or pool[b, 0] == FAR or (pool[b, 3] and two < one):
-                    continue
-                if follow[kinds[node] & _KIND, pool[a, 1] >> 6 & 63] >> (
-                    pool[b, 1] >> 6 & 63
-                ) & 1 == 0:
-                    continue
-                low, high, to_low, to_high = a, b, one, two
-                if _rank_of(rank, pool[a, 1] >> HEAD_SHIFT, n_all) > _rank_of(
-                    rank, pool[b, 1] >> HEAD_SHIFT, n_all
-                ):
-                    low, high, to_low, to_high = b, a, two, one
-                tail, head = pool[low, 1] >> HEAD_SHIFT, pool[high, 1] >> HEAD_SHIFT
-                arc = (
-                    pool[a, 0] + pool[b, 0],
-                    pack(head, pool[low, 1] & 63, pool[high, 1] & 63),
-                    np.int64(node) << 32 | to_low << 16 | to_high,
-                )
-                patches, is_new = _offer(hierarchy, patches, tail, arc)
-                if is_new and not is_queued[tail]:
-                    if waiting == len(queue):
-                        queue = grow_rows(queue)
-                    push(queue, waiting, _rank_of(rank, tail, n_all), tail)
-                    waiting += 1
-                    is_queued[tail] = True
-    at, lists, pool = patches
-    return at, lists[: lists[0, 0] + 1], pool[: lists[0, 1]]
+            if pool[base + one, 0] < FAR:
+                near = pool[base + one, 1] >> 6 & 63
+                if heads[near] < 0:
+                    classes[n_classes] = near
+                    n_classes += 1
+                after[one], heads[near] = heads[near], one
+        for one in range(size):
+            a = base + one
+            if pool[a, 3] == 0 or pool[a, 0] == FAR:
+                continue
+            may_follow = follow[kinds[node] & _KIND, pool[a, 1] >> 6 & 63]
+            up = _rank_of(rank, pool[a, 1] >> HEAD_SHIFT, n_all)
+            for near in classes[:n_classes]:
+                two = heads[near] if may_follow >> near & 1 else -1
+                while two >= 0:
+                    this, b = two, base + two
+                    two = after[two]
+                    if this == one or (pool[b, 3] and this < one):
+                        continue
+                    low, high, to_low, to_high = a, b, one, this
+                    if up > _rank_of(rank, pool[b, 1] >> HEAD_SHIFT, n_all):
+                        low, high, to_low, to_high = b, a, this, one
+                    tail = pool[low, 1] >> HEAD_SHIFT
+                    packed = pack(
+                        pool[high, 1] >> HEAD_SHIFT, pool[low, 1] & 63, pool[high, 1] & 63
+                    )
+                    past = np.int64(node) << 32 | to_low << 16 | to_high
+                    cost = pool[a, 0] + pool[b, 0]
+                    if (
+                        _offer(hierarchy, patches, tail, cost, packed, past)
+                        and not is_queued[tail]
+                    ):
+                        push(queue, waiting, _rank_of(rank, tail, n_all), tail)
+                        waiting += 1
+                        is_queued[tail] = True
+    n_patches = 0 if lists[0, 2] else lists[0, 0] + 1
+    return at, lists[:n_patches].copy(), pool[: lists[0, 1]].copy()
 
 
 @njit(cache=True, nogil=True)
