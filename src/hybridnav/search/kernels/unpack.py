@@ -26,7 +26,7 @@ def _unpack(arcs, entry, nodes, count):
         number, past = max(arc, -1 - arc), np.int64(NO_ARC)
         if number < middles.size:
             past = middles[number]
-        elif middles.size:
+        elif len(pool):
             past = pool[number - middles.size, 2]
         if past < 0:
             if count == nodes.size:

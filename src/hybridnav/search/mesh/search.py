@@ -352,13 +352,15 @@ class MeshSearch:
         self, cells: tuple[Cell, Cell], positions: tuple[Position, Position], *, epsilon: float
     ) -> float:
         """Return the length in cells of the path that `path` finds, infinite for none."""
-        if self.labels is None:
+        graph, works = self.engine()
+        if graph is None:
             return self.path(cells, positions, epsilon=epsilon).length_cells
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        work = self._hub_works.take()
-        length = self._run((self.arrays, self.labels.arrays), ends, work, _ALONE)[2]
-        self._hub_works.give(work)
+        effort = (math.inf, epsilon, math.inf) if self.labels is None else _ALONE
+        work = works.take()
+        length = self._run((self.arrays, graph.arrays), ends, work, effort)[2]
+        works.give(work)
         return length
 
     def _run(

@@ -383,8 +383,8 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
         # Arcs of a patched corner are numbered behind those of the hierarchy.
-        behind = 0
-        if len(at) and at[node]:
+        behind, is_patched = 0, len(at) > 0 and at[node] > 0
+        if is_patched:
             behind = len(arcs)
             low, high = lists[at[node], 0], lists[at[node], 0] + lists[at[node], 1]
         else:
@@ -422,7 +422,7 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
             elif from_x != x or from_y != y:
                 may_follow = follow[kinds[node] & 3, class_of(kinds[node], from_x - x, from_y - y)]
             for arc in range(low, high):
-                if behind:
+                if is_patched:
                     packed, further = pool[arc, 1], cost + pool[arc, 0]
                 else:
                     packed, further = arcs[arc, 1], cost + arcs[arc, 0]
