@@ -3,9 +3,9 @@
 Least times of many repeats, for each pair of ends, which other programs on the machine change
 little: of `planner.plan`, of the kernel inside it, and what `plan` and `distance` take beside it.
 Then what a second core can bring: the CPU time of a batch of all pairs and of a table, over that of
-the caller's thread plus half of the other threads'. And how many times more plans and distances, one
-at a time, four threads get in a second than one: wall time, the best of repeats that alternate, so
-it counts only on a quiet machine, and more threads get a larger share of a busy one.
+the caller's thread plus half of the other threads'. And how many times more plans and distances,
+one at a time, four threads get in a second than one: wall time, the best of repeats that alternate.
+It counts on a quiet machine alone: on a busy one, more threads get a larger share of it.
 """
 
 from __future__ import annotations
@@ -131,8 +131,8 @@ def measure(planner: hn.HybridPlanner, points: Any, repeats: int) -> list[str]:
         two_cores(lambda: planner.plan_many(starts, goals), repeats),
         two_cores(lambda: planner.distances(starts[::4], goals[::4]), repeats),
     ]
-    for ask in (planner.plan, planner.distance):
-        shares.append(four_threads(ask, ends * 5, repeats))
+    asked = planner.plan, planner.distance
+    shares += [four_threads(ask, ends * 5, repeats) for ask in asked]
     times = [np.median(one) * 1e6 for one in (beside + inside, inside, beside, alone)]
     return [f"{one:.1f}" for one in times] + [f"{one:.2f}" for one in shares]
 

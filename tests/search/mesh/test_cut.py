@@ -229,6 +229,29 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
 
+@settings(max_examples=examples(40), deadline=None)
+@given(closures(), seeds)
+def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(
+    case: tuple[Any, Any], seed: int
+) -> None:
+    free, closed = case
+    search = MeshSearch(build_mesh(free))
+    search.prepare()
+    parts = closed, closed[::2], closed[: len(closed) // 2]
+    rounds = [DetourSearch(search, free, part) for part in parts]
+    lefts = [without(free, part) for part in parts]
+    assume(lefts[0].any())
+    anew = [MeshSearch(build_mesh(left)) for left in lefts]
+    opened = MeshSearch(build_mesh(free))
+    for query in queries(lefts[0], seed):
+        for round_it, fresh in zip([*rounds, *rounds], [*anew, *anew], strict=True):
+            optimum = fresh.path(*query).length_cells
+            assert round_it.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
+            assert search.path(*query).length_cells == pytest.approx(
+                opened.path(*query).length_cells, abs=1e-9
+            )
+
+
 @settings(max_examples=examples(60), deadline=None)
 @given(closures(), seeds)
 def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
@@ -284,6 +307,18 @@ def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
         round_it = DetourSearch(search, free, np.array([cell[0] * 9 + cell[1]]))
         assert round_it.is_met_by(opened) is is_met
         assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
+
+
+def test_a_hierarchy_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell() -> None:
+    free = np.ones((6, 9), np.bool_)
+    free[2, 4] = False
+    search = MeshSearch(build_mesh(free))
+    search.prepare()
+    for where, is_repaired in ((0.5, True), (0.0, False)):
+        round_it = DetourSearch(search, free, np.array([2 * 9 + 3, 3 * 9 + 5]))
+        found = round_it.path(((3, 3), (2, 8)), ((3.0 + where, 3.0 + where), (2.5, 8.5)))
+        assert round_it.is_ready is is_repaired
+        assert found.positions is not None
 
 
 @pytest.mark.parametrize("is_prepared", [False, True])

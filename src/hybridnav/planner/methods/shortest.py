@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -184,7 +184,7 @@ class OverMesh(Method):
             return MeshPath(None, math.inf, bound, 0), 0
         began, closed = time.perf_counter(), query.closed
         detours = None if closed is None else self._round(search, closed)
-        effort = {"epsilon": self._epsilon, "budget_s": self._budget_s}
+        effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
         if detours is not None and detours.is_ready:
             found = detours.path(query.cells, positions, **effort)
             return found, found.expanded

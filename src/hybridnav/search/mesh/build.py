@@ -342,8 +342,6 @@ _LOOKED_AN_EDGE = 110
 does not begin: on five of the six real maps on which it would be given up."""
 
 
-
-
 def read_only(*arrays: Any) -> tuple[Any, ...]:
     """Return views of arrays that cannot be written: kernels are compiled for these."""
     views = tuple(array.view() for array in arrays)

@@ -292,7 +292,7 @@ class MeshSearch:
         graph = self._graph
         return graph, self.works if graph is None else self.corner_works
 
-    def path(
+    def path(  # noqa: PLR0913 - all but two have defaults
         self,
         cells: tuple[Cell, Cell],
         positions: tuple[Position, Position],

@@ -438,7 +438,10 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1
-                records[other, direction], records[other, 2 + direction] = further, node << 32 | behind + arc
+                records[other, direction], records[other, 2 + direction] = (
+                    further,
+                    node << 32 | behind + arc,
+                )
                 push(heap, size, estimate, other)
                 size += 1
         if direction:

@@ -129,8 +129,8 @@ def corners_round(mesh, closure, closed, left, place):
     Returns
     -------
     tuple
-        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32 polygons
-        that contain a new corner, sorted, and which.
+        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32
+        polygons that contain a new corner, sorted, and which.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     box = closure[0]
@@ -291,8 +291,8 @@ def look_round(mesh, where, endpoints, rooms, bounds, around):
 
 # The patches. `patches` holds int32 (n,), the number of each corner's patch, 0 for none; int64 (p,
 # 4) begin, size, room and corner of each; int64 (m, 4) cost, head and classes, middle, and whether
-# an arc has changed. Row 0 of the second counts patches and used rows of the third; its third number
-# is set if there was no room, and then nothing counts.
+# an arc has changed. Row 0 of the second counts patches and used rows of the third; its third
+# number is set if there was no room, and then nothing counts.
 
 
 @njit(cache=True, nogil=True)
@@ -384,7 +384,7 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
     """Mark all arcs as stale whose path meets a closed cell."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, middles, follow = hierarchy
-    rank, begin, into, tails, boxes, groups = footing
+    rank, _, _, _, boxes, groups = footing
     closure, free = around[0], around[1]
     low_y, high_y = closure[0][0], closure[0][1] + 1
     low_x, high_x = closure[0][2], closure[0][3] + 1
@@ -601,10 +601,7 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
                     )
                     past = np.int64(node) << 32 | to_low << 16 | to_high
                     cost = pool[a, 0] + pool[b, 0]
-                    if (
-                        _offer(hierarchy, patches, tail, cost, packed, past)
-                        and not is_queued[tail]
-                    ):
+                    if _offer(hierarchy, patches, tail, cost, packed, past) and not is_queued[tail]:
                         push(queue, waiting, _rank_of(rank, tail, n_all), tail)
                         waiting += 1
                         is_queued[tail] = True
