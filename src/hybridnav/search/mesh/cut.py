@@ -50,7 +50,7 @@ _ROOM = 16
 """Initial room for positions, per path."""
 _LEAST = 64
 """Least number of queries that justifies a thread."""
-_PATCHED = 1 << 14
+_PATCHED = 1 << 16
 """Initial room for arcs of corners whose arcs change round closed cells."""
 _MANY = 1000
 """Least number of queries that justifies the graph of corners."""
