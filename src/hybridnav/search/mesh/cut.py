@@ -27,7 +27,7 @@ from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
 from hybridnav.search.mesh.kernels.polyanya import WORK_FULL
 from hybridnav.search.mesh.kernels.queries import ANSWERS_FULL, many
-from hybridnav.search.mesh.kernels.repairs import corners_round, repair
+from hybridnav.search.mesh.kernels.repairs import repair
 from hybridnav.search.mesh.search import (
     MOST_NEW,
     NO_LIMIT,
@@ -411,7 +411,7 @@ class DetourSearch:
         if self._repaired is not None or not isinstance(graph, CornerHierarchy):
             return self._repaired
         xs, ys, kinds, *new = self._without(
-            lambda left: corners_round(
+            lambda left: kernels.corners_round(
                 opened.arrays, self._closure, self._closed, left, opened.place
             )
         )

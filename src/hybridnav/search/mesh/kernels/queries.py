@@ -12,6 +12,7 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
+from hybridnav.search.mesh.kernels.closures import look_round
 from hybridnav.search.mesh.kernels.corner_search import (
     APART,
     MET,
@@ -39,7 +40,6 @@ from hybridnav.search.mesh.kernels.polyanya import (
     put_corner,
     seed,
 )
-from hybridnav.search.mesh.kernels.repairs import look_round
 from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, distance
 
 _OPENED, _SEEDED = 1, 2

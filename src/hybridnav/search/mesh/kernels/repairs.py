@@ -10,35 +10,22 @@ J. Dibbelt, B. Strasser, D. Wagner: Customizable contraction hierarchies, 2016 (
 """
 
 import numpy as np
-from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, pop, push
-from hybridnav._base.kernels.exact import turn_of
 from hybridnav._base.moves import FAR
-from hybridnav.search.contraction import HEAD_SHIFT, grow_rows, pack
-from hybridnav.search.mesh.kernels.closures import crosses, is_beside
-from hybridnav.search.mesh.kernels.corner_search import (
-    APART,
-    MET,
-    polygon_in,
-    polygons_of_endpoints,
-    polygons_with,
+from hybridnav.search.contraction import HEAD_SHIFT, pack
+from hybridnav.search.mesh.kernels.closures import (
+    CHANGED,
+    DEAD,
+    KIND,
+    crosses,
+    is_beside,
+    see_round,
 )
-from hybridnav.search.mesh.kernels.polyanya import DONE, PAUSED, WORK_FULL
-from hybridnav.search.mesh.kernels.views import (
-    class_of,
-    cost_of,
-    distance,
-    has_target,
-    see_from_point,
-    touches,
-)
+from hybridnav.search.mesh.kernels.corner_search import polygon_in, polygons_with
+from hybridnav.search.mesh.kernels.views import class_of, cost_of, touches
 
-CHANGED, DEAD = 4, 8
-"""Bits of a kind: the corner touches a closed cell, so that no path bends there; all cells at it
-are closed or blocked, or two that meet there alone, so that no path passes it."""
-_KIND = 3
 _GROUP = 64
 """Corners, neighbours on the map, that have a box in common."""
 _ROOM = 4
@@ -75,6 +62,7 @@ def footing_of(mesh, hierarchy):
     for box in (boxes, groups):
         box[:, :2], box[:, 2:] = np.inf, -np.inf
     for node in range(n):
+        # Edges alone count for the boxes: shortcuts are found through them.
         for arc in range(first[node], first[node + 1]):
             head = arcs[arc, 1] >> HEAD_SHIFT
             tails[arc] = node
@@ -85,6 +73,7 @@ def footing_of(mesh, hierarchy):
                     box[1] = min(box[1], cy[node], cy[head])
                     box[2] = max(box[2], cx[node], cx[head])
                     box[3] = max(box[3], cy[node], cy[head])
+    # The arcs into each corner, by the corners that they come from.
     below = begin[1:].copy()
     for node in range(n):
         begin[node + 1] += begin[node]
@@ -93,6 +82,7 @@ def footing_of(mesh, hierarchy):
         head = arcs[arc, 1] >> HEAD_SHIFT
         into[at[head]] = arc
         at[head] += 1
+    # A corner follows when all below it have been numbered.
     rank, order, count = np.empty(n, np.int32), np.empty(n, np.int32), 0
     for node in range(n):
         if below[node] == 0:
@@ -108,185 +98,6 @@ def footing_of(mesh, hierarchy):
                 order[count] = head
                 count += 1
     return rank, begin, into, tails, boxes, groups
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def corners_round(mesh, closure, closed, left, place):
-    """Find the corners that closed cells have, and those at which paths bend no more.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    closure, closed
-        See `closure_of`; the flat cells.
-    left
-        bool (rows, cols), free cells that are not closed.
-    place
-        Component of polygons, and the polygon of each cell.
-
-    Returns
-    -------
-    tuple
-        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32
-        polygons that contain a new corner, sorted, and which.
-    """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    box = closure[0]
-    rows, cols = left.shape
-    n, n_new = len(kinds), 0
-    found = np.empty((64, 3), np.int64)
-    for cell in closed:
-        row, col = cell // cols, cell % cols
-        for k in range(4):
-            down, side = row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1
-            if not (0 <= down < rows and 0 <= side < cols):
-                continue
-            if left[down, col] and left[row, side] and left[down, side]:
-                if n_new == len(found):
-                    found = grow_rows(found)
-                # Seen from the corner, the cell lies on the other side than the corner from it.
-                found[n_new, 0], found[n_new, 1] = col + (k & 1), row + (k >> 1)
-                found[n_new, 2] = 3 - k
-                n_new += 1
-    xs, ys = np.empty(n + n_new), np.empty(n + n_new)
-    every = np.empty(n + n_new, np.uint8)
-    xs[:n], ys[:n], every[:n] = cx, cy, kinds
-    for k in range(n_new):
-        xs[n + k], ys[n + k], every[n + k] = found[k, 0], found[k, 1], found[k, 2]
-    for corner in range(n):
-        x, y = cx[corner], cy[corner]
-        if y < box[0] or y > box[1] + 1 or x < box[2] or x > box[3] + 1 or kinds[corner] > _KIND:
-            continue
-        row, col = int(y), int(x)
-        a = row > 0 and col > 0 and left[row - 1, col - 1]
-        b = row > 0 and col < cols and left[row - 1, col]
-        c = row < rows and col > 0 and left[row, col - 1]
-        d = row < rows and col < cols and left[row, col]
-        n_free = int(a) + int(b) + int(c) + int(d)
-        if n_free < 3:
-            every[corner] |= CHANGED
-        if n_free == 0 or (n_free == 2 and a == d):
-            every[corner] |= DEAD
-    room, listed = np.empty(len(place[0]), np.int32), np.empty((64, 2), np.int64)
-    n_listed = 0
-    for k in range(n_new):
-        x, y = found[k, 0], found[k, 1]
-        inner = polygon_in(mesh, place[0], place[1], y, x)
-        for polygon in room[: polygons_with(mesh, inner, y, x, float(x), float(y), room)]:
-            if n_listed == len(listed):
-                listed = grow_rows(listed)
-            listed[n_listed, 0], listed[n_listed, 1] = polygon, k
-            n_listed += 1
-    order = np.argsort(listed[:n_listed, 0])
-    polygons, members = np.empty(n_listed, np.int32), np.empty(n_listed, np.int32)
-    for k in range(n_listed):
-        polygons[k], members[k] = listed[order[k], 0], listed[order[k], 1]
-    return xs, ys, every, polygons, members
-
-
-# Views round closed cells.
-
-
-@overload(has_target)
-def _has_new_corners(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
-    """Return what stands for `has_target` for new corners, which are marked, and one point."""
-
-    def mark(target, polygon, x, y, rays):
-        polygons, members, xs, ys, is_seen, tx, ty, goals = target
-        lx, ly, rx, ry = rays
-        k = np.searchsorted(polygons, polygon)
-        while k < len(polygons) and polygons[k] == polygon:
-            one = members[k]
-            if turn_of(x, y, rx, ry, xs[one], ys[one]) >= 0:
-                is_seen[one] |= turn_of(x, y, lx, ly, xs[one], ys[one]) <= 0
-            k += 1
-        for goal in goals:
-            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
-                return turn_of(x, y, lx, ly, tx, ty) <= 0
-        return False
-
-    return mark if len(target) == 8 else None
-
-
-@njit(cache=True, nogil=True)
-def _see_round(mesh, around, place, goal, room, found):
-    """Find the corners seen from a point, past closed cells; see `see_from_point`.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`, with the corners and kinds of `corners_round`.
-    around
-        Closure, free cells, polygons of new corners, and which; see `look_round`.
-    place
-        x and y of the point, and int32 polygons that contain it.
-    goal
-        x and y of another point, and int32 polygons that contain it.
-    room, found
-        See `see_from_point`.
-    """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    closure, free, polygons, members, n_old = around
-    x, y, starts = place
-    seen = room[2]
-    is_seen = np.zeros(len(cx) - n_old, np.bool_)
-    for polygon in starts:
-        k = np.searchsorted(polygons, polygon)
-        while k < len(polygons) and polygons[k] == polygon:
-            is_seen[members[k]] = True
-            k += 1
-    target = (polygons, members, cx[n_old:], cy[n_old:], is_seen, *goal)
-    n, is_goal_seen = see_from_point(mesh, x, y, starts, target, room, found)
-    if n < 0 or n + len(is_seen) > len(seen):
-        return -1, False
-    kept = found
-    for k in range(found, n):
-        corner = seen[k]
-        if not crosses(closure, free, x, y, cx[corner], cy[corner]):
-            seen[kept] = corner
-            kept += 1
-    for corner in range(n_old, len(cx)):
-        if (
-            is_seen[corner - n_old]
-            and touches(kinds[corner], cx[corner] - x, cy[corner] - y)
-            and not crosses(closure, free, x, y, cx[corner], cy[corner])
-        ):
-            seen[kept] = corner
-            kept += 1
-    return kept, is_goal_seen
-
-
-@njit(cache=True, nogil=True)
-def look_round(mesh, where, endpoints, rooms, bounds, around):
-    """Do the same as `look_from_endpoints` past closed cells.
-
-    Neither end is a corner of a closed cell. `around` holds the closure (see `closure_of`), the
-    free cells before, int32 polygons of new corners, and which corners these are; the number of
-    corners before.
-    """
-    sx, sy, tx, ty = endpoints
-    component, polygon_at, cells = where
-    starts, goals, room = rooms
-    how, n_starts, n_goals = polygons_of_endpoints(
-        mesh, component, polygon_at, cells, endpoints, starts, goals
-    )
-    if how == APART:
-        bounds[:] = np.inf
-        return DONE, 0, 0
-    nowhere = (0.0, 0.0, starts[:0])
-    n, _ = _see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
-    if n < 0:
-        return WORK_FULL, 0, 0
-    target = (tx, ty, goals[:n_goals] if how != MET else starts[:0])
-    n_all, is_seen = _see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
-    if n_all < 0:
-        return WORK_FULL, 0, 0
-    if (is_seen or how == MET) and not crosses(around[0], around[1], sx, sy, tx, ty):
-        bounds[:] = distance(sx, sy, tx, ty)
-        return DONE, 0, 0
-    return PAUSED, n, n_all
 
 
 # The patches. `patches` holds int32 (n,), the number of each corner's patch, 0 for none; int64 (p,
@@ -389,6 +200,7 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
     low_y, high_y = closure[0][0], closure[0][1] + 1
     low_x, high_x = closure[0][2], closure[0][3] + 1
     stack, n = np.empty((len(patches[2]), 2), np.int32), 0
+    # Boxes of groups, then of corners, leave few edges to test exactly.
     for group in range(len(groups)):
         box = groups[group]
         if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
@@ -412,8 +224,9 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
         n -= 1
         node, position = stack[n, 0], stack[n, 1]
         stale = arcs[first[node] + position, 1]
-        may_follow = follow[kinds[node] & _KIND, stale >> 6 & 63]
+        may_follow = follow[kinds[node] & KIND, stale >> 6 & 63]
         one = stale >> HEAD_SHIFT
+        # Where a cheaper arc had the same ends, no shortcut past this corner was kept.
         for arc in range(first[node], first[node + 1]):
             other = arcs[arc, 1] >> HEAD_SHIFT
             if may_follow >> (arcs[arc, 1] >> 6 & 63) & 1 == 0 or other == one:
@@ -439,6 +252,7 @@ def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
     at, lists, pool = patches
     base = lists[at[node], 0]
     n_stale = 0
+    # Its stale arcs, by the corners where they end; none to corners that cannot be passed.
     for position in range(first[node + 1] - first[node]):
         row = base + position
         head = pool[row, 1] >> HEAD_SHIFT
@@ -459,6 +273,8 @@ def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
                     near = class_of(kinds[node], dx, dy)
                     far = class_of(kinds[head], -dx, -dy)
                     _write(pool, row, cost, pack(head, near, far), -1)
+    # Each corner below with arcs to both ends of a stale one may join them. Those of its arcs that
+    # have changed were offered before; these have not.
     for k in range(begin[node], begin[node + 1] if n_stale else begin[node]):
         low = tails[into[k]]
         here = into[k] - first[low]
@@ -467,7 +283,7 @@ def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
             to_node, by = rows[here, 0], rows[here, 1]
         else:
             to_node, by = arcs[into[k], 0], arcs[into[k], 1]
-        may_follow = follow[kinds[low] & _KIND, by >> 6 & 63]
+        may_follow = follow[kinds[low] & KIND, by >> 6 & 63]
         for other in range(first[low + 1] - first[low]):
             row = row_of[arcs[first[low] + other, 1] >> HEAD_SHIFT] - 1
             if row < 0:
@@ -480,6 +296,7 @@ def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
                 past = np.int64(low) << 32 | here << 16 | other
                 head = packed >> HEAD_SHIFT
                 _write(pool, row, cost, pack(head, by & 63, packed & 63), past)
+    # The room of marks is left as it was.
     for position in range(first[node + 1] - first[node]):
         row_of[pool[base + position, 1] >> HEAD_SHIFT] = 0
 
@@ -536,10 +353,11 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
         nowhere = (0.0, 0.0, starts[:0])
         n = -1
         while n < 0:
-            n, _ = _see_round(mesh, around, (x, y, starts), nowhere, view, 0)
-            if n < 0:
+            n, _ = see_round(mesh, around, (x, y, starts), nowhere, view, 0)
+            if n < 0:  # there was no room
                 more = 2 * len(view[2])
                 view = np.empty((more, 2), np.int32), np.empty((more, 4)), np.empty(more, np.int32)
+        # Only segments along which a path may bend round it, each once.
         for k in range(n):
             other = np.int64(view[2][k])
             dx, dy = cx[other] - x, cy[other] - y
@@ -560,6 +378,7 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
         waiting += 1
         is_queued[node] = True
     after = np.empty(256, np.int32)
+    # A corner is taken once: what is offered to it comes from corners below.
     while waiting > 0 and not lists[0, 2]:
         node = pop(queue, waiting)
         waiting -= 1
@@ -583,7 +402,8 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
             a = base + one
             if pool[a, 3] == 0 or pool[a, 0] == FAR:
                 continue
-            may_follow = follow[kinds[node] & _KIND, pool[a, 1] >> 6 & 63]
+            # Only arcs that leave into the other quadrant, without a bend to the wrong side.
+            may_follow = follow[kinds[node] & KIND, pool[a, 1] >> 6 & 63]
             up = _rank_of(rank, pool[a, 1] >> HEAD_SHIFT, n_all)
             for near in classes[:n_classes]:
                 two = heads[near] if may_follow >> near & 1 else -1
@@ -592,6 +412,7 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
                     two = after[two]
                     if this == one or (pool[b, 3] and this < one):
                         continue
+                    # The new arc belongs to the lower one of the two ends.
                     low, high, to_low, to_high = a, b, one, this
                     if up > _rank_of(rank, pool[b, 1] >> HEAD_SHIFT, n_all):
                         low, high, to_low, to_high = b, a, this, one
