@@ -3,12 +3,15 @@
 Least times of many repeats, for each pair of ends, which other programs on the machine change
 little: of `planner.plan`, of the kernel inside it, and what `plan` and `distance` take beside it.
 Then what a second core can bring: the CPU time of a batch of all pairs and of a table, over that of
-the caller's thread plus half of the other threads'.
+the caller's thread plus half of the other threads'. And how many times more plans and distances,
+one at a time, four threads get in a second than one: wall time, the best of repeats that alternate.
+It counts on a quiet machine alone: on a busy one, more threads get a larger share of it.
 """
 
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +48,8 @@ COLUMNS = (
     "distance beside",
     "batch",
     "table",
+    "threads: plan",
+    "distance",
 )
 OPTIONS = (
     DATA,
@@ -93,6 +98,23 @@ def two_cores(ask: Callable[[], Any], repeats: int) -> float:
     return best[1]
 
 
+def four_threads(ask: Callable[..., Any], ends: Any, repeats: int) -> float:
+    """Return how many times more queries four threads get answered than one, by wall time."""
+    seconds = {1: np.inf, 4: np.inf}
+
+    def share(number: int, count: int) -> None:
+        for pair in ends[number::count]:
+            ask(*pair)
+
+    for count in [1, 4] * repeats:
+        with ThreadPoolExecutor(count) as pool:
+            list(pool.map(share, range(count), [count] * count))  # starts the threads
+            began = time.perf_counter()
+            list(pool.map(share, range(count), [count] * count))
+            seconds[count] = min(seconds[count], time.perf_counter() - began)
+    return seconds[1] / seconds[4]
+
+
 def measure(planner: hn.HybridPlanner, points: Any, repeats: int) -> list[str]:
     """Return the figures of one planner."""
     home, name = KERNELS[planner.preset.name]
@@ -109,6 +131,8 @@ def measure(planner: hn.HybridPlanner, points: Any, repeats: int) -> list[str]:
         two_cores(lambda: planner.plan_many(starts, goals), repeats),
         two_cores(lambda: planner.distances(starts[::4], goals[::4]), repeats),
     ]
+    asked = planner.plan, planner.distance
+    shares += [four_threads(ask, ends * 5, repeats) for ask in asked]
     times = [np.median(one) * 1e6 for one in (beside + inside, inside, beside, alone)]
     return [f"{one:.1f}" for one in times] + [f"{one:.2f}" for one in shares]
 

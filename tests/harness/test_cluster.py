@@ -118,6 +118,9 @@ def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
     cells = np.argwhere(grid.enterable())
     picked = np.random.default_rng(0).integers(len(cells), size=(2, 9))
     starts, goals = (grid.frame.points_of(cells[part]) for part in picked)
+    cluster.scale(2)
+    with distributed.Client(cluster) as client:
+        client.wait_for_workers(2, timeout=60)
     done: list[tuple[int, int]] = []
     there = partial(
         distances_on_cluster,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -149,10 +150,15 @@ class Planning:
         """Return the cells of a closure, None for no closure; the last ones are kept."""
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
+        # Areas and doors are found again as they are; a mapping has to be read.
+        known = self.closures
+        given = None if isinstance(blocked, Mapping) else known.get(blocked)
+        if given is not None:
+            return given
         # Loads shapely, which most queries do not need.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
-        closure, known = as_blocked(blocked), self.closures
+        closure = as_blocked(blocked)
         # Without a lock: two threads may compute the same cells.
         found = known.pop(closure.key, None)
         if found is None:
@@ -160,6 +166,8 @@ class Planning:
             solid = closure.solid_on(self.grid) if is_solid else None
             found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
         known[closure.key] = found  # the last one now
+        if not isinstance(blocked, Mapping):
+            known[blocked] = found
         for old in list(known)[:-_KEPT]:
             known.pop(old, None)
         return found

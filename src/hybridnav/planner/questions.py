@@ -79,7 +79,9 @@ class Questions:
         2.546
         """
         with self._query():
-            now, closed = self._now, self._closing([start, goal], blocked)
+            now, closed = self._now, blocked
+            if self._privacy is not None:
+                closed = self._closing([start, goal], blocked)
             return _distance(now, now.read(start, goal, None, closed, "anywhere"))
 
     def explain(

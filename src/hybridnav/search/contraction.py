@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hybridnav.search.kernels.contract import HEAD_SHIFT, contract, have_reverses, pack, renumbered
+from hybridnav.search.kernels.labels import grow_rows
 from hybridnav.search.kernels.unpack import NO_ARC, corners_between
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "NO_ARC",
     "contract",
     "corners_between",
+    "grow_rows",
     "have_reverses",
     "pack",
     "renumbered",

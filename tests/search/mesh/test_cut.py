@@ -214,7 +214,7 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
     search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
     if is_prepared:
         search.prepare()
-    round_it = DetourSearch(search.mesh, free, closed)
+    round_it = DetourSearch(search, free, closed)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         found, opened = round_it.path(*query), search.path(*query)
@@ -229,6 +229,29 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
 
+@settings(max_examples=examples(40), deadline=None)
+@given(closures(), seeds)
+def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(
+    case: tuple[Any, Any], seed: int
+) -> None:
+    free, closed = case
+    search = MeshSearch(build_mesh(free))
+    search.prepare()
+    parts = closed, closed[::2], closed[: len(closed) // 2]
+    rounds = [DetourSearch(search, free, part) for part in parts]
+    lefts = [without(free, part) for part in parts]
+    assume(lefts[0].any())
+    anew = [MeshSearch(build_mesh(left)) for left in lefts]
+    opened = MeshSearch(build_mesh(free))
+    for query in queries(lefts[0], seed):
+        for round_it, fresh in zip([*rounds, *rounds], [*anew, *anew], strict=True):
+            optimum = fresh.path(*query).length_cells
+            assert round_it.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
+            assert search.path(*query).length_cells == pytest.approx(
+                opened.path(*query).length_cells, abs=1e-9
+            )
+
+
 @settings(max_examples=examples(60), deadline=None)
 @given(closures(), seeds)
 def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
@@ -240,7 +263,7 @@ def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
     assume(left.any())
     mesh = renew_mesh(build_mesh(before), free, np.flatnonzero(before != free))
     search, anew = MeshSearch(mesh), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(mesh, free, closed)
+    round_it = DetourSearch(MeshSearch(mesh), free, closed)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         opened = search.path(*query)
@@ -256,7 +279,7 @@ def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -
     left = without(free, closed)
     assume(left.any())
     search = MeshSearch(build_mesh(free))
-    round_it = DetourSearch(search.mesh, free, closed)
+    round_it = DetourSearch(search, free, closed)
     cells, positions = zip(*queries(left, seed), strict=True)
     pairs = np.array(cells), np.array(positions)
     many = shortest_paths(
@@ -281,9 +304,21 @@ def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
     # Round the one blocked cell goes the path above or below: what lies on the other side is free.
     above = bool(opened.positions[1, 0] == 3)
     for cell, is_met in (((1 if above else 3, 4), False), ((3 if above else 1, 4), True)):
-        round_it = DetourSearch(search.mesh, free, np.array([cell[0] * 9 + cell[1]]))
+        round_it = DetourSearch(search, free, np.array([cell[0] * 9 + cell[1]]))
         assert round_it.is_met_by(opened) is is_met
         assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
+
+
+def test_a_hierarchy_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell() -> None:
+    free = np.ones((6, 9), np.bool_)
+    free[2, 4] = False
+    search = MeshSearch(build_mesh(free))
+    search.prepare()
+    for where, is_repaired in ((0.5, True), (0.0, False)):
+        round_it = DetourSearch(search, free, np.array([2 * 9 + 3, 3 * 9 + 5]))
+        found = round_it.path(((3, 3), (2, 8)), ((3.0 + where, 3.0 + where), (2.5, 8.5)))
+        assert round_it.is_ready is is_repaired
+        assert found.positions is not None
 
 
 @pytest.mark.parametrize("is_prepared", [False, True])
@@ -293,11 +328,11 @@ def test_two_cells_that_meet_at_a_corner_let_nothing_through(*, is_prepared: boo
     if is_prepared:
         search.prepare()
     query = ((0, 0), (3, 3)), ((0.5, 0.5), (3.5, 3.5))
-    apart = DetourSearch(search.mesh, free, np.array([1 * 4 + 2, 2 * 4 + 1]))
+    apart = DetourSearch(search, free, np.array([1 * 4 + 2, 2 * 4 + 1]))
     opened = search.path(*query)
     assert apart.is_met_by(opened)
     assert apart.path(*query).length_cells > opened.length_cells
-    one = DetourSearch(search.mesh, free, np.array([1 * 4 + 2]))
+    one = DetourSearch(search, free, np.array([1 * 4 + 2]))
     assert not one.is_met_by(opened)
 
 
@@ -325,7 +360,7 @@ def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
     assume(left.any())
     search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
     search.prepare()
-    round_it = DetourSearch(search.mesh, free, closed)
+    round_it = DetourSearch(search, free, closed)
     rng = np.random.default_rng(seed)
     (a, b), (c, d) = rng.choice(np.argwhere(left), 2).tolist()
     query = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
@@ -353,7 +388,7 @@ def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
     left = without(free, closed)
     assume(left.any())
     search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(search.mesh, free, closed)
+    round_it = DetourSearch(search, free, closed)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         found = round_it.path(*query, epsilon=epsilon)

@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -200,13 +200,17 @@ class OverMesh(Method):
         if search is None:
             bound = math.dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
-        began = time.perf_counter()
-        found = search.path(query.cells, positions, epsilon=self._epsilon, budget_s=self._budget_s)
-        closed, expanded = query.closed, found.expanded
+        began, closed = time.perf_counter(), query.closed
+        detours = None if closed is None else self._round(search, closed)
+        effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
+        if detours is not None and detours.is_ready:
+            found = detours.path(query.cells, positions, **effort)
+            return found, found.expanded
+        found = search.path(query.cells, positions, **effort)
+        expanded = found.expanded
         is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
-        if closed is None or is_cut_off:
+        if detours is None or is_cut_off:
             return found, expanded
-        detours = self._round(search, closed)
         if found.positions is None or detours.is_met_by(found):
             bound = found.lower_bound_cells
             left_s = self._budget_s
@@ -336,7 +340,7 @@ class OverMesh(Method):
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            known = search.mesh, self._free, closed.flat, self._scratch
+            known = search, self._free, closed.flat, self._scratch
             found = self._detours[closed] = DetourSearch(*known)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)

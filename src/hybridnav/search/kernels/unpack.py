@@ -16,14 +16,18 @@ def _unpack(arcs, entry, nodes, count):
     of the arc, or -1 minus that number if it is passed backwards. Return the corners, a new array
     if there was no room, and their number.
     """
-    first, middles = arcs
+    first, middles, at, lists, pool = arcs
     stack = np.empty((64, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = entry
     depth = 1
     while depth > 0:
         depth -= 1
         tail, head, arc = stack[depth, 0], stack[depth, 1], stack[depth, 2]
-        past = middles[max(arc, -1 - arc)] if middles.size > 0 else NO_ARC
+        number, past = max(arc, -1 - arc), np.int64(NO_ARC)
+        if number < middles.size:
+            past = middles[number]
+        elif len(pool):
+            past = pool[number - middles.size, 2]
         if past < 0:
             if count == nodes.size:
                 nodes = np.concatenate((nodes, nodes))
@@ -33,7 +37,10 @@ def _unpack(arcs, entry, nodes, count):
         if depth + 2 > stack.shape[0]:
             stack = np.concatenate((stack, stack))
         middle = past >> 32
-        back, on = first[middle] + (past >> 16 & 0xFFFF), first[middle] + (past & 0xFFFF)
+        low = first[middle] if middle < first.size else 0
+        if at.size and at[middle]:
+            low = middles.size + lists[at[middle], 0]
+        back, on = low + (past >> 16 & 0xFFFF), low + (past & 0xFFFF)
         if arc < 0:
             back, on = on, back
         stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, head, on
@@ -51,7 +58,7 @@ def corners_between(arcs, meeting, records):
     ----------
     arcs
         Offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
-        graph that is not contracted.
+        graph that is not contracted. The patches of `repair`, empty without any.
     meeting
         The corner where the searches from both endpoints meet.
     records

@@ -5,7 +5,7 @@ graph of its corners at which paths bend, with landmarks.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pythoncdt
@@ -344,6 +344,26 @@ _LOOKED_AN_EDGE = 110
 does not begin: on five of the six real maps on which it would be given up."""
 
 
+def read_only(*arrays: Any) -> tuple[Any, ...]:
+    """Return views of arrays that cannot be written: kernels are compiled for these."""
+    views = tuple(array.view() for array in arrays)
+    for view in views:
+        view.flags.writeable = False
+    return views
+
+
+_NO_ROWS = np.empty((0, 4), np.int64)
+NOTHING_CLOSED = (
+    read_only(np.empty(0, np.int32), _NO_ROWS, _NO_ROWS),
+    (
+        read_only(np.array([1, 0, 1, -1]), np.zeros(1, np.int64), np.empty(0, np.int64)),
+        *read_only(np.empty((0, 0), np.bool_), np.empty(0, np.int32), np.empty(0, np.int32)),
+        0,
+    ),
+)
+"""Patches of a hierarchy, and what is closed, while nothing is; see `kernels.repairs`."""
+
+
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class CornerHierarchy:
@@ -364,9 +384,9 @@ class CornerHierarchy:
     """int64 (4, 64), the classes that may follow each class on a shortest path."""
 
     @property
-    def arrays(self) -> tuple[IntArray, LongArray, LongArray, LongArray]:
-        """The arrays in the order of the kernels."""
-        return self.first, self.arcs, self.middles, self.follow
+    def arrays(self) -> tuple[Any, ...]:
+        """The arrays in the order of the kernels, with nothing closed."""
+        return self.first, self.arcs, self.middles, self.follow, NOTHING_CLOSED
 
 
 def contract_corners(
@@ -403,7 +423,4 @@ def contract_corners(
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
     if len(arcs) and not len(found[1]):
         return None
-    kept = CornerHierarchy(found[0], found[1], found[2], follow)
-    for array in kept.arrays:
-        array.flags.writeable = False
-    return kept
+    return CornerHierarchy(*read_only(found[0], found[1], found[2], follow))

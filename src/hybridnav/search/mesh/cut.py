@@ -13,16 +13,34 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import SHARES, Pool, cores
-from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
+from hybridnav.search.mesh.build import (
+    ConvexMesh,
+    CornerHierarchy,
+    merge_triangles,
+    read_only,
+    select_triangles,
+    triangulate,
+)
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
 from hybridnav.search.mesh.kernels.polyanya import WORK_FULL
 from hybridnav.search.mesh.kernels.queries import ANSWERS_FULL, many
-from hybridnav.search.mesh.search import NO_LIMIT, SURE, MeshPath, MeshSearch, rounded_into
+from hybridnav.search.mesh.kernels.repairs import repair
+from hybridnav.search.mesh.search import (
+    MOST_NEW,
+    NO_LIMIT,
+    SURE,
+    MeshPath,
+    MeshSearch,
+    round_into,
+    rounded_into,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 
 
@@ -32,6 +50,8 @@ _ROOM = 16
 """Initial room for positions, per path."""
 _LEAST = 64
 """Least number of queries that justifies a thread."""
+_PATCHED = 1 << 16
+"""Initial room for arcs of corners whose arcs change round closed cells."""
 _MANY = 1000
 """Least number of queries that justifies the graph of corners."""
 
@@ -320,12 +340,13 @@ Position = tuple[float, float]
 class DetourSearch:
     """Exact shortest any-angle paths round closed cells; threads may share it.
 
-    The closed cells are cut out of the mesh, by the first query that needs it.
+    The first query that needs it repairs the hierarchy of corners round the closed cells. Where
+    there is none, and for ends at a corner of a closed cell, these cells are cut out of the mesh.
 
     Parameters
     ----------
-    mesh
-        The mesh of the map with these cells open.
+    opened
+        The search of the map with these cells open.
     free
         bool (rows, cols), its free cells.
     closed
@@ -336,9 +357,9 @@ class DetourSearch:
 
     Examples
     --------
-    >>> from hybridnav.search.mesh import DetourSearch, build_mesh
+    >>> from hybridnav.search.mesh import DetourSearch, MeshSearch, build_mesh
     >>> free = np.ones((3, 5), dtype=bool)
-    >>> detour = DetourSearch(build_mesh(free), free, np.array([2, 7]))
+    >>> detour = DetourSearch(MeshSearch(build_mesh(free)), free, np.array([2, 7]))
     >>> detour.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
     array([[0.5, 0.5],
            [2. , 2. ],
@@ -348,28 +369,63 @@ class DetourSearch:
 
     def __init__(
         self,
-        mesh: ConvexMesh,
+        opened: MeshSearch,
         free: BoolArray,
         closed: LongArray,
         scratch: Pool[BoolArray] | None = None,
     ) -> None:
-        self._mesh, self._free = mesh, free
+        self._open, self._free = opened, free
         self._scratch = Pool(partial(np.copy, free)) if scratch is None else scratch
         self._closed = closed[free.ravel()[closed]]
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
+        self._repaired: tuple[Any, Any] | None = None
 
     @property
     def search(self) -> MeshSearch:
         """The search of the mesh without the closed cells."""
         # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
         if self._search is None:
-            free = self._scratch.take()
-            free.ravel()[self._closed] = False
-            self._search = MeshSearch(renew_mesh(self._mesh, free, self._closed))
-            free.ravel()[self._closed] = True
-            self._scratch.give(free)
+            self._search = self._without(
+                lambda left: MeshSearch(renew_mesh(self._open.mesh, left, self._closed))
+            )
         return self._search
+
+    def _without(self, make: Callable[[BoolArray], Any]) -> Any:
+        """Return what is made of the free cells that are not closed."""
+        left = self._scratch.take()
+        left.ravel()[self._closed] = False
+        made = make(left)
+        left.ravel()[self._closed] = True
+        self._scratch.give(left)
+        return made
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether paths are found round the closed cells as quickly as with them open."""
+        return self._repaired is not None
+
+    def repaired(self) -> tuple[Any, Any] | None:
+        """Return the corners, and their hierarchy round the closed cells; None without one."""
+        opened, graph = self._open, self._open.graph
+        if self._repaired is not None or not isinstance(graph, CornerHierarchy):
+            return self._repaired
+        xs, ys, kinds, *new = self._without(
+            lambda left: kernels.corners_round(
+                opened.arrays, self._closure, self._closed, left, opened.place
+            )
+        )
+        n_corners = len(opened.mesh.corners)
+        if len(xs) > n_corners + MOST_NEW:
+            return None
+        corners = xs, ys, *read_only(kinds), *opened.arrays[3:]
+        around = read_only(*self._closure), *read_only(self._free, *new), n_corners
+        arrays = graph.arrays[:4]
+        known, room = (opened.footing, around, opened.edges, opened.place), _PATCHED
+        while not len((patches := repair(corners, arrays, *known, room))[1]):
+            room *= 4
+        self._repaired = corners, (*arrays, (read_only(*patches), around))
+        return self._repaired
 
     def is_met_by(self, path: MeshPath) -> bool:
         """Return whether a shortest path between open cells is illegal with these cells closed.
@@ -402,6 +458,11 @@ class DetourSearch:
     ) -> MeshPath:
         """Find a shortest path between two positions, as `MeshSearch.path` does."""
         until = math.inf if budget_s is None else perf_counter() + budget_s
-        search = self.search
+        ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
+        at_corner = (ends == np.floor(ends)).all(axis=1).any()
+        repaired = None
+        if not (at_corner and kernels.path_crosses(self._closure, self._free, ends)):
+            repaired = self.repaired()
+        search = self.search if repaired is None else self._open
         left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s)
+        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=repaired)

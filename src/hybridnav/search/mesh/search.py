@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from functools import partial
+from functools import cached_property, partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -25,6 +25,7 @@ from hybridnav.search.mesh.build import (
 from hybridnav.search.mesh.hubs import HubLabels, label_corners
 from hybridnav.search.mesh.kernels import hubs, polyanya
 from hybridnav.search.mesh.kernels.queries import answer
+from hybridnav.search.mesh.kernels.repairs import footing_of
 
 if TYPE_CHECKING:
     from hybridnav._base.progress import Progress
@@ -45,6 +46,8 @@ NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
 _ALONE = math.inf, 0.0, 0.0
 """Effort of a query by hub labels for the length alone: no time for the path."""
+MOST_NEW = 1024
+"""Most corners that closed cells may add to the hierarchy."""
 SURE = 1.0 - 1e-12
 """Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
 _WORTH = 20_000
@@ -129,7 +132,7 @@ class _HierarchyWork(_Work):
 
     def __init__(self, mesh: ConvexMesh) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners)
+        n = len(mesh.corners) + MOST_NEW
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         self.records, self.touched = np.full((n, 4), FAR), np.empty(n, np.int32)
         self.heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
@@ -249,6 +252,8 @@ class MeshSearch:
                 if graph is None:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
+            if isinstance(graph, CornerHierarchy):
+                _ = self.footing
             progress(2, 2)
 
     def adopt(
@@ -265,6 +270,13 @@ class MeshSearch:
             self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
         self.edges, self._graph = edges, graph
         self.is_prepared = True
+
+    @cached_property
+    def footing(self) -> tuple[Any, ...]:
+        """What repairs need of the hierarchy; see `kernels.repairs`."""
+        assert isinstance(self._graph, CornerHierarchy)  # noqa: S101 - the caller has looked
+        footing: tuple[Any, ...] = footing_of(self.arrays, self._graph.arrays[:4])
+        return footing
 
     def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
         """Build hub labels of the corners, which answer later queries in microseconds.
@@ -296,7 +308,7 @@ class MeshSearch:
         graph = self._graph
         return graph, self.works if graph is None else self.corner_works
 
-    def path(
+    def path(  # noqa: PLR0913 - all but two have defaults
         self,
         cells: tuple[Cell, Cell],
         positions: tuple[Position, Position],
@@ -304,6 +316,7 @@ class MeshSearch:
         epsilon: float = 0.0,
         budget_s: float | None = None,
         known: FloatArray | None = None,
+        repaired: tuple[Any, Any] | None = None,
     ) -> MeshPath:
         """Find a shortest path between two positions.
 
@@ -322,6 +335,8 @@ class MeshSearch:
             float64 (n, 2), a path from start to goal in free space: the answer until the search
             finds a shorter one. With epsilon the search ends as soon as this path is proved good
             enough; without epsilon it saves little.
+        repaired
+            Corners and hierarchy round closed cells, see `DetourSearch`; None with nothing closed.
 
         Returns
         -------
@@ -341,9 +356,11 @@ class MeshSearch:
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        graph, works = self.engine()
+        graph, works = self.engine() if repaired is None else (self._graph, self.corner_works)
+        arrays = self.blocks if graph is None else graph.arrays
+        on = (self.arrays, arrays) if repaired is None else repaired
         work = works.take()
-        _, path, length, bound, expanded = self._run(graph, ends, work, (upper, epsilon, until))
+        _, path, length, bound, expanded = self._run(on, ends, work, (upper, epsilon, until))
         works.give(work)
         if graph is None:
             self.expanded += expanded
@@ -354,18 +371,20 @@ class MeshSearch:
         self, cells: tuple[Cell, Cell], positions: tuple[Position, Position], *, epsilon: float
     ) -> float:
         """Return the length in cells of the path that `path` finds, infinite for none."""
-        if self.labels is None:
+        graph, works = self.engine()
+        if graph is None:
             return self.path(cells, positions, epsilon=epsilon).length_cells
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        work = self._hub_works.take()
-        length = self._run(self.labels, ends, work, _ALONE)[2]
-        self._hub_works.give(work)
+        effort = (math.inf, epsilon, math.inf) if self.labels is None else _ALONE
+        work = works.take()
+        length = self._run((self.arrays, graph.arrays), ends, work, effort)[2]
+        works.give(work)
         return length
 
     def _run(
         self,
-        graph: CornerGraph | CornerHierarchy | HubLabels | None,
+        on: tuple[Any, Any],
         ends: tuple[tuple[int, ...], tuple[float, ...]],
         work: Any,
         effort: tuple[float, float, float],
@@ -373,10 +392,9 @@ class MeshSearch:
         """Run a kernel in slices until it is done, or out of time; see `answer`."""
         upper, epsilon, until = effort
         limit = 0 if not until else NO_LIMIT if until == math.inf else SLICE
-        arrays: Any = self.blocks if graph is None else graph.arrays
         while True:
             left = upper, 1.0 + epsilon, limit
-            found = answer(self.arrays, arrays, self.place, ends, (work.arrays, work.told), left)
+            found = answer(*on, self.place, ends, (work.arrays, work.told), left)
             status = found[0]
             if status == polyanya.DONE:
                 return cast("tuple[int, FloatArray, float, float, int]", found)

@@ -1,4 +1,4 @@
-"""Kernels of closed cells: whether a path of free space meets them.
+"""Kernels of closed cells: whether a path of free space meets them, and views past them.
 
 Points are x = column, y = row in grid units, as for the search of intervals: the endpoints of a
 query are rounded so that every side test is exact (see `turn_of`). Floats choose the candidate
@@ -8,10 +8,25 @@ cells, with a margin; side tests alone decide whether a segment meets a cell.
 import math
 
 import numpy as np
+from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
+from hybridnav.search.contraction import grow_rows
+from hybridnav.search.mesh.kernels.corner_search import (
+    APART,
+    MET,
+    polygon_in,
+    polygons_of_endpoints,
+    polygons_with,
+)
+from hybridnav.search.mesh.kernels.polyanya import DONE, PAUSED, WORK_FULL
+from hybridnav.search.mesh.kernels.views import distance, has_target, see_from_point, touches
 
+CHANGED, DEAD = 4, 8
+"""Bits of a kind: the corner touches a closed cell, so that no path bends there; all cells at it
+are closed or blocked, or two that meet there alone, so that no path passes it."""
+KIND = 3
 _MARGIN = 1e-6
 """Rounding of the point where a segment meets a row of cells, in cells."""
 
@@ -142,12 +157,14 @@ def is_beside(box, ax, ay, bx, by):
 
     `box` holds their first and last row, first and last column.
     """
-    return (
-        max(ay, by) >= box[0]
-        and min(ay, by) <= box[1] + 1
-        and max(ax, bx) >= box[2]
-        and min(ax, bx) <= box[3] + 1
-    )
+    low_y, high_y, low_x, high_x = box[0], box[1] + 1, box[2], box[3] + 1
+    if max(ay, by) < low_y or min(ay, by) > high_y or max(ax, bx) < low_x or min(ax, bx) > high_x:
+        return False
+    # The line may pass all four corners of the box on one side.
+    dx, dy = bx - ax, by - ay
+    left = max(dx * (low_y - ay), dx * (high_y - ay)) - min(dy * (low_x - ax), dy * (high_x - ax))
+    right = min(dx * (low_y - ay), dx * (high_y - ay)) - max(dy * (low_x - ax), dy * (high_x - ax))
+    return left >= -_MARGIN and right <= _MARGIN
 
 
 @njit(cache=True, nogil=True)
@@ -216,3 +233,189 @@ def paths_cross(closure, free, positions, starts):
     for k in range(len(found)):
         found[k] = path_crosses(closure, free, positions[starts[k] : starts[k + 1]])
     return found
+
+
+# The corners of closed cells, and views past these cells.
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def corners_round(mesh, closure, closed, left, place):
+    """Find the corners that closed cells have, and those at which paths bend no more.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    closure, closed
+        See `closure_of`; the flat cells.
+    left
+        bool (rows, cols), free cells that are not closed.
+    place
+        Component of polygons, and the polygon of each cell.
+
+    Returns
+    -------
+    tuple
+        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32
+        polygons that contain a new corner, sorted, and which.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    box = closure[0]
+    rows, cols = left.shape
+    n, n_new = len(kinds), 0
+    found = np.empty((64, 3), np.int64)
+    # A corner of a closed cell whose other three cells are free, found from that cell alone.
+    for cell in closed:
+        row, col = cell // cols, cell % cols
+        for k in range(4):
+            down, side = row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1
+            if not (0 <= down < rows and 0 <= side < cols):
+                continue
+            if left[down, col] and left[row, side] and left[down, side]:
+                if n_new == len(found):
+                    found = grow_rows(found)
+                # Seen from the corner, the cell lies on the other side than the corner from it.
+                found[n_new, 0], found[n_new, 1] = col + (k & 1), row + (k >> 1)
+                found[n_new, 2] = 3 - k
+                n_new += 1
+    xs, ys = np.empty(n + n_new), np.empty(n + n_new)
+    every = np.empty(n + n_new, np.uint8)
+    xs[:n], ys[:n], every[:n] = cx, cy, kinds
+    for k in range(n_new):
+        xs[n + k], ys[n + k], every[n + k] = found[k, 0], found[k, 1], found[k, 2]
+    # Corners that touch a closed cell have two cells or more that are not free.
+    for corner in range(n):
+        x, y = cx[corner], cy[corner]
+        if y < box[0] or y > box[1] + 1 or x < box[2] or x > box[3] + 1 or kinds[corner] > KIND:
+            continue
+        row, col = int(y), int(x)
+        a = row > 0 and col > 0 and left[row - 1, col - 1]
+        b = row > 0 and col < cols and left[row - 1, col]
+        c = row < rows and col > 0 and left[row, col - 1]
+        d = row < rows and col < cols and left[row, col]
+        n_free = int(a) + int(b) + int(c) + int(d)
+        if n_free < 3:
+            every[corner] |= CHANGED
+        if n_free == 0 or (n_free == 2 and a == d):
+            every[corner] |= DEAD
+    # The polygons with each new corner: views are told of it there.
+    room, listed = np.empty(len(place[0]), np.int32), np.empty((64, 2), np.int64)
+    n_listed = 0
+    for k in range(n_new):
+        x, y = found[k, 0], found[k, 1]
+        inner = polygon_in(mesh, place[0], place[1], y, x)
+        for polygon in room[: polygons_with(mesh, inner, y, x, float(x), float(y), room)]:
+            if n_listed == len(listed):
+                listed = grow_rows(listed)
+            listed[n_listed, 0], listed[n_listed, 1] = polygon, k
+            n_listed += 1
+    # Sorted, so that a view finds those of its polygon by halving.
+    order = np.argsort(listed[:n_listed, 0])
+    polygons, members = np.empty(n_listed, np.int32), np.empty(n_listed, np.int32)
+    for k in range(n_listed):
+        polygons[k], members[k] = listed[order[k], 0], listed[order[k], 1]
+    return xs, ys, every, polygons, members
+
+
+# Views round closed cells.
+
+
+@overload(has_target)
+def _has_new_corners(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
+    """Return what stands for `has_target` for new corners, which are marked, and one point."""
+
+    def mark(target, polygon, x, y, rays):
+        polygons, members, xs, ys, is_seen, tx, ty, goals = target
+        lx, ly, rx, ry = rays
+        k = np.searchsorted(polygons, polygon)
+        while k < len(polygons) and polygons[k] == polygon:
+            one = members[k]
+            if turn_of(x, y, rx, ry, xs[one], ys[one]) >= 0:
+                is_seen[one] |= turn_of(x, y, lx, ly, xs[one], ys[one]) <= 0
+            k += 1
+        for goal in goals:
+            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
+                return turn_of(x, y, lx, ly, tx, ty) <= 0
+        return False
+
+    return mark if len(target) == 8 else None
+
+
+@njit(cache=True, nogil=True)
+def see_round(mesh, around, place, goal, room, found):
+    """Find the corners seen from a point, past closed cells; see `see_from_point`.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`, with the corners and kinds of `corners_round`.
+    around
+        Closure, free cells, polygons of new corners, and which; see `look_round`.
+    place
+        x and y of the point, and int32 polygons that contain it.
+    goal
+        x and y of another point, and int32 polygons that contain it.
+    room, found
+        See `see_from_point`.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    closure, free, polygons, members, n_old = around
+    x, y, starts = place
+    seen = room[2]
+    is_seen = np.zeros(len(cx) - n_old, np.bool_)
+    for polygon in starts:
+        k = np.searchsorted(polygons, polygon)
+        while k < len(polygons) and polygons[k] == polygon:
+            is_seen[members[k]] = True
+            k += 1
+    target = (polygons, members, cx[n_old:], cy[n_old:], is_seen, *goal)
+    n, is_goal_seen = see_from_point(mesh, x, y, starts, target, room, found)
+    if n < 0 or n + len(is_seen) > len(seen):
+        return -1, False
+    kept = found
+    for k in range(found, n):
+        corner = seen[k]
+        if not crosses(closure, free, x, y, cx[corner], cy[corner]):
+            seen[kept] = corner
+            kept += 1
+    for corner in range(n_old, len(cx)):
+        if (
+            is_seen[corner - n_old]
+            and touches(kinds[corner], cx[corner] - x, cy[corner] - y)
+            and not crosses(closure, free, x, y, cx[corner], cy[corner])
+        ):
+            seen[kept] = corner
+            kept += 1
+    return kept, is_goal_seen
+
+
+@njit(cache=True, nogil=True)
+def look_round(mesh, where, endpoints, rooms, bounds, around):
+    """Do the same as `look_from_endpoints` past closed cells.
+
+    Neither end is a corner of a closed cell. `around` holds the closure (see `closure_of`), the
+    free cells before, int32 polygons of new corners, and which corners these are; the number of
+    corners before.
+    """
+    sx, sy, tx, ty = endpoints
+    component, polygon_at, cells = where
+    starts, goals, room = rooms
+    how, n_starts, n_goals = polygons_of_endpoints(
+        mesh, component, polygon_at, cells, endpoints, starts, goals
+    )
+    if how == APART:
+        bounds[:] = np.inf
+        return DONE, 0, 0
+    nowhere = (0.0, 0.0, starts[:0])
+    n, _ = see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
+    if n < 0:
+        return WORK_FULL, 0, 0
+    target = (tx, ty, goals[:n_goals] if how != MET else starts[:0])
+    n_all, is_seen = see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
+    if n_all < 0:
+        return WORK_FULL, 0, 0
+    if (is_seen or how == MET) and not crosses(around[0], around[1], sx, sy, tx, ty):
+        bounds[:] = distance(sx, sy, tx, ty)
+        return DONE, 0, 0
+    return PAUSED, n, n_all

@@ -12,6 +12,7 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
+from hybridnav.search.mesh.kernels.closures import look_round
 from hybridnav.search.mesh.kernels.corner_search import (
     APART,
     MET,
@@ -229,7 +230,7 @@ def _answer(mesh, graph, place, where, points, work, effort):
     """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
     if isinstance(graph[1], tuple):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
-    kernel = {3: query_corners, 4: query_hierarchy}.get(len(graph), query_hubs)
+    kernel = {3: query_corners, 5: query_hierarchy}.get(len(graph), query_hubs)
     return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
@@ -253,7 +254,7 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
         return by_intervals
     if len(graph) == 3:
         return by_corners
-    return by_hierarchy if len(graph) == 4 else by_hubs
+    return by_hierarchy if len(graph) == 5 else by_hubs
 
 
 # Kernels of the search of the hierarchy of corners: shortest any-angle paths.
@@ -273,7 +274,8 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     mesh, endpoints
         See `successors`.
     hierarchy
-        Results of `contract` and `classes_that_follow`.
+        Results of `contract` and `classes_that_follow`; patches of `repair` with what `look_round`
+        needs, all empty if nothing is closed.
     where
         See `look_from_endpoints`.
     work
@@ -295,9 +297,12 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        status, n, n_all = look_from_endpoints(
-            mesh, where, endpoints, (starts, goals, room), bounds
-        )
+        patches, around = hierarchy[4]
+        rooms = starts, goals, room
+        if len(patches[0]):
+            status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
+        else:
+            status, n, n_all = look_from_endpoints(mesh, where, endpoints, rooms, bounds)
         if n_all > len(heaps[0]):
             status = WORK_FULL
         if status == WORK_FULL:
@@ -314,8 +319,8 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         if status != DONE:
             return status, path
     if counts[LAST] >= 0:
-        first, _, middles, _ = hierarchy
-        nodes = corners_between((first, middles), counts[LAST], records)
+        first, _, middles, _, (patches, _) = hierarchy
+        nodes = corners_between((first, middles, *patches), counts[LAST], records)
         path = _path_through(mesh, endpoints, nodes)
         is_proved = bounds[LOWER] >= bounds[UPPER]
         bounds[UPPER] = 0.0
@@ -355,7 +360,7 @@ def _seed(mesh, endpoints, seen, direction, work):
 def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, arcs, _, follow = hierarchy
+    first, arcs, _, follow, ((at, lists, pool), _) = hierarchy
     _, _, _, records, touched, heaps, counts, bounds = work
     sx, sy, tx, ty = endpoints
     to_start, to_goal, n_touched = counts[SIZE], counts[MARKED], counts[TOUCHED]
@@ -377,7 +382,13 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         direction = 0 if low_start <= low_goal else 1
         heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
-        low, high = first[node], first[node + 1]
+        # Arcs of a patched corner are numbered behind those of the hierarchy.
+        behind, is_patched = 0, len(at) > 0 and at[node] > 0
+        if is_patched:
+            behind = len(arcs)
+            low, high = lists[at[node], 0], lists[at[node], 0] + lists[at[node], 1]
+        else:
+            low, high = np.int64(first[node]), np.int64(first[node + 1])
         if size + high - low > len(heap):
             status = WORK_FULL
             break
@@ -405,11 +416,16 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
             # nothing out.
             by, may_follow = records[node, 2 + direction], np.int64(-1)
             if by != NO_ARC:
-                may_follow = follow[kinds[node], arcs[by & 0xFFFFFFFF, 1] & 63]
+                last = by & 0xFFFFFFFF
+                came = arcs[last, 1] if last < len(arcs) else pool[last - len(arcs), 1]
+                may_follow = follow[kinds[node] & 3, came & 63]
             elif from_x != x or from_y != y:
-                may_follow = follow[kinds[node], class_of(kinds[node], from_x - x, from_y - y)]
+                may_follow = follow[kinds[node] & 3, class_of(kinds[node], from_x - x, from_y - y)]
             for arc in range(low, high):
-                packed, further = arcs[arc, 1], cost + arcs[arc, 0]
+                if is_patched:
+                    packed, further = pool[arc, 1], cost + pool[arc, 0]
+                else:
+                    packed, further = arcs[arc, 1], cost + arcs[arc, 0]
                 other = packed >> 12
                 known = records[other, direction]
                 if may_follow >> (packed >> 6 & 63) & 1 == 0 or known <= further:
@@ -422,7 +438,10 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1
-                records[other, direction], records[other, 2 + direction] = further, node << 32 | arc
+                records[other, direction], records[other, 2 + direction] = (
+                    further,
+                    node << 32 | behind + arc,
+                )
                 push(heap, size, estimate, other)
                 size += 1
         if direction:
