@@ -29,14 +29,9 @@ _UNPROCESSABLE = 422
 class HttpTools:
     """The functions of the floors of a page.
 
-    Parameters
-    ----------
-    session_of
-        Returns the session of the floor that a request names.
-    body_of
-        Returns the value of the body of a request, or the response that refuses it.
-    allow_edits
-        Whether what changes something is answered.
+    `session_of`: returns the session of the floor that a request names; `body_of`: returns the
+    value of the body of a request, or the response that refuses it; `allow_edits`: whether what
+    changes something is answered.
     """
 
     def __init__(

@@ -41,13 +41,7 @@ class UnclearError(HybridNavError):
 
 
 class NamedPlaces:
-    """The rooms and doors of one map, by what programs call them.
-
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    """
+    """The rooms and doors of one map, by what programs call them."""
 
     def __init__(self, rooms: Rooms) -> None:
         self.rooms = rooms
@@ -81,10 +75,7 @@ class NamedPlaces:
     def meant(self, name: str, known: list[str], what: str) -> str:
         """Return the one name that a text means.
 
-        Raises
-        ------
-        UnclearError
-            When it means none, or several.
+        Raises `UnclearError` when it means none, or several.
         """
         if name in known:
             return name

@@ -207,16 +207,9 @@ def placed_pose(
     the graph's points that lie in walls or outside the map. The links that are near to theirs by
     this pose are fitted once more, by least squares.
 
-    Parameters
-    ----------
-    own
-        float64 (n, 2), the ends of links in the graph, metres, at least one.
-    wanted
-        float64 (n, 2), those of the building, in the frame of the map.
-    graph
-        float64 (k, 2), points of the graph where a robot should fit, in the frame of `own`.
-    grid
-        The map.
+    `own`: float64 (n, 2), the ends of links in the graph, metres, at least one; `wanted`: float64
+    (n, 2), those of the building, in the frame of the map; `graph`: float64 (k, 2), points of the
+    graph where a robot should fit, in the frame of `own`.
     """
     whole = fitted_pose(own, wanted)
     if _away(own, wanted, whole).max() <= _AGREED_M:

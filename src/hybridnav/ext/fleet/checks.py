@@ -34,11 +34,8 @@ _LEAST_PART = 0.05
 def check_floors(floors: Sequence[Floor]) -> None:
     """Refuse floors that do not make one building for one robot.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is none, a name occurs twice, or their planners plan by different presets, for
-        different robots, or with headings.
+    Raises `InvalidValueError` when there is none, a name occurs twice, or their planners plan by
+    different presets, for different robots, or with headings.
     """
     if not floors:
         raise InvalidValueError("a building needs at least one floor, got none")
@@ -75,10 +72,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
 
     Links that the robot does not fit in need no free ends.
 
-    Raises
-    ------
-    InvalidValueError
-        When a link is refused.
+    Raises `InvalidValueError` when a link is refused.
     """
     known = {floor.name: floor for floor in floors}
     seen: set[str] = set()
@@ -97,10 +91,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
 def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
     """Refuse a link that stops at no floor of a name, or where this robot cannot stand.
 
-    Raises
-    ------
-    InvalidValueError
-        When an end is refused.
+    Raises `InvalidValueError` when an end is refused.
     """
     for end in link.ends:
         if end.floor not in floors:
@@ -133,10 +124,8 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
 def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Link]) -> None:
     """Refuse to close what is not in a building.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is no such link, floor, door or room, or a door or a room lacks its floor.
+    Raises `InvalidValueError` when there is no such link, floor, door or room, or a door or a room
+    lacks its floor.
     """
     names = tuple(floor.name for floor in floors)
     if item.link is not None:
@@ -169,19 +158,9 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
     A floor may consist of several parts, as two wings without a passage do, but an end lies in none
     that is smaller than a twentieth of the largest.
 
-    Parameters
-    ----------
-    link
-        The link, whose ends have been checked.
-    floors
-        The floors of the building, by their names.
-    parts
-        The parts of each floor.
-
-    Raises
-    ------
-    InvalidValueError
-        When an end lies in such a part.
+    `link`: the link, whose ends have been checked; `floors`: the floors of the building, by their
+    names; `parts`: the parts of each floor. Raises `InvalidValueError` when an end lies in such a
+    part.
     """
     for end in link.ends:
         grid = floors[end.floor].planner.grid
@@ -205,14 +184,8 @@ def parts_of(
     """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
     robot may not be.
 
-    Parameters
-    ----------
-    floor
-        The floor.
-    allow_unexplored
-        Whether the robot enters unexplored cells.
-    closed
-        int64 (n,), flat cells that are closed besides.
+    `allow_unexplored`: whether the robot enters unexplored cells; `closed`: int64 (n,), flat cells
+    that are closed besides.
     """
     from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
 
@@ -229,10 +202,7 @@ def parts_of(
 def check_speed(speed_m_s: float) -> float:
     """Return a speed, refuse what is none.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is not a finite number above 0.
+    Raises `InvalidValueError` when it is not a finite number above 0.
     """
     if not (math.isfinite(speed_m_s) and speed_m_s > 0):
         raise InvalidValueError(
@@ -247,20 +217,9 @@ def check_speed(speed_m_s: float) -> float:
 def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
     """Return the floor of a start or goal, and the point or name on it.
 
-    Parameters
-    ----------
-    what
-        "start" or "goal".
-    given
-        What the caller gave.
-    floors
-        The floors of the building.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is neither, the floor or the name is not known, the name is on several floors, or
-        the point is not two finite numbers.
+    `what`: "start" or "goal"; `given`: what the caller gave; `floors`: the floors of the building.
+    Raises `InvalidValueError` when it is neither, the floor or the name is not known, the name is
+    on several floors, or the point is not two finite numbers.
     """
     if isinstance(given, str):
         index, waypoint = _floor_of_name(given, floors), given

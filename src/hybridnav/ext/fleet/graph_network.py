@@ -109,14 +109,8 @@ class BuildingNetwork:
     `graphs.GraphMethod`, floor by floor. A ride costs what the building's link charges, and the
     straight way from the nodes of the graph to the ends of that link.
 
-    Parameters
-    ----------
-    matched
-        The graph, matched to its building.
-    stairs
-        Whether the robot takes stairs.
-    clear_edges_only
-        Whether edges and rides that the robot cannot follow are left out.
+    `matched`: the graph, matched to its building; `stairs`: whether the robot takes stairs;
+    `clear_edges_only`: whether edges and rides that the robot cannot follow are left out.
     """
 
     def __init__(

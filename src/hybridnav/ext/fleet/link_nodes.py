@@ -274,12 +274,8 @@ def node_at(graph: WaypointGraph, point: tuple[float, float]) -> int | None:
 def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph, int]]:
     """Return the floors that a link stops at, and the node at its end on each.
 
-    Parameters
-    ----------
-    building
-        A building with nodes at all ends, as `join_links` returns it.
-    link
-        One of its links.
+    `building`: a building with nodes at all ends, as `join_links` returns it; `link`: one of its
+    links.
     """
     found = []
     for end in link.ends:
@@ -293,12 +289,7 @@ def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph,
 def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
     """Return a graph with a node at the end of each of some links, joined in both directions.
 
-    Parameters
-    ----------
-    graph
-        The graph.
-    stubs
-        The ends, and the nodes that they are joined to.
+    `stubs`: the ends, and the nodes that they are joined to.
     """
     n = graph.n_nodes
     points = np.concatenate([graph.points, [end for _, end, _ in stubs]])

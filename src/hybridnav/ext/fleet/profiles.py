@@ -26,12 +26,7 @@ _NEAR_M = 1.0
 def floors_under(floors: Sequence[Floor], profile: Profile) -> list[Floor]:
     """Return floors with planners of the width and the costs of a profile.
 
-    Parameters
-    ----------
-    floors
-        The floors; if a profile has costs on one, it plans by costs on all.
-    profile
-        The profile.
+    `floors`: the floors; if a profile has costs on one, it plans by costs on all.
     """
     by_costs = any(profile.by_costs(floor.rooms) for floor in floors)
     made: dict[HybridPlanner, HybridPlanner] = {}
@@ -59,14 +54,7 @@ def links_under(links: Sequence[Link], floors: Mapping[str, Floor], profile: Pro
     Where its width has no room at an end, the nearest cell of the same room within a metre is
     taken; a link without one is left out.
 
-    Parameters
-    ----------
-    links
-        The links of the building.
-    floors
-        The floors, by name.
-    profile
-        The profile.
+    `links`: the links of the building; `floors`: the floors, by name.
     """
     found = []
     for link in links:
@@ -106,12 +94,8 @@ def reason_under(
     """Return what of a profile leaves no route over floors, one line; empty where there is none
     without it.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    plan_under
-        Returns the plan of the query under another profile, and the floors of its planners.
+    `plan_under`: returns the plan of the query under another profile, and the floors of its
+    planners.
     """
 
     def passed(other: Profile) -> list[str] | None:

@@ -132,10 +132,7 @@ class Bundle(NamedTuple):
         """Return the options, None for no bundle. Refuse folders that hold other files, costs that
         are no masks, and options that do not go with a bundle, or without one.
 
-        Raises
-        ------
-        InvalidValueError, UsageError
-            When one of them is given.
+        Raises `InvalidValueError` or `UsageError` when one of them is given.
         """
         from hybridnav.ext.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
 
@@ -172,10 +169,8 @@ class Fleet:
     ) -> Fleet | None:
         """Return the options, None for a format that has none of them.
 
-        Raises
-        ------
-        UsageError
-            When an option is for another format, or one that the format needs is missing.
+        Raises `UsageError` when an option is for another format, or one that the format needs is
+        missing.
         """
         check_homes({"--floor": floor}, ENDINGS, f"--format {kind}")
         check_homes({"--anchor": anchor}, ("osm",), f"--format {kind}")
@@ -211,10 +206,7 @@ class Fleet:
 def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
     """Return the named points of a YAML file, in metres, and which of them are lifts.
 
-    Raises
-    ------
-    UsageError
-        When it is no mapping of names to points or poses, or has a name twice.
+    Raises `UsageError` when it is no mapping of names to points or poses, or has a name twice.
     """
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
 

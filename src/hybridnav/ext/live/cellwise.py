@@ -33,12 +33,8 @@ class CellDraft:
     surviving cells within the merge distance; what is left of them makes places of its own. Levels
     below the places are made when they are read (see `levels`).
 
-    Parameters
-    ----------
-    before
-        The version before.
-    criterion
-        When two fields merge; its linkage is "throats" or "radius".
+    `before`: the version before; `criterion`: when two fields merge; its linkage is "throats" or
+    "radius".
     """
 
     def __init__(self, before: State, criterion: Criterion) -> None:

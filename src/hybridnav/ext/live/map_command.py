@@ -33,12 +33,7 @@ def is_bag(path: Path) -> bool:
 def open_log(path: Path, topic: str | None = None, frame: str | None = None) -> ScanLog:
     """Open a log of scans.
 
-    Parameters
-    ----------
-    path
-        The file or folder.
-    topic, frame
-        As in `BagLog`, for bags.
+    `path`: the file or folder; `topic`, `frame`: as in `BagLog`, for bags.
     """
     if is_bag(path):
         return hn.ext.live.BagLog(path, topic=topic, frame=frame)

@@ -309,14 +309,8 @@ def with_levels(state: State, box: Box, criterion: Criterion) -> State:
     Each of these places is dissolved into its cells and contracted again, beside places that stay
     as they are, until its surviving cell alone is left.
 
-    Parameters
-    ----------
-    state
-        The version; it stays as it is.
-    box
-        All cells, by the rows and columns of the tiles.
-    criterion
-        When two fields merge; its linkage is "throats" or "radius".
+    `state`: the version; it stays as it is; `box`: all cells, by the rows and columns of the tiles;
+    `criterion`: when two fields merge; its linkage is "throats" or "radius".
     """
     if state.has_levels:
         return state
@@ -369,10 +363,7 @@ def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
 
     Cells by which the map grew are left out, as updates look at them anyway.
 
-    Raises
-    ------
-    InvalidValueError
-        When the newer grid does not cover the older one, cell on cell.
+    Raises `InvalidValueError` when the newer grid does not cover the older one, cell on cell.
     """
     rows, cols = shift_of(before, after, otherwise="begin a new replay")
     changed = np.zeros(after.shape, np.bool_)

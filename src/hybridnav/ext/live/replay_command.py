@@ -143,14 +143,7 @@ def _with_rooms(
 class _Log:
     """A log that is replayed.
 
-    Parameters
-    ----------
-    file
-        The log.
-    most_scans
-        Scans to read, None for all.
-    max_cells
-        Scans that need more cells are left out.
+    `most_scans`: scans to read, None for all; `max_cells`: scans that need more cells are left out.
     """
 
     def __init__(self, file: Path, most_scans: int | None, max_cells: int) -> None:

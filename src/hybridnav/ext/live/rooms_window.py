@@ -71,18 +71,10 @@ def renew(
 ) -> Renewed:
     """Find the rooms anew that changed cells touch; all others keep their free cells.
 
-    Parameters
-    ----------
-    before
-        The rooms before.
-    grid
-        The map now.
-    outside
-        bool (rows, cols), its free cells outside of the building.
-    differs
-        bool (rows, cols), cells that changed; at least one.
-    settings
-        The least area of a room in square metres, and the least number that no room has had.
+    `before`: the rooms before; `grid`: the map now; `outside`: bool (rows, cols), its free cells
+    outside of the building; `differs`: bool (rows, cols), cells that changed; at least one;
+    `settings`: the least area of a room in square metres, and the least number that no room has
+    had.
     """
     free = (grid.measured == CellClass.FREE) & ~outside
     touched = _touched(before.number_of, differs, grid)
@@ -246,17 +238,11 @@ def match(
     bears the number of the one with which it shares the most cells, the least number on a tie; a
     room that stayed bears its own.
 
-    Parameters
-    ----------
-    old
-        int32 (rows, cols), the old rooms that were given up, -1 elsewhere.
-    labels
-        int32 (rows, cols), the rooms now: the numbers of those that stay, and labels of those that
-        were found anew; -1 elsewhere.
-    first
-        The least label of a room that was found anew, and the least number that no room has had.
-    areas_staying
-        int64 (n,), the free cells of each room that stayed by its number, where it was before.
+    `old`: int32 (rows, cols), the old rooms that were given up, -1 elsewhere; `labels`: int32
+    (rows, cols), the rooms now: the numbers of those that stay, and labels of those that were found
+    anew; -1 elsewhere; `first`: the least label of a room that was found anew, and the least number
+    that no room has had; `areas_staying`: int64 (n,), the free cells of each room that stayed by
+    its number, where it was before.
     """
     first_label, first_number = first
     areas = np.bincount(labels[labels >= 0], minlength=first_label)
@@ -361,16 +347,9 @@ def doors_of(
 ) -> list[OnlineDoor]:
     """Return the doors between rooms.
 
-    Parameters
-    ----------
-    number_of
-        int32 (rows, cols), the number of the room of each cell, -1 for none.
-    grid
-        The map of these cells.
-    low
-        Row and column of cell (0, 0) in the lasting numbering.
-    known
-        A point of each door that has a number; see `RoomBoundaries.numbers`.
+    `number_of`: int32 (rows, cols), the number of the room of each cell, -1 for none; `grid`: the
+    map of these cells; `low`: row and column of cell (0, 0) in the lasting numbering; `known`: a
+    point of each door that has a number; see `RoomBoundaries.numbers`.
     """
     rooms = np.flatnonzero(np.bincount(number_of.ravel() + 1)[1:])
     dense = np.full(int(rooms.max(initial=NO_ROOM)) + 2, NO_ROOM, np.int32)

@@ -49,12 +49,7 @@ class PlaceTable:
 
     A new version copies the table when it first changes it, which takes 10 us for 3,000 places.
 
-    Parameters
-    ----------
-    numbers
-        int64 (n,), ascending; None for no place.
-    rows
-        `PLACE` (n,), read-only.
+    `numbers`: int64 (n,), ascending; None for no place; `rows`: `PLACE` (n,), read-only.
     """
 
     def __init__(self, numbers: LongArray | None = None, rows: AnyArray | None = None) -> None:
@@ -280,14 +275,8 @@ def state_of(pyramid: DualGraphPyramid) -> State:
 def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
     """Return a version as dense arrays.
 
-    Parameters
-    ----------
-    state
-        The version.
-    box
-        The cells of its grid among those of the tiles.
-    settings
-        Its grid, and what it was built with.
+    `box`: the cells of its grid among those of the tiles; `settings`: its grid, and what it was
+    built with.
     """
     cells = state.tiles.read(box)
     differs = cells["class"] != settings.grid.classes

@@ -152,10 +152,7 @@ class Tiles:
     Arrays of a version never change: those of a tile are copied when they first change. All that a
     kernel reads is read-only, those copies too, because it takes arrays of one type only.
 
-    Parameters
-    ----------
-    tiles
-        Tiles, their arrays read-only, by row and column of tiles.
+    `tiles`: tiles, their arrays read-only, by row and column of tiles.
     """
 
     def __init__(self, tiles: Mapping[tuple[int, int], Tile]) -> None:
@@ -204,14 +201,8 @@ class Tiles:
     ) -> Differing:
         """Return the cells of boxes whose class is another than that given for a map.
 
-        Parameters
-        ----------
-        boxes
-            Boxes on the map without common cells.
-        classes
-            uint8 (rows, cols), `CellClass` of the cells of the map.
-        low
-            Row and column of its first cell.
+        `boxes`: boxes on the map without common cells; `classes`: uint8 (rows, cols), `CellClass`
+        of the cells of the map; `low`: row and column of its first cell.
         """
         found, count = np.empty((_FEW_ROWS, 4), np.int64), 0
         for box in boxes:

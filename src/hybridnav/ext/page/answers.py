@@ -51,19 +51,9 @@ def lines_of(
 ) -> list[dict[str, Any]]:
     """Return the lines of instructions, each with the place and the door that it is about.
 
-    Parameters
-    ----------
-    instructions
-        What a person does on a route.
-    language
-        Code of the language.
-    floors
-        Number and map of each floor that is visited, in order.
-
-    Raises
-    ------
-    InvalidValueError
-        When there are no sentences in this language.
+    `instructions`: what a person does on a route; `language`: code of the language; `floors`:
+    number and map of each floor that is visited, in order. Raises `InvalidValueError` when there
+    are no sentences in this language.
     """
     lines: list[dict[str, Any]] = []
     visited = 0

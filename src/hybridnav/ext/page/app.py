@@ -121,18 +121,9 @@ def make_app(
 ) -> ASGIApp:
     """Return the application of a page.
 
-    Parameters
-    ----------
-    shown
-        What it shows: a site, or one that is still being prepared.
-    token
-        The first part of every path.
-    port
-        The port on 127.0.0.1.
-    folder
-        The only folder in which anything is written.
-    allow_edits
-        Whether programs may change what others see, as people may on the page.
+    `shown`: what it shows: a site, or one that is still being prepared; `token`: the first part of
+    every path; `port`: the port on 127.0.0.1; `folder`: the only folder in which anything is
+    written; `allow_edits`: whether programs may change what others see, as people may on the page.
     """
     at = f"/{token}"
     routes = [

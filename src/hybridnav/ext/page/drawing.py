@@ -93,12 +93,7 @@ def _lines(lines: list[FloatArray], grid: OccupancyGrid) -> list[Any]:
 def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
     """Return what a page needs to know of a map before it draws its cells.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    n_zooms
-        Number of sizes of its tiles.
+    `n_zooms`: number of sizes of its tiles.
     """
     up, along = grid.frame.axes_m.tolist()
     return {
@@ -213,16 +208,9 @@ GRID = "grid-astar"
 class PagePlanning:
     """The planners of one topological map, made when a preset is first asked for.
 
-    Parameters
-    ----------
-    model
-        The map or model.
-    topology
-        Its topological map with rooms.
-    settings
-        The preset that the page begins with; its section `pyramid` holds for all.
-    costs
-        Costs given beside the presets, None for none.
+    `model`: the map or model; `topology`: its topological map with rooms; `settings`: the preset
+    that the page begins with; its section `pyramid` holds for all; `costs`: costs given beside the
+    presets, None for none.
     """
 
     def __init__(
@@ -255,10 +243,7 @@ class PagePlanning:
     def planner(self, name: str) -> HybridPlanner:
         """Return the planner of a preset.
 
-        Raises
-        ------
-        HybridNavError
-            When there is no such preset, or it cannot plan on this map.
+        Raises `HybridNavError` when there is no such preset, or it cannot plan on this map.
         """
         with self._making:
             if name not in self._planners:
@@ -337,10 +322,7 @@ class PagePlanning:
     def blocked(self, closed: FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
 
-        Raises
-        ------
-        InvalidValueError
-            When the corners of an area make no polygon.
+        Raises `InvalidValueError` when the corners of an area make no polygon.
         """
         if not closed:
             return None

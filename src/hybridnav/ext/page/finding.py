@@ -29,10 +29,7 @@ class Finder:
     Favourites stand in one file of the folder, so that they outlive the page, whose address is
     another one each time.
 
-    Parameters
-    ----------
-    folder
-        The folder of the map or building.
+    `folder`: the folder of the map or building.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -69,12 +66,8 @@ class Finder:
     def favour(self, site: Site, asked: Favour) -> dict[str, Any]:
         """Keep a room or point as a favourite, or no longer.
 
-        Raises
-        ------
-        InvalidValueError
-            When there is none of this name.
-        OSError
-            When the file cannot be written: the favourite then lasts as long as the page.
+        Raises `InvalidValueError` when there is none of this name, `OSError` when the file cannot
+        be written: the favourite then lasts as long as the page.
         """
         if (asked.floor, asked.name) not in set(_all_of(site)):
             raise InvalidValueError(f"no room or point is called {asked.name!r:.80}")

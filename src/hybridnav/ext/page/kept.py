@@ -80,17 +80,8 @@ _MOST_BYTES = 10_000_000
 class RoomsFile:
     """A file of rooms inside one folder, and its journal `.NAME.edits` beside it.
 
-    Parameters
-    ----------
-    folder
-        The only folder that is written to.
-    name
-        Name of the file in it.
-
-    Raises
-    ------
-    RoomsError
-        When the file is a link that leads out of the folder.
+    `folder`: the only folder that is written to; `name`: name of the file in it. Raises
+    `RoomsError` when the file is a link that leads out of the folder.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -118,10 +109,7 @@ class RoomsFile:
     def is_changed(self, *, since_told: bool = False) -> bool:
         """Return whether somebody else has changed the file since it was read or written here.
 
-        Parameters
-        ----------
-        since_told
-            Whether to overlook the change that the last call returned.
+        `since_told`: whether to overlook the change that the last call returned.
         """
         now = self._digest()
         known = {self._seen, self._told} if since_told else {self._seen}
@@ -131,10 +119,7 @@ class RoomsFile:
     def save(self, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         """Write rooms whole or not at all, and end the journal.
 
-        Raises
-        ------
-        RoomsError
-            When the file cannot be written; the old one and the journal stay.
+        Raises `RoomsError` when the file cannot be written; the old one and the journal stay.
         """
         self._check_inside(self.path)
         save_rooms(self.path, rooms, grid)

@@ -182,10 +182,7 @@ class Cells:
     def layer(self, name: str) -> Layer:
         """Return the layer `map`.
 
-        Raises
-        ------
-        PreparingError
-            When another one is asked for.
+        Raises `PreparingError` when another one is asked for.
         """
         if name != "map":
             raise PreparingError(f"not yet: {self._stage()}")

@@ -66,10 +66,7 @@ def _texts() -> str:
 def whole_page(data: object) -> str:
     """Return the page with everything inside, which opens without a server.
 
-    Parameters
-    ----------
-    data
-        What the server would answer, as plain values.
+    `data`: what the server would answer, as plain values.
     """
     modules = "\n".join(_plain(asset(name)) for name in _NAMES)
     # `</script>` in a name of a room must not end the script.
@@ -188,22 +185,10 @@ WHOLE = ("model", "path-geojson", "path-csv")
 def exported(site: Site, kind: str, query: PartQuery | None, folder: Path) -> tuple[str, bytes]:
     """Return the name and the content of a file about a whole site.
 
-    Parameters
-    ----------
-    site
-        The site.
-    kind
-        One of `WHOLE`.
-    query
-        The query whose path is written, and the floor; None for the model.
-    folder
-        Where a temporary folder may lie for the time of the writing.
-
-    Raises
-    ------
-    InvalidValueError
-        When the kind is not known, a path is wanted without a query, or the route does not visit
-        the floor.
+    `kind`: one of `WHOLE`; `query`: the query whose path is written, and the floor; None for the
+    model; `folder`: where a temporary folder may lie for the time of the writing. Raises
+    `InvalidValueError` when the kind is not known, a path is wanted without a query, or the route
+    does not visit the floor.
     """
     _check_kind(kind, WHOLE)
     if kind == "model":
@@ -218,19 +203,8 @@ def exported(site: Site, kind: str, query: PartQuery | None, folder: Path) -> tu
 def exported_floor(session: Session, kind: str, folder: Path) -> tuple[str, bytes]:
     """Return the name and the content of a file about a floor.
 
-    Parameters
-    ----------
-    session
-        The floor.
-    kind
-        `nav2` or `rooms`.
-    folder
-        As for `exported`.
-
-    Raises
-    ------
-    InvalidValueError
-        When the kind is not known.
+    `kind`: `nav2` or `rooms`; `folder`: as for `exported`. Raises `InvalidValueError` when the kind
+    is not known.
     """
     _check_kind(kind, [each for each in KINDS if each not in WHOLE])
     topology = session.planning.topology

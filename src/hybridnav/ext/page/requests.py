@@ -193,10 +193,7 @@ _T = TypeVar("_T", bound=BaseModel)
 def checked(kind: type[_T], value: Any) -> _T:
     """Return a request of some kind.
 
-    Raises
-    ------
-    InvalidValueError
-        When a key or value is not as expected; the message names the first.
+    Raises `InvalidValueError` when a key or value is not as expected; the message names the first.
     """
     try:
         return kind.model_validate(value)
@@ -209,10 +206,7 @@ def checked(kind: type[_T], value: Any) -> _T:
 def checked_change(value: dict[str, Any]) -> Change:
     """Return a change of the rooms.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is none.
+    Raises `InvalidValueError` when it is none.
     """
     op = value.get("op")
     kind = _KINDS.get(op) if isinstance(op, str) else None
@@ -233,20 +227,9 @@ _NEAR = 1.0
 def changed(rooms: RoomLabels, change: Change, grid: OccupancyGrid) -> RoomLabels:
     """Return rooms after a change.
 
-    Parameters
-    ----------
-    rooms
-        The rooms before.
-    change
-        What to do, in grid units.
-    grid
-        The map.
-
-    Raises
-    ------
-    InvalidValueError
-        When there is no such room, a name is taken or no name, two rooms do not touch, a line cuts
-        nothing off, or a room would lose its last free cell.
+    `rooms`: the rooms before; `change`: what to do, in grid units. Raises `InvalidValueError` when
+    there is no such room, a name is taken or no name, two rooms do not touch, a line cuts nothing
+    off, or a room would lose its last free cell.
     """
     if isinstance(change, Rename):
         return _renamed(rooms, change)

@@ -303,10 +303,8 @@ class _OverFloors:
     def _with(self, preset: str) -> Building:
         """Return the building with planners by a preset, of the rooms as they are now.
 
-        Raises
-        ------
-        HybridNavError
-            When there is no such preset, or it cannot plan on a floor or over floors.
+        Raises `HybridNavError` when there is no such preset, or it cannot plan on a floor or over
+        floors.
         """
         planners = [session.planning.planner(preset) for session in self.sessions]
         with self._making:
@@ -347,10 +345,7 @@ class _OverFloors:
     def on_floor(self, query: PartQuery) -> Tour:
         """Return the parts of a route on one floor, to be written.
 
-        Raises
-        ------
-        InvalidValueError
-            When there is no route, or it does not visit the floor.
+        Raises `InvalidValueError` when there is no route, or it does not visit the floor.
         """
         name = self._building.floors[query.floor].name
         plan = self._outcome(query)

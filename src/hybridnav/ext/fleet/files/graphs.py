@@ -129,10 +129,7 @@ def read_open_rmf(
 def floor_in(building: BuildingGraph, floor: str | None, where: str) -> WaypointGraph:
     """Return the graph of a floor, or of the only one.
 
-    Raises
-    ------
-    MapError
-        When there are several and none is chosen.
+    Raises `MapError` when there are several and none is chosen.
     """
     if floor is None and len(building.floors) > 1:
         names = ", ".join(each.name for each in building.floors)

@@ -26,19 +26,8 @@ _TEXT = "topological map"
 def read_yaml_graph(data: Any, where: str, name: str) -> WaypointGraph:
     """Read a topological map: a list of nodes (STRANDS) or a mapping with `nodes` (tmap2).
 
-    Parameters
-    ----------
-    data
-        The file as parsed.
-    where
-        What messages begin with.
-    name
-        Name of a graph that has none.
-
-    Raises
-    ------
-    MapError
-        When it is in neither form.
+    `data`: the file as parsed; `where`: what messages begin with; `name`: name of a graph that has
+    none. Raises `MapError` when it is in neither form.
     """
     gathered = Gathered(where)
     if isinstance(data, list):
@@ -125,20 +114,10 @@ _TRUE = ("true", "1")
 def read_graphml(text: str, where: str, name: str) -> WaypointGraph:
     """Read a graph.
 
-    Parameters
-    ----------
-    text
-        The file. Nodes have `x` and `y`, or one of the other attributes of
-        `WaypointGraph.from_networkx`; nested graphs are read as one.
-    where
-        What messages begin with.
-    name
-        Name of a graph that has none.
-
-    Raises
-    ------
-    MapError
-        When it is no GraphML, or declares a document type: entities could make it endless.
+    `text`: the file. Nodes have `x` and `y`, or one of the other attributes of
+    `WaypointGraph.from_networkx`; nested graphs are read as one; `where`: what messages begin with;
+    `name`: name of a graph that has none. Raises `MapError` when it is no GraphML, or declares a
+    document type: entities could make it endless.
     """
     reader = _Reader(where, name)
     parser = expat.ParserCreate("utf-8", namespace_separator=" ")
@@ -276,19 +255,8 @@ def read_text_graph(text: str, where: str, name: str) -> WaypointGraph:
     """Read a map of blocks `node:`, each with a name, `waypoint:` (x, y, z, and a quaternion),
     `edges:` (a line each: the other node, the action) and `vertices:`.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of the graph.
-
-    Raises
-    ------
-    MapError
-        When a line is not as expected; the text names it.
+    `where`: what messages begin with; `name`: name of the graph. Raises `MapError` when a line is
+    not as expected; the text names it.
     """
     gathered = Gathered(where)
     node, section = _Node(), ""

@@ -47,26 +47,10 @@ def is_lif(text: str) -> bool:
 def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     """Read layouts: one floor for each `layoutLevelId`, or for each layout that has none.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-
-    Returns
-    -------
-    BuildingGraph
-        Floors in the order of the file, in its one frame. Edges between two floors become links
-        between their nodes: those of one `edgeName` one link, of the kind with which that begins,
-        or else a lift. Times are not stated.
-
-    Raises
-    ------
-    MapError
-        When it is not of this form.
+    `where`: what messages begin with; `name`: name of a building that has none. Returns floors in
+    the order of the file, in its one frame. Edges between two floors become links between their
+    nodes: those of one `edgeName` one link, of the kind with which that begins, or else a lift.
+    Times are not stated. Raises `MapError` when it is not of this form.
     """
     data = _parsed(text, where)
     floors: dict[str, Gathered] = {}

@@ -72,29 +72,12 @@ class OsmFloor:
 def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) -> BuildingGraph:
     """Read a building.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-    anchor
-        Where its frame is to lie on the Earth; None for the node named root of an area graph, or
-        else the least latitude and longitude.
-
-    Returns
-    -------
-    BuildingGraph
-        A floor for each level, from the lowest to the highest. Where a level has ways with
-        `highway`, its nodes and edges are those; else nodes stand for areas, doors and passages,
-        joined as `add_area_graph` does it.
-
-    Raises
-    ------
-    MapError
-        When it is no XML of OpenStreetMap, or has no level with a node.
+    `where`: what messages begin with; `name`: name of a building that has none; `anchor`: where its
+    frame is to lie on the Earth; None for the node named root of an area graph, or else the least
+    latitude and longitude. Returns a floor for each level, from the lowest to the highest. Where a
+    level has ways with `highway`, its nodes and edges are those; else nodes stand for areas, doors
+    and passages, joined as `add_area_graph` does it. Raises `MapError` when it is no XML of
+    OpenStreetMap, or has no level with a node.
     """
     data = read_osm_xml(text, where)
     if not data.places:
@@ -342,18 +325,9 @@ def add_area_graph(
     it names, by their ids or names; a door, a node with `door`, to those whose outline it is part
     of.
 
-    Parameters
-    ----------
-    gathered
-        What they are added to; ids are `way ID` and `node ID`.
-    areas
-        Closed ways.
-    passages
-        Ways of two nodes.
-    tags
-        Tags of nodes.
-    points
-        Points of nodes in metres; None for none.
+    `gathered`: what they are added to; ids are `way ID` and `node ID`; `areas`: closed ways;
+    `passages`: ways of two nodes; `tags`: tags of nodes; `points`: points of nodes in metres; None
+    for none.
     """
     shapes = {way.id: shape for way in areas if (shape := _shape(way, points)) is not None}
     inside: dict[int, list[tuple[str, Point]]] = {area: [] for area in shapes}

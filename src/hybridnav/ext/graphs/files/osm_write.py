@@ -332,13 +332,7 @@ _CABIN_M = 2.0
 
 
 class Shapes:
-    """The outlines of a floor's areas, counter-clockwise, with the ends of doors as corners.
-
-    Parameters
-    ----------
-    floor
-        The floor.
-    """
+    """The outlines of a floor's areas, counter-clockwise, with the ends of doors as corners."""
 
     def __init__(self, floor: FloorGraph) -> None:
         self._names = [area.name for area in floor.areas]

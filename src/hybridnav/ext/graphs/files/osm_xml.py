@@ -167,18 +167,8 @@ def is_osm(text: str) -> bool:
 def read_osm_xml(text: str, where: str) -> OsmData:
     """Read nodes and ways; relations and all else are passed over.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    MapError
-        When it is no XML of OpenStreetMap, or declares a document type: entities could make it
-        endless.
+    `where`: what messages begin with. Raises `MapError` when it is no XML of OpenStreetMap, or
+    declares a document type: entities could make it endless.
     """
     if len(text) > MOST_BYTES:
         raise MapError(f"{where}: XML of OpenStreetMap of more than {MOST_BYTES} bytes is not read")
@@ -194,10 +184,7 @@ def read_osm_xml(text: str, where: str) -> OsmData:
 def parse_xml(parser: expat.XMLParserType, text: str, where: str) -> None:
     """Parse a text that was read as UTF-8, by a parser for UTF-8.
 
-    Raises
-    ------
-    MapError
-        When it is no XML, or declares another encoding.
+    Raises `MapError` when it is no XML, or declares another encoding.
     """
 
     def check(_version: str, encoding: str | None, _standalone: int) -> None:

@@ -64,28 +64,12 @@ def read_drawn(
 ) -> BuildingGraph:
     """Read a building map.
 
-    Parameters
-    ----------
-    data
-        The file as parsed.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-    graph_index
-        Which of the graphs to read, from 0 to 9; None for the first that has lanes.
-
-    Returns
-    -------
-    BuildingGraph
-        A floor for each level on which the graph has lanes, from the lowest to the highest, in
-        metres, with y up, in the frame of the reference level.
-
-    Raises
-    ------
-    MapError
-        When it is not of this form, its coordinates are degrees, the scale of a level is not known,
-        or no lane belongs to the graph.
+    `data`: the file as parsed; `where`: what messages begin with; `name`: name of a building that
+    has none; `graph_index`: which of the graphs to read, from 0 to 9; None for the first that has
+    lanes. Returns a floor for each level on which the graph has lanes, from the lowest to the
+    highest, in metres, with y up, in the frame of the reference level. Raises `MapError` when it is
+    not of this form, its coordinates are degrees, the scale of a level is not known, or no lane
+    belongs to the graph.
     """
     levels = mapping_of(data["levels"], where, "levels", MOST_FLOORS)
     contents = {
@@ -308,19 +292,8 @@ def drawings_of(
     scale and an origin of their own. Metres (`cartesian_meters`) are taken as they are: the editor
     does not apply `offset_x` and `offset_y` to them.
 
-    Parameters
-    ----------
-    data
-        The file.
-    contents
-        Its levels.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    MapError
-        When coordinates are degrees, or the reference level is not there.
+    `where`: what messages begin with. Raises `MapError` when coordinates are degrees, or the
+    reference level is not there.
     """
     system = data.get("coordinate_system", _PIXELS)
     if system == _METRES:
@@ -356,10 +329,7 @@ def drawings_of(
 def drawing_of(drawings: dict[str, Drawing], level: str, where: str) -> Drawing:
     """Return how a level is drawn.
 
-    Raises
-    ------
-    MapError
-        When its scale is not known.
+    Raises `MapError` when its scale is not known.
     """
     found = drawings.get(level)
     if found is None:

@@ -34,17 +34,8 @@ TRANSFORMS = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
 class Bag:
     """A bag: a file of ROS 1 (.bag), a folder of ROS 2, or one of its files (.mcap, .db3).
 
-    Parameters
-    ----------
-    path
-        The file or folder.
-
-    Raises
-    ------
-    MapNotFoundError
-        When it does not exist.
-    MapError
-        When rosbags is not installed.
+    `path`: the file or folder. Raises `MapNotFoundError` when it does not exist, `MapError` when
+    rosbags is not installed.
     """
 
     def __init__(self, path: PathLike) -> None:
@@ -70,10 +61,7 @@ class Bag:
     def topics(self) -> dict[str, tuple[str, int]]:
         """The type of the messages of each topic, and how many there are.
 
-        Raises
-        ------
-        MapError
-            When the file is no bag, or damaged.
+        Raises `MapError` when the file is no bag, or damaged.
         """
         with self._open() as reader:
             return {
@@ -87,17 +75,8 @@ class Bag:
     def topic_of(self, msgtype: str, topic: str | None) -> str:
         """Return the topic of messages of a type.
 
-        Parameters
-        ----------
-        msgtype
-            The type.
-        topic
-            Name of the topic; None for the only one.
-
-        Raises
-        ------
-        MapError
-            When there is none, more than one and none was named, or the file is damaged.
+        `topic`: name of the topic; None for the only one. Raises `MapError` when there is none,
+        more than one and none was named, or the file is damaged.
         """
         found = self.topics_of({msgtype})
         short = msgtype.replace("/msg/", "/")
@@ -115,10 +94,7 @@ class Bag:
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
         """Yield the messages of some topics with these, in the order in which they were recorded.
 
-        Raises
-        ------
-        MapError
-            When the file is damaged; what was yielded before is sound.
+        Raises `MapError` when the file is damaged; what was yielded before is sound.
         """
         with self._open() as reader:
             wanted = [each for each in reader.connections if each.topic in topics]
@@ -130,10 +106,7 @@ class Bag:
     def last(self, topic: str) -> Any:
         """Return the last message of a topic.
 
-        Raises
-        ------
-        MapError
-            When there is none, or the file is damaged.
+        Raises `MapError` when there is none, or the file is damaged.
         """
         with self._open() as reader:
             wanted = [each for each in reader.connections if each.topic == topic]
@@ -218,23 +191,9 @@ class _Unpacker(Protocol):
 def unpacked(make: Callable[[], Any], data: bytes, what: str, most_bytes: int) -> bytes:
     """Return what compressed frames hold.
 
-    Parameters
-    ----------
-    make
-        Makes a decompressor of one frame, as in the module bz2.
-    data
-        The frames.
-    what
-        Words for them in messages.
-    most_bytes
-        Size in bytes at which to stop.
-
-    Raises
-    ------
-    TooLargeError
-        When they hold more.
-    EOFError
-        When the last one has no end, or there are more than 10,000.
+    `make`: makes a decompressor of one frame, as in the module bz2; `what`: words for them in
+    messages; `most_bytes`: size in bytes at which to stop. Raises `TooLargeError` when they hold
+    more, `EOFError` when the last one has no end, or there are more than 10,000.
     """
     parts: list[bytes] = []
     left = most_bytes

@@ -74,10 +74,7 @@ class Transforms:
     def ancestors(self, frame: str) -> list[str]:
         """Return a frame, its parent, and so on up to the root.
 
-        Raises
-        ------
-        NoPoseError
-            When they form a circle.
+        Raises `NoPoseError` when they form a circle.
         """
         found = [frame]
         while (series := self._series.get(found[-1])) is not None:
@@ -96,22 +93,9 @@ class Transforms:
 
         Between two transforms, places are blended along a line and rotations along an arc.
 
-        Parameters
-        ----------
-        frame, fixed
-            Names of the two.
-        stamp_ns
-            The time, in nanoseconds.
-
-        Returns
-        -------
-        tuple
-            float64 (3, 3) and float64 (3,), metres.
-
-        Raises
-        ------
-        NoPoseError
-            When no chain of transforms leads up to it, or there are none at that time.
+        `frame`, `fixed`: names of the two; `stamp_ns`: the time, in nanoseconds. Returns float64
+        (3, 3) and float64 (3,), metres. Raises `NoPoseError` when no chain of transforms leads up
+        to it, or there are none at that time.
         """
         chain = self.ancestors(frame)
         if fixed not in chain:
