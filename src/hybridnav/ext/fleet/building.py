@@ -15,12 +15,15 @@ from hybridnav.ext.fleet.checks import (
     check_links,
     check_speed,
     endpoint_of,
+    floors_under,
+    links_under,
+    profiled,
+    reason_under,
     refusal_of,
 )
 from hybridnav.ext.fleet.floors import FloorTable, building_parts
 from hybridnav.ext.fleet.links import LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
-from hybridnav.ext.fleet.profiles import floors_under, links_under, profiled, reason_under
 from hybridnav.ext.fleet.search import LinkSearch
 from hybridnav.maps.names import place_of_name
 from hybridnav.planner.blocked import as_blocked

@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.merging import merge_pairs
-from hybridnav.ext.live.kernels.rings import box_groups, box_round
+from hybridnav.ext.live.kernels.near import box_groups, box_round
 from hybridnav.ext.live.state import PLACE, State
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.maps.islands import unique_rows

@@ -12,7 +12,7 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.cellwise import CellDraft
 from hybridnav.ext.live.identities import check_sides, settle, shift_of
-from hybridnav.ext.live.kernels import rings as _ring_kernels
+from hybridnav.ext.live.kernels import near as _ring_kernels
 from hybridnav.ext.live.state import State, pyramid_of, state_of
 from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import OccupancyGrid

@@ -19,9 +19,16 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from hybridnav._base.extension import extension
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import GRID
-from hybridnav.ext.page.finding import Finder
-from hybridnav.ext.page.opening import PreparingError
-from hybridnav.ext.page.page import ASSETS, POLICY, asset, exported, exported_floor, live_page
+from hybridnav.ext.page.kept import Finder
+from hybridnav.ext.page.page import (
+    ASSETS,
+    POLICY,
+    PreparingError,
+    asset,
+    exported,
+    exported_floor,
+    live_page,
+)
 from hybridnav.ext.page.requests import (
     AlternativesQuery,
     At,
@@ -47,7 +54,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-    from hybridnav.ext.page.opening import Opening
+    from hybridnav.ext.page.page import Opening
     from hybridnav.ext.page.session import Session
     from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
@@ -167,8 +174,11 @@ class _Answers:
                 AlternativesQuery,
                 lambda _, query: self._shown.site.routes(query).alternatives(query),
             ),
-            f"{at}/find": (Find, lambda _, asked: self._finder.find(self._shown.site, asked)),
-            f"{at}/favour": (Favour, lambda _, asked: self._finder.favour(self._shown.site, asked)),
+            f"{at}/find": (Find, lambda _, asked: self._finder.find(self._shown.site.named, asked)),
+            f"{at}/favour": (
+                Favour,
+                lambda _, asked: self._finder.favour(self._shown.site.named, asked),
+            ),
             f"{floor}/stand": (Stand, lambda request, asked: on(request).stand(asked)),
             f"{floor}/at": (At, lambda request, asked: on(request).room_at(asked)),
             f"{floor}/edit": (Edit, lambda request, asked: on(request).edit(asked)),

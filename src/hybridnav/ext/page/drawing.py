@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of, named_ends
+from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, lines_of, named_ends
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import natural_key
 from hybridnav.planner import Blocked, PlanResult, load_preset, plan_alternatives, preset_names

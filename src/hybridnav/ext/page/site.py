@@ -12,8 +12,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
 from hybridnav.ext.fleet.checks import check_closing
 from hybridnav.ext.fleet.plan import GuidedRoute
-from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of
-from hybridnav.ext.page.kept import Closings
+from hybridnav.ext.page.kept import Closings, Named
+from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, lines_of
 from hybridnav.ext.page.session import Session
 from hybridnav.planner import PROFILES, Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
@@ -165,6 +165,17 @@ class Site:
         number = int(text) if is_number else -1
         self._check(number, text)
         return self.sessions[number]
+
+    @property
+    def named(self) -> Named:
+        """The rooms that the robot fits in, and all points, each with the number of its floor."""
+        found: list[tuple[int, str]] = []
+        for number, session in enumerate(self.sessions):
+            rooms = session.planning.topology.rooms
+            fitting = [name for name, fits in zip(rooms.names, rooms.fits, strict=True) if fits]
+            points = [name for name in rooms.labels.points if name not in rooms.names]
+            found += [(number, name) for name in (*fitting, *points)]
+        return Named(self.name, self.names, found)
 
     def _check(self, number: int, given: object) -> None:
         if not 0 <= number < len(self.sessions):

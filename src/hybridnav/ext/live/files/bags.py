@@ -20,9 +20,11 @@ from hybridnav.ext.live.files.bag_files import (
     PATH,
     TRANSFORMS,
     Bag,
+    NoPoseError,
+    Transforms,
     check_rosbags,
+    frame_of,
 )
-from hybridnav.ext.live.files.bag_poses import NoPoseError, Transforms, frame_of
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
 from hybridnav.maps import OccupancyGrid
