@@ -166,9 +166,8 @@ def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
 
 def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
     """Return a point in another frame."""
-    x, y, yaw = pose
-    cosine, sine = cos(yaw), sin(yaw)
-    return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]
+    x, y = moved_points(np.array([point], dtype=np.float64), pose)[0].tolist()
+    return x, y
 
 
 def moved_points(points: FloatArray, pose: Pose) -> FloatArray:

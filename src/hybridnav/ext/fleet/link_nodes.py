@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link
+from hybridnav.ext.graphs.gather import free_name
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import place_of_name
 
@@ -300,9 +301,7 @@ def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
     for link, _, _ in stubs:
         wanted = f"link {link}"
         numbered = (f"{wanted} ({number})" for number in itertools.count(2))
-        name = next(name for name in itertools.chain([wanted], numbered) if name not in taken)
-        taken.add(name)
-        names.append(name)
+        names.append(free_name(itertools.chain([wanted], numbered), taken))
     facts = {n + at: {"link": link} for at, (link, _, _) in enumerate(stubs)}
     return replace(
         graph,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -58,10 +58,6 @@ class Network:
         steps = positions[edges[:, 1]] - positions[edges[:, 0]]
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         return cls(sight, positions, adjacency(len(positions), edges, lengths), usable)
-
-    def with_candidates(self, candidates: int) -> Network:
-        """Return the network with another number of nodes that are tested for sight."""
-        return replace(self, candidates=candidates)
 
     @cached_property
     def _tree(self) -> KDTree:

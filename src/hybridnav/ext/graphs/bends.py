@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -194,8 +194,8 @@ def bend_paths(chosen: Nodes, edges: LongArray, pairs: tuple[FloatArray, FloatAr
     space = chosen.space
     paths = space.paths(*pairs)
     both = np.concatenate([edges, edges[:, ::-1]])
-    network = Network.of(space.sight, chosen.positions, both).with_candidates(MANY_CANDIDATES)
-    lengths = network.join(*pairs).best()
+    network = Network.of(space.sight, chosen.positions, both)
+    lengths = replace(network, candidates=MANY_CANDIDATES).join(*pairs).best()
     is_long = lengths > (1 + _LONG) * paths.length_cells
     bends = bends_of(paths, np.flatnonzero(is_long).tolist())
     chosen.add(space.moved_off(bends, RIM_CELLS), "bend", _LEAST_CELLS)

@@ -189,7 +189,7 @@ def _part(name: str, findings: tuple[Finding, ...]) -> dict[str, Any]:
 
 def _rows(report: BuildingGraphReport) -> list[list[str]]:
     """Return the table of routes, its heads first."""
-    from hybridnav.ext.fleet.graph_judge import Answer  # noqa: PLC0415 - buildings alone need it
+    from hybridnav.ext.fleet.graph_check import Answer  # noqa: PLC0415 - buildings alone need it
 
     answers = get_args(Answer)
     heads = [*answers, "loss mean", "p95", "most", "steps", "expanded", "graph, ms", "building, ms"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -10,7 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import UsageError, complain
+from hybridnav.cli.common import UsageError, answer, complain, timings
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
@@ -201,6 +202,14 @@ class Fleet:
         if self.anchor is not None:
             return hn.ext.graphs.export_osm(building, out, anchor=self.anchor)
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
+
+
+def respond(
+    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
+) -> None:
+    """Print figures as JSON, or lines, with the seconds that it took."""
+    whole = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    answer((whole if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
 
 
 def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:

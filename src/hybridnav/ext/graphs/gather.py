@@ -239,6 +239,13 @@ def edge_text(name: Name | None, tail: Name, head: Name) -> str:
     return f"edge{own} from {shown(tail)} to {shown(head)}"
 
 
+def free_name(wanted: Iterable[str], taken: set[Any]) -> str:
+    """Return the first of some names that is not taken, which it is then."""
+    found = next(name for name in wanted if name not in taken)
+    taken.add(found)
+    return found
+
+
 def _one_line(text: str) -> str:
     """Return a name without line breaks, control codes and lone surrogates, and not too long."""
     plain = "".join(letter if letter.isprintable() else "?" for letter in " ".join(text.split()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -281,7 +281,7 @@ def judge_route_graph(
             "lower least_m or the robot's radius"
         )
     network = Network.of(space.sight, graph.positions, graph.edges)
-    attached = network.with_candidates(MANY_CANDIDATES).join(starts, goals)
+    attached = replace(network, candidates=MANY_CANDIDATES).join(starts, goals)
     return GraphReport(
         pairs=len(starts),
         in_sight=float(attached.direct.mean()),

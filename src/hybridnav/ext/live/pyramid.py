@@ -237,7 +237,8 @@ class OnlinePyramid:
         InvalidValueError
             When cells of the grid changed that no update stated.
         """
-        return pyramid_of(self._with_levels, self._box(), self)
+        built = self.merge_distance_m, self.linkage, self.seed
+        return pyramid_of(self._with_levels, self._box(), self.grid, built)
 
     @cached_property
     def place_numbers(self) -> LongArray:

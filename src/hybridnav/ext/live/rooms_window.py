@@ -44,31 +44,13 @@ class RoomCells(NamedTuple):
     """bool (rows, cols), free cells inside the building, as measured."""
 
 
-class Renewed(NamedTuple):
-    """Rooms after a change."""
-
-    number_of: IntArray
-    """int32 (rows, cols), the number of the room of each cell of the map."""
-    events: Events
-    """What became of the rooms."""
-
-
-class _Part(NamedTuple):
-    """The part of the map that is looked at."""
-
-    window: Box
-    """Its cells."""
-    room_of: IntArray
-    """int32, the rooms beside that stay, -1 where rooms are to be found; see `renewed_rooms`."""
-
-
 def renew(
     before: RoomCells,
     grid: OccupancyGrid,
     outside: BoolArray,
     differs: BoolArray,
     settings: tuple[float, int],
-) -> Renewed:
+) -> tuple[IntArray, Events]:
     """Find the rooms anew that changed cells touch; all others keep their free cells.
 
     `before`: the rooms before; `grid`: the map now; `outside`: bool (rows, cols), its free cells
@@ -101,16 +83,8 @@ def renew(
     # Outlines that people draw hold walls and furniture far from free cells.
     number_of[np.isin(number_of, died)] = NO_ROOM
     changed = set(np.unique(np.append(old[moved], new[moved])).tolist()) - {NO_ROOM}
-    return Renewed(
-        number_of,
-        Events(
-            matches.born,
-            died,
-            matches.merged,
-            matches.split,
-            tuple(sorted((changed & has) - set(matches.born))),
-        ),
-    )
+    kept = tuple(sorted((changed & has) - set(matches.born)))
+    return number_of, Events(matches.born, died, matches.merged, matches.split, kept)
 
 
 def beside_rooms(number_of: IntArray, grid: OccupancyGrid) -> BoolArray:
@@ -168,8 +142,9 @@ def _part(
     differs: BoolArray,
     touched: list[int],
     grid: OccupancyGrid,
-) -> _Part:
-    """Return the rooms to find, and what lies beside, in a window with some of the map around."""
+) -> tuple[Box, IntArray]:
+    """Return a window with some of the map around the rooms to find, and the rooms beside that stay
+    in it, -1 where rooms are to be found; see `renewed_rooms`."""
     of_rooms, box = box_of_rooms(number_of, touched), bounds(differs)
     box = box if of_rooms is None else box.joined(of_rooms)
     box, found = _to_find(number_of, free, differs, touched, box)
@@ -182,7 +157,7 @@ def _part(
     stays = free[inside] & np.isin(number, beside)
     room_of: IntArray = np.where(stays, number, np.int32(LEFT_OUT))
     room_of[box.inside(window)][found] = NO_ROOM
-    return _Part(window, room_of)
+    return window, room_of
 
 
 def _to_find(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav._base.typing import FloatArray
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planner.guide import Instruction
@@ -272,7 +272,10 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
     if kept == gone:
         raise InvalidValueError(f"{change.room!r:.80} is one room: choose another one to merge")
     label_of = rooms.label_of
-    if not _touch(label_of == kept, label_of == gone):
+    # Loads scipy's filters, which most requests do not need.
+    from scipy.ndimage import binary_dilation  # noqa: PLC0415
+
+    if not (binary_dilation(label_of == kept) & (label_of == gone)).any():
         raise InvalidValueError(
             f"{change.room!r:.80} and {change.other!r:.80} do not touch: only neighbours merge"
         )
@@ -286,16 +289,6 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
         one, private=one.private or other.private, cost=max(one.cost, other.cost)
     )
     return replace(rooms, names=names, label_of=renumbered, points=points, uses=uses)
-
-
-def _touch(one: BoolArray, other: BoolArray) -> bool:
-    """Return whether a cell of one set lies beside a cell of another one."""
-    return bool(
-        (one[:, 1:] & other[:, :-1]).any()
-        or (one[:, :-1] & other[:, 1:]).any()
-        or (one[1:] & other[:-1]).any()
-        or (one[:-1] & other[1:]).any()
-    )
 
 
 def _split(rooms: RoomLabels, change: Split, grid: OccupancyGrid) -> RoomLabels:

@@ -6,7 +6,7 @@ import math
 import threading
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
+    from hybridnav.ext.page.drawing import PagePlanning
     from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
-    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder, PlanResult
+    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder
     from hybridnav.topology.rooms import Rooms
 
 _MOST_DIGITS = 3
@@ -44,32 +45,10 @@ _NEAR_M = 1.0
 """Metres from a door within which the end of a link is taken to be at it."""
 
 
-class Routes(Protocol):
-    """What plans between points of the floors of a site, in grid units.
-
-    One floor and several differ here alone: on one map a route is described by its rooms and doors,
-    and others differ from it by these; over floors both go by links.
-    """
-
-    @property
-    def presets(self) -> list[str]:
-        """The names to choose from, the one of the start first."""
-
-    @property
-    def links(self) -> list[dict[str, Any]]:
-        """The links between the floors, as plain values."""
-
-    def plan(self, query: PlanQuery) -> dict[str, Any]:
-        """Return a plan with its certificate; unless it is brief, with words."""
-
-    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
-        """Return some routes that differ for people."""
-
-    def on_floor(self, query: PartQuery) -> PlanResult | Tour:
-        """Return the part of a route on one floor, to be written."""
-
-    def kept(self) -> HybridPlanner | Building:
-        """Return what a model holds."""
+Routes: TypeAlias = "PagePlanning | _OverFloors"
+"""What plans between points of the floors of a site, in grid units. One floor and several differ
+here alone: on one map a route is described by its rooms and doors, and others differ from it by
+these; over floors both go by links."""
 
 
 class Site:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import MapError
@@ -209,10 +210,17 @@ def members_of(text: str, where: str) -> Iterator[tuple[str, int | None, Any]]:
     list; -1 with no value for an empty one), and the value. Raises `MapError` when the text is no
     JSON object, or too large; one line with the place.
     """
-    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
-        raise MapError(f"{where}: JSON of more than {MOST_VALUES} values is not read")
-    try:
+    with json_errors(text, where, MOST_VALUES):
         yield from _Scanner(text).members()
+
+
+@contextmanager
+def json_errors(text: str, where: str, most_values: int) -> Iterator[None]:
+    """Raise `MapError`, one line with the place, when a text has too many values or is no JSON."""
+    if text.count(",") + text.count("[") + text.count("{") > most_values:
+        raise MapError(f"{where}: JSON of more than {most_values} values is not read")
+    try:
+        yield
     except json.JSONDecodeError as failure:
         at = f"line {failure.lineno}, column {failure.colno}"
         raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None

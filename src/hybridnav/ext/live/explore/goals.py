@@ -204,8 +204,6 @@ def widest_point(plan: OccupancyGrid) -> tuple[float, float]:
 
 def cells_in_reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray:
     """Return the cells of a walled plan that a robot can reach, bool (rows, cols)."""
-    from scipy import ndimage  # noqa: PLC0415 - half a second
-
     try:
         point = np.asarray(start, dtype=np.float64)
     except (TypeError, ValueError):
@@ -219,6 +217,4 @@ def cells_in_reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray
             f"the start ({point[0]:g}, {point[1]:g}) is not in a free cell of the plan: choose a "
             f"point on the map that is more than {plan.robot_radius_m:g} m from walls"
         )
-    labels, _ = ndimage.label(plan.classes == CellClass.FREE)
-    reached: BoolArray = labels == labels[row, col]
-    return reached
+    return _connected(plan, (row, col))

@@ -8,7 +8,7 @@ from array import array
 from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -183,16 +183,6 @@ class TooLargeError(Exception):
         )
 
 
-class _Unpacker(Protocol):
-    """What bz2, lz4 and zstd have in common."""
-
-    @property
-    def eof(self) -> bool: ...
-    @property
-    def unused_data(self) -> bytes | None: ...
-    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
-
-
 def unpacked(make: Callable[[], Any], data: bytes, what: str, most_bytes: int) -> bytes:
     """Return what compressed frames hold.
 
@@ -203,7 +193,7 @@ def unpacked(make: Callable[[], Any], data: bytes, what: str, most_bytes: int) -
     parts: list[bytes] = []
     left = most_bytes
     for _ in range(_MOST_FRAMES):
-        unpacker: _Unpacker = make()
+        unpacker = make()
         parts.append(unpacker.decompress(data, max_length=left + 1))
         left -= len(parts[-1])
         if left < 0:
