@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.links import Link
     from hybridnav.maps import OccupancyGrid
 
-
 Pose = tuple[float, float, float]
 """`(x, y, yaw)` of one frame in another, in metres and radians."""
 

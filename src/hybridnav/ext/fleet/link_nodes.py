@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.graphs import WaypointGraph
 
-
 # Graphs of several floors, joined by links, as fleets and map editors exchange them.
 
 Point = tuple[float, float]

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.refine import Sight
 
-
 _CANDIDATES = 100
 """Nearest nodes of a point that are tested for sight."""
 MANY_CANDIDATES = 1500

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 
-
 # Edges of a route graph: a spanner of sight, joined wherever free space is.
 
 _NEAREST = 200

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.topology.rooms import Rooms
 
-
 _PAIRS = 2000
 """Random free points; the share that sees a node is counted."""
 _HALVINGS = 24

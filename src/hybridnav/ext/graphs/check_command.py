@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraphCheck, BuildingGraphReport
     from hybridnav.ext.graphs import Finding, GraphCheck
 
-
 AlignOption = Annotated[
     bool,
     typer.Option(

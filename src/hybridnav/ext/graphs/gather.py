@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
 
-
 Point = tuple[float, float]
 Severity = Literal["error", "warning", "note"]
 """Errors stop a robot or a reader, warnings may; notes are what graphs leave out on purpose too."""

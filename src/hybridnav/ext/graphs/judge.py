@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.search.mesh import MeshPaths
 
-
 LEAST_AREA_M2 = 1.0
 """Area in square metres below which a part of free space gets no nodes: scans have many."""
 RIM_CELLS = 2.0**-6

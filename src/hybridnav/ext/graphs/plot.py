@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hybridnav.viz.canvas import View
     from hybridnav.viz.layout import Entry
 
-
 _COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
 _MARKS = "sD^vo<>phP"
 """Marks of the kinds of findings, again from the first where there are more."""

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.maps.room_labels import Point
 
-
 _MARGIN_M = 0.3
 """A changed cell touches the rooms within this distance: walls belong to rooms up to 0.25 m."""
 _CONTEXT_M = 10.0

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import Linkage
 
-
 # The table of places.
 
 PLACE = np.dtype(

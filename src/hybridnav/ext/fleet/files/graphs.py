@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.graphs.files.osm_xml import Anchor
     from hybridnav.topology.rooms import Door, Rooms
 
-
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""
 JSON, XML = (".geojson", ".json", ".lif"), (".graphml", ".osm", ".xml")

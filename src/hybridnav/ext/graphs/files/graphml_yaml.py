@@ -17,7 +17,6 @@ from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-
 LIMITS = Limits(max_bytes=2**25, max_values=300_000, aliases=True)
 """How much of a file is read; a map of 90 nodes has 11,000 values."""
 _TEXT = "topological map"

@@ -14,7 +14,6 @@ from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-
 MOST_ID = 2**32 - 1
 """Nav2 holds ids as unsigned integers of 32 bits."""
 _LINES = ("LineString", "MultiLineString")

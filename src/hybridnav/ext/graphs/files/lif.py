@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
     from hybridnav.ext.fleet import LinkKind
 
-
 Point = tuple[float, float]
 _MOST_BYTES, _MOST_VALUES = 3 * 2**24, 2**22
 """Most characters of a file, and most values, counted by its commas and brackets: it is read as a

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, PathLike
     from hybridnav.ext.fleet import FloorGraph, Link
 
-
 _DECIMALS = 11
 """Decimals of degrees: a micrometre. OpenStreetMap itself keeps 7, a centimetre."""
 _HIGHWAYS = {"lift": "elevator", "stairs": "steps", "ramp": "footway"}

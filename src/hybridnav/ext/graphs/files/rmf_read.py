@@ -13,7 +13,6 @@ from hybridnav.ext.graphs.gather import Gathered, pair_of, shown
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-
 MOST_FLOORS, MOST_LINKS = 1000, 1000
 """Most levels of a file, and most links between them."""
 

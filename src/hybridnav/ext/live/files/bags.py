@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, PathLike
 
-
 _MOST_TILT_RAD = 0.1
 """Angle between the vertical and the axis of a laser up to which its scans count as level."""
 _FIXED = ("map", "odom")

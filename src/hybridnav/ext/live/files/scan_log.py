@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, PathLike
 
-
 _LONGEST_PAUSE_S = 600.0
 
 

@@ -26,6 +26,16 @@ def beside_of(cell, side, rows, cols):
 
 
 @njit(cache=True, nogil=True)
+def with_rows(rows, count, more):
+    """Return rows with space for more than some, the same array where it has it."""
+    if count + more <= len(rows):
+        return rows
+    longer = np.empty((2 * (count + more),) + rows.shape[1:], rows.dtype)
+    longer[:count] = rows[:count]
+    return longer
+
+
+@njit(cache=True, nogil=True)
 def step_to(side, cols):
     """Return what a flat cell on a side differs by, for cells that are at no side of the window.
 
@@ -84,10 +94,7 @@ def look_again(place, low, table, numbers, limit):
         n_moved += 1
         if not is_near:
             lost = leave_near(place, number, around, found, limit)
-            if n_cells + lost.size > cells.size:
-                longer = np.empty(2 * (n_cells + lost.size), np.int64)
-                longer[:n_cells] = cells[:n_cells]
-                cells = longer
+            cells = with_rows(cells, n_cells, lost.size)
             cells[n_cells : n_cells + lost.size] = lost
             n_cells += lost.size
             measure(place, low, (number, i), table, around)
@@ -232,10 +239,7 @@ def ring_joins(ring, end, parent, place):
             step_row, step_col = parent[row, col, 0], parent[row, col, 1]
             row, col = row + step_row, col + step_col
             if not (0 <= row < rows and 0 <= col < cols):
-                if count == len(beyond):
-                    longer = np.empty((2 * count, 6), np.int64)
-                    longer[:count] = beyond
-                    beyond = longer
+                beyond = with_rows(beyond, count, 1)
                 beyond[count, 0], beyond[count, 1] = edge, level
                 beyond[count, 2], beyond[count, 3] = row, col
                 beyond[count, 4], beyond[count, 5] = to_row, to_col
@@ -398,6 +402,3 @@ def enter(cells, changed, record, field_of, numbers):
                     continue
                 if gone[row, col] or gone[to_row, to_col]:
                     edges[row, col, north] = edge_end[2 * cell + north]
-
-
-# Kernels on the cells of places that regions are made of.

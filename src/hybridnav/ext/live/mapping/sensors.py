@@ -18,7 +18,6 @@ from hybridnav.maps.checks import checked_type
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
 
-
 MOST_RANGE_CELLS = 2**14
 """Cells of a beam that are walked exactly in int64."""
 
