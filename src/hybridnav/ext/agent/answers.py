@@ -366,7 +366,7 @@ class MapAnswers:
 
     def _named(self, asked: ask.Close) -> tuple[list[int], list[str]]:
         doors = [self._rooms.listed_door(number).number for number in asked.doors]
-        rooms = [self._places.meant(name, list(self._rooms.names), "room") for name in asked.rooms]
+        rooms = [self._places.meant(name, list(self._rooms.names)) for name in asked.rooms]
         if not doors and not rooms:
             raise InvalidValueError("give doors or rooms")
         return doors, rooms
@@ -408,7 +408,7 @@ class MapAnswers:
         return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
-        old = self._places.meant(asked.room, list(self._rooms.names), "room")
+        old = self._places.meant(asked.room, list(self._rooms.names))
         answer = self._rename(old, asked.name)
         self._before.append((old, asked.name))
         return answer

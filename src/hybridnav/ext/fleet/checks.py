@@ -180,25 +180,15 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
             )
 
 
-def parts_of(
-    floor: Floor, *, allow_unexplored: bool = False, closed: LongArray | None = None
-) -> LongArray:
+def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:
     """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
-    robot may not be.
-
-    `allow_unexplored`: whether the robot enters unexplored cells; `closed`: int64 (n,), flat cells
-    that are closed besides.
-    """
+    robot may not be."""
     from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
 
     grid = floor.planner.grid
-    is_open = grid.enterable(allow_unexplored=allow_unexplored).copy()
-    if closed is not None:
-        is_open.ravel()[closed] = False
     around = ndimage.generate_binary_structure(2, 2 if grid.corner_cutting else 1)
-    labels, _ = ndimage.label(is_open, structure=around)
-    found: LongArray = labels.astype(np.int64) - 1
-    return found
+    labels, _ = ndimage.label(grid.enterable(allow_unexplored=allow_unexplored), structure=around)
+    return np.asarray(labels, dtype=np.int64) - 1
 
 
 def check_speed(speed_m_s: float) -> float:
