@@ -81,18 +81,6 @@ MOST_READINGS = 1_000_000
 """Readings of a scan."""
 
 
-def checked_count(name: str, value: Any, most: int) -> int:
-    """Return a whole number from 1 to the most.
-
-    Raises `InvalidValueError` when it is none.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= most:
-        raise InvalidValueError(
-            f"{name} is {value!r:.80}, expected a whole number from 1 to {most}: give another one"
-        )
-    return int(value)
-
-
 def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return a finite pose, no farther than a grid may be.
 

@@ -11,9 +11,9 @@ import numpy as np
 from hybridnav._base.trig import log, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import ray_lengths
-from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_count, checked_number
+from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_number
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.maps.checks import checked_type
+from hybridnav.maps.checks import checked_type, checked_whole
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
@@ -208,7 +208,7 @@ class SimulatedLaser:
                 f"max_range_m is {far_m}, expected a finite number > 0: give metres"
             )
         _check_lengths(noise_m=self.noise_m)
-        checked_count("n_beams", self.n_beams, MOST_READINGS)
+        checked_whole("n_beams", self.n_beams, 1, MOST_READINGS)
         for name in ("start_rad", "step_rad"):
             checked_number(name, getattr(self, name))
 
