@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
-_MOST_PAIRS = 1_000_000
 LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 """Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
 
@@ -77,7 +76,7 @@ ReportOption = Annotated[
         "--report",
         metavar="N",
         min=1,
-        max=_MOST_PAIRS,
+        max=1_000_000,
         help="Compare the routes of N random pairs with shortest paths.",
     ),
 ]
@@ -184,9 +183,8 @@ class Fleet:
         if kind == "lif" and not vehicles:
             raise UsageError("--format lif needs --vehicle MANUFACTURER.SERIES: who drives")
         place = None if anchor is None else _anchor(anchor)
-        return cls(
-            kind, "0" if floor is None else floor, place, tuple(vehicles or ()), not no_doors
-        )
+        own = "0" if floor is None else floor
+        return cls(kind, own, place, tuple(vehicles or ()), not no_doors)
 
     def write(self, topology: hn.TopologicalMap, graph: RouteGraph, out: Path) -> tuple[str, ...]:
         """Write a file of one floor; return what it does not hold."""
@@ -213,10 +211,8 @@ def respond(
 
 
 def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
-    """Return the named points of a YAML file, in metres, and which of them are lifts.
-
-    Raises `UsageError` when it is no mapping of names to points or poses, or has a name twice.
-    """
+    """Return the named points of a YAML file, in metres, and which of them are lifts. Raises
+    `UsageError` when it is no mapping of names to points or poses, or has a name twice."""
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
 
     given, lifts = read_yaml(path, what="points", error=MapError), {}

@@ -69,7 +69,6 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
 
 # What is known of the nodes and edges of a route graph: rooms, doors, widths.
 
-
 FARTHEST_M = 10.0
 """Distance in metres up to which free space beside an edge is measured."""
 
