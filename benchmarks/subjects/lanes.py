@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +85,7 @@ class Floor:
         clear[clear] = space.joins(at[edges[clear, 0]], at[edges[clear, 1]])
         usable = edges[clear]
         network = Network.of(space.sight, at, usable, np.flatnonzero(is_free))
-        joined = network.with_candidates(MANY_CANDIDATES).join(self.starts, self.goals)
+        joined = replace(network, candidates=MANY_CANDIDATES).join(self.starts, self.goals)
         nearest = excess_of(joined.nearest(), self.optimum)
         best = excess_of(joined.best(), self.optimum)
         own = excess_of(self.own_lengths(at, usable), self.optimum)
@@ -129,7 +130,7 @@ class Floor:
         ]
         steps = np.array([step for chain in chains for step in pairwise(chain)], dtype=np.int64)
         network = Network.of(self.space.sight, np.concatenate([at, inner]), steps.reshape(-1, 2))
-        return network.with_candidates(MANY_CANDIDATES).join(self.starts, self.goals).best()
+        return replace(network, candidates=MANY_CANDIDATES).join(self.starts, self.goals).best()
 
     def nav2_lengths(self, at: FloatArray, is_free: Any, edges: LongArray) -> FloatArray:
         """Return the lengths of the routes of all pairs as Nav2 joins them, in cells, infinite for

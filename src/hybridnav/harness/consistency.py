@@ -31,15 +31,9 @@ Cell = tuple[int, int]
 class Consistency:
     """The two layers of one method on one map, and the three questions to them.
 
-    Parameters
-    ----------
-    grid
-        The map; its free cells are the metric layer.
-    region_of
-        int32 (rows, cols), the region of each cell, -1 for none.
-    topology
-        The topological map of the regions, with its arcs; with None the edges of the topological
-        layer are all pairs of regions that a legal move joins.
+    `grid`: the map; its free cells are the metric layer; `region_of`: int32 (rows, cols), the
+    region of each cell, -1 for none; `topology`: the topological map of the regions, with its arcs;
+    with None the edges of the topological layer are all pairs of regions that a legal move joins.
     """
 
     def __init__(
@@ -96,10 +90,7 @@ class Consistency:
         """Check that every region is connected, and that solvability agrees for every pair of free
         cells.
 
-        Returns
-        -------
-        list
-            The faults, each with two cells that show it.
+        Returns the faults, each with two cells that show it.
         """
         free = np.flatnonzero(self._free)
         region, component, whole = self._region[free], self._component[free], self._whole[free]
@@ -138,19 +129,8 @@ class Consistency:
     ) -> str | None:
         """Check that a topological plan has a metric path inside its regions, in order.
 
-        Parameters
-        ----------
-        start, goal
-            Cells (row, col).
-        nodes
-            Regions in the order passed.
-        arcs
-            Dense indices of the arcs between them; None allows any legal crossing.
-
-        Returns
-        -------
-        str or None
-            What is wrong.
+        `start`, `goal`: cells (row, col); `nodes`: regions in the order passed; `arcs`: dense
+        indices of the arcs between them; None allows any legal crossing. Returns what is wrong.
         """
         unknown = [node for node in nodes if not 0 <= node < self._count]
         if unknown:
@@ -191,12 +171,8 @@ class Consistency:
 
         Each stay in a region is a graph of its own, and any legal move leads from one to the next.
 
-        Parameters
-        ----------
-        start, goal
-            Cells (row, col).
-        nodes
-            Regions in the order passed, no two alike in a row; one may come again.
+        `start`, `goal`: cells (row, col); `nodes`: regions in the order passed, no two alike in a
+        row; one may come again.
         """
         tails, heads, base = [], [], 0
         starts = np.searchsorted(self._region[self._order], np.arange(self._count + 1))
@@ -232,15 +208,7 @@ class Consistency:
 
         A diagonal between two regions may pass either of its side cells.
 
-        Parameters
-        ----------
-        cells
-            int64 (n, 2), the path.
-
-        Returns
-        -------
-        str or None
-            What is wrong.
+        `cells`: int64 (n, 2), the path. Returns what is wrong.
         """
         flat = cells[:, 0] * self._cols + cells[:, 1]
         region = self._region[flat]

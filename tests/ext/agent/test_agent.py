@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.ext.agent import TOOLS, MapAnswers, serving
+from hybridnav.ext.agent import TOOLS, MapAnswers, questions
 from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.kept import RoomsFile
 from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
@@ -226,9 +226,9 @@ def test_small_answers_and_a_limit_in_time(tmp_path, monkeypatch):
         ("explain", {"start": start, "goal": goal}),
     ):
         assert len(json.dumps(answers.call(name, arguments)).encode()) <= 2048, name
-    monkeypatch.setattr(serving, "LIMIT_S", 0.05)
+    monkeypatch.setattr(questions, "LIMIT_S", 0.05)
     monkeypatch.setattr(answers, "call", lambda *_: __import__("time").sleep(0.4))
-    late = asyncio.run(serving.answered(answers, "route", {}))
+    late = asyncio.run(questions.answered(answers.call, "route", {}))
     assert not late["ok"]
     assert "no answer within" in late["text"]
 

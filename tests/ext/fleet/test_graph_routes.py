@@ -22,7 +22,7 @@ from hybridnav.ext.fleet import (
     judge_building_graph,
     match_graph,
 )
-from hybridnav.ext.fleet.graph_judge import drawn_pairs
+from hybridnav.ext.fleet.graph_check import drawn_pairs
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.harness.judges import segment_faults
 from tests.ext.fleet.scenes import Scene, charge, optimum_any_angle, random_building, usable

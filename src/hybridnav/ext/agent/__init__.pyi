@@ -1,5 +1,5 @@
 from .answers import MapAnswers as MapAnswers
 from .questions import TOOLS as TOOLS, Tool as Tool
-from .serving import serve_stdio as serve_stdio
+from .command import serve_stdio as serve_stdio
 
 __all__: list[str]

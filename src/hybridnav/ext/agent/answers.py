@@ -13,17 +13,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from hybridnav.errors import HybridNavError, InvalidValueError
+from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
-from hybridnav.ext.agent.places import (
-    SHOWN,
-    NamedPlaces,
-    UnclearError,
-    doubled,
-    fitting,
-    narrowed,
-    rounded,
-    tight_of,
-)
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, matching
@@ -107,7 +98,7 @@ class MapAnswers:
             first = error.errors()[0]
             at = ".".join(map(str, first["loc"])) or "the arguments"
             return _refused(f"{at}: {first['msg']}".replace("\n", " ")[:300])
-        except UnclearError as error:
+        except places.UnclearError as error:
             return _refused(str(error)) | {"choices": error.choices}
         except HybridNavError as error:
             return _refused(str(error))
@@ -123,8 +114,8 @@ class MapAnswers:
         return self._session.planning.topology
 
     @property
-    def _places(self) -> NamedPlaces:
-        return NamedPlaces(self._rooms)
+    def _places(self) -> places.NamedPlaces:
+        return places.NamedPlaces(self._rooms)
 
     def _shut(self, avoiding: list[str]) -> Blocked:
         """Return what is closed in this session with what one question avoids."""
@@ -199,7 +190,7 @@ class MapAnswers:
             "text": f"{text}.",
             "room": name,
             "ground": ground,
-            "beside": beside[:SHOWN],
+            "beside": beside[: places.SHOWN],
         }
         if near:
             answer["nearest_door"] = {
@@ -219,7 +210,7 @@ class MapAnswers:
         key = width / 2
         known = self._planners.get(key)
         if known is None or known.pyramid_rooms is not self._rooms.labels:
-            known = self._planners[key] = narrowed(own, key)
+            known = self._planners[key] = places.narrowed(own, key)
         self._planners.move_to_end(key)
         while len(self._planners) > _MOST_PLANNERS:
             self._planners.popitem(last=False)
@@ -242,14 +233,14 @@ class MapAnswers:
             "length_m": length,
             "lower_bound_m": bound,
             "gap": round(max(tour.gap, 0.0), 9),
-            "start": rounded(tour.start),
-            "goal": rounded(tour.goal),
+            "start": places.rounded(tour.start),
+            "goal": places.rounded(tour.goal),
             "rooms": [leg.room or leg.shape for leg in tour.legs][:_PASSED],
             "doors": doors[:_PASSED],
         }
         if asked.words:
             lines = tour.words(asked.language)[asked.words_from :]
-            answer["words"] = fitting(lines)
+            answer["words"] = places.fitting(lines)
             answer["words_left"] = len(lines) - len(answer["words"])
         path = tour.results[0].path
         if asked.points and path is not None:
@@ -271,7 +262,7 @@ class MapAnswers:
             "status": str(tour.status),
             "reason": words,
             "doors_to_open": [one.which for one in why.to_open if one.kind == "doors"],
-            "widest_m": doubled(why.widest_m),
+            "widest_m": places.doubled(why.widest_m),
         }
 
     def _can_reach(self, asked: ask.CanReach) -> dict[str, Any]:
@@ -280,7 +271,7 @@ class MapAnswers:
             return {"can_reach": False, **self._no_path(planner, tour, asked, "en")}
         ends: Any = tour.start, tour.goal
         why = planner.explain(*ends, blocked=self._shut(asked.avoiding))
-        width = doubled(why.widest_m)
+        width = places.doubled(why.widest_m)
         limits = "nothing limits the width" if width is None else f"below {width:.3f} m wide"
         return {
             "text": f"Yes, in {tour.length_m:.2f} m; for all who are {limits}."
@@ -289,7 +280,7 @@ class MapAnswers:
             "can_reach": True,
             "length_m": round(tour.length_m, 3),
             "widest_m": width,
-            **tight_of(why),
+            **places.tight_of(why),
         }
 
     def _explain(self, asked: ask.Explain) -> dict[str, Any]:
@@ -301,10 +292,10 @@ class MapAnswers:
         return {
             "text": " ".join(why.words(asked.language)),
             "has_path": why.has_path,
-            "widest_m": doubled(why.widest_m),
+            "widest_m": places.doubled(why.widest_m),
             "doors_to_open": [one.which for one in why.to_open if one.kind == "doors"],
             "through_unexplored": why.through_unexplored,
-            **tight_of(why),
+            **places.tight_of(why),
         }
 
     def _nearest(self, asked: ask.Nearest) -> dict[str, Any]:
@@ -327,7 +318,7 @@ class MapAnswers:
                 best.append((found.cost, facts | lengths))
                 best.sort(key=lambda one: one[0])
         if not best:
-            raise UnclearError(
+            raise places.UnclearError(
                 f"none of {len(goals)} of {asked.of!r:.80} can be reached from there"
             )
         others_m = min([others_m, *(length for length, _ in best[asked.count :])])
@@ -375,7 +366,7 @@ class MapAnswers:
 
     def _named(self, asked: ask.Close) -> tuple[list[int], list[str]]:
         doors = [self._rooms.listed_door(number).number for number in asked.doors]
-        rooms = [self._places.meant(name, list(self._rooms.names), "room") for name in asked.rooms]
+        rooms = [self._places.meant(name, list(self._rooms.names)) for name in asked.rooms]
         if not doors and not rooms:
             raise InvalidValueError("give doors or rooms")
         return doors, rooms
@@ -417,7 +408,7 @@ class MapAnswers:
         return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
-        old = self._places.meant(asked.room, list(self._rooms.names), "room")
+        old = self._places.meant(asked.room, list(self._rooms.names))
         answer = self._rename(old, asked.name)
         self._before.append((old, asked.name))
         return answer

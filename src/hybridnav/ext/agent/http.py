@@ -12,8 +12,7 @@ from starlette.routing import Route
 from hybridnav._version import __version__
 from hybridnav.errors import HybridNavError
 from hybridnav.ext.agent.answers import MapAnswers
-from hybridnav.ext.agent.questions import TOOLS, Answer
-from hybridnav.ext.agent.serving import INSTRUCTIONS, answered, schema_of
+from hybridnav.ext.agent.questions import INSTRUCTIONS, TOOLS, Answer, answered, schema_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,14 +28,9 @@ _UNPROCESSABLE = 422
 class HttpTools:
     """The functions of the floors of a page.
 
-    Parameters
-    ----------
-    session_of
-        Returns the session of the floor that a request names.
-    body_of
-        Returns the value of the body of a request, or the response that refuses it.
-    allow_edits
-        Whether what changes something is answered.
+    `session_of`: returns the session of the floor that a request names; `body_of`: returns the
+    value of the body of a request, or the response that refuses it; `allow_edits`: whether what
+    changes something is answered.
     """
 
     def __init__(
@@ -74,7 +68,7 @@ class HttpTools:
         if answers is None:
             answers = MapAnswers(session, allow_edits=self._allow_edits)
             self._answers[session] = answers
-        found = await answered(answers, request.path_params["name"], arguments)
+        found = await answered(answers.call, request.path_params["name"], arguments)
         if "png" in found:
             found["png"] = base64.b64encode(found["png"]).decode()
         return JSONResponse(found, 200 if found["ok"] else _UNPROCESSABLE)

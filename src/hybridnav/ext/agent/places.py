@@ -41,13 +41,7 @@ class UnclearError(HybridNavError):
 
 
 class NamedPlaces:
-    """The rooms and doors of one map, by what programs call them.
-
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    """
+    """The rooms and doors of one map, by what programs call them."""
 
     def __init__(self, rooms: Rooms) -> None:
         self.rooms = rooms
@@ -78,13 +72,10 @@ class NamedPlaces:
             "doors": [door.number for door in self.doors_of(name)][:SHOWN],
         }
 
-    def meant(self, name: str, known: list[str], what: str) -> str:
+    def meant(self, name: str, known: list[str]) -> str:
         """Return the one name that a text means.
 
-        Raises
-        ------
-        UnclearError
-            When it means none, or several.
+        Raises `UnclearError` when it means none, or several.
         """
         if name in known:
             return name
@@ -99,9 +90,8 @@ class NamedPlaces:
         if len(found) == 1:
             return found[0]
         if not found:
-            raise UnclearError(
-                f"no {what} is called {name!r:.80}{did_you_mean(name, tuple(known))}"
-            )
+            hint = did_you_mean(name, tuple(known))
+            raise UnclearError(f"no room is called {name!r:.80}{hint}")
         listed = self.rooms.names
         raise UnclearError(
             f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
@@ -113,7 +103,7 @@ class NamedPlaces:
         if not isinstance(place, str):
             return place[0], place[1]
         labels = self.rooms.labels
-        return self.meant(place, list(dict.fromkeys((*labels.names, *labels.points))), "room")
+        return self.meant(place, list(dict.fromkeys((*labels.names, *labels.points))))
 
     def blocked(self, avoiding: list[str]) -> Blocked:
         """Return what a question avoids."""
@@ -122,7 +112,7 @@ class NamedPlaces:
             if number := _DOOR.fullmatch(text.strip()):
                 doors.append(self.rooms.listed_door(int(number[1])).number)
             else:
-                rooms.append(self.meant(text, list(self.rooms.names), "room"))
+                rooms.append(self.meant(text, list(self.rooms.names)))
         return Blocked(doors=doors, rooms=rooms)
 
     def candidates(

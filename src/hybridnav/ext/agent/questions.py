@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple
+import asyncio
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _FAR_M = 1e6
 _Metres = Annotated[float, Field(ge=-_FAR_M, le=_FAR_M, allow_inf_nan=False)]
@@ -303,3 +307,31 @@ TOOLS = (
     Tool("name_room", NameRoom, ChangeAnswer, edits=True),
 )
 """All functions, for every protocol."""
+
+
+# Calls, for every protocol.
+
+LIMIT_S = 30.0
+"""Seconds after which a call is answered with an error."""
+INSTRUCTIONS = (
+    "A map of a building for robots and people: rooms, doors, and shortest paths with a proof. "
+    "Places are names of rooms or points [x, y] in metres. Begin with describe_map and list_rooms. "
+    "An answer with ok=false says in `text` what to do, and in `choices` what a name may mean."
+)
+
+
+async def answered(
+    call: Callable[[str, dict[str, Any]], dict[str, Any]], name: str, arguments: dict[str, Any]
+) -> dict[str, Any]:
+    """Answer a call in a thread, within its time."""
+    try:
+        return await asyncio.wait_for(asyncio.to_thread(call, name, arguments), LIMIT_S)
+    except asyncio.TimeoutError:
+        return {"ok": False, "text": f"no answer within {LIMIT_S:g} s: ask again, and for less"}
+
+
+def schema_of(asks: Any) -> dict[str, Any]:
+    """Return the JSON schema of the arguments of a function."""
+    schema: dict[str, Any] = asks.model_json_schema()
+    schema.pop("description", None)
+    return schema

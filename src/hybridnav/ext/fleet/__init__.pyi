@@ -5,8 +5,6 @@ from .floors import Floor as Floor
 from .graph_check import (
     BuildingGraphCheck as BuildingGraphCheck,
     check_building_graph as check_building_graph,
-)
-from .graph_judge import (
     BuildingGraphReport as BuildingGraphReport,
     RouteCounts as RouteCounts,
     judge_building_graph as judge_building_graph,

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.links import Link
     from hybridnav.maps import OccupancyGrid
 
-
 Pose = tuple[float, float, float]
 """`(x, y, yaw)` of one frame in another, in metres and radians."""
 
@@ -166,9 +165,8 @@ def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
 
 def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
     """Return a point in another frame."""
-    x, y, yaw = pose
-    cosine, sine = cos(yaw), sin(yaw)
-    return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]
+    x, y = moved_points(np.array([point], dtype=np.float64), pose)[0].tolist()
+    return x, y
 
 
 def moved_points(points: FloatArray, pose: Pose) -> FloatArray:
@@ -207,16 +205,9 @@ def placed_pose(
     the graph's points that lie in walls or outside the map. The links that are near to theirs by
     this pose are fitted once more, by least squares.
 
-    Parameters
-    ----------
-    own
-        float64 (n, 2), the ends of links in the graph, metres, at least one.
-    wanted
-        float64 (n, 2), those of the building, in the frame of the map.
-    graph
-        float64 (k, 2), points of the graph where a robot should fit, in the frame of `own`.
-    grid
-        The map.
+    `own`: float64 (n, 2), the ends of links in the graph, metres, at least one; `wanted`: float64
+    (n, 2), those of the building, in the frame of the map; `graph`: float64 (k, 2), points of the
+    graph where a robot should fit, in the frame of `own`.
     """
     whole = fitted_pose(own, wanted)
     if _away(own, wanted, whole).max() <= _AGREED_M:

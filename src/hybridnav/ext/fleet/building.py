@@ -10,17 +10,10 @@ import numpy as np
 
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.fleet.checks import (
-    check_floors,
-    check_links,
-    check_speed,
-    endpoint_of,
-    refusal_of,
-)
+from hybridnav.ext.fleet import checks
 from hybridnav.ext.fleet.floors import FloorTable, building_parts
 from hybridnav.ext.fleet.links import LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
-from hybridnav.ext.fleet.profiles import floors_under, links_under, profiled, reason_under
 from hybridnav.ext.fleet.search import LinkSearch
 from hybridnav.maps.names import place_of_name
 from hybridnav.planner.blocked import as_blocked
@@ -107,11 +100,11 @@ class Building:
         profiles: Sequence[Profile] = (),
         journal: Journal | None = None,
     ) -> None:
-        check_floors(floors)
-        check_links(links, floors)
+        checks.check_floors(floors)
+        checks.check_links(links, floors)
         self.floors = tuple(floors)
         self.links = tuple(links)
-        self.speed_m_s = check_speed(speed_m_s)
+        self.speed_m_s = checks.check_speed(speed_m_s)
         self.profiles = tuple({one.name: one for one in (*PROFILES, *profiles)}.values())
         """The profiles that `plan` knows by name."""
         self.journal = journal
@@ -350,7 +343,7 @@ class Building:
             return plans(one, (1, 1.0))[0], self._under(one).floors
 
         found = plans(chosen, limits)
-        note = "" if found[0].solved else reason_under(chosen, wider)
+        note = "" if found[0].solved else checks.reason_under(chosen, wider)
         of: dict[str, Any] = {"profile": chosen.name, "note": note}
         return replace(found, found=tuple(replace(plan, **of) for plan in found))
 
@@ -359,10 +352,10 @@ class Building:
         tables = self._current()
         kept = self._profiled.get(profile)
         if kept is None or any(a is not b for a, b in zip(kept[0], tables, strict=True)):
-            floors = floors_under(self.floors, profile)
-            links = links_under(self.links, {floor.name: floor for floor in floors}, profile)
+            floors = checks.floors_under(self.floors, profile)
+            links = checks.links_under(self.links, {floor.name: floor for floor in floors}, profile)
             made = Building(floors, links, speed_m_s=self.speed_m_s)
-            own = Privacy(profile, profiled(floors, profile))
+            own = Privacy(profile, checks.profiled(floors, profile))
             shut = [
                 table.closing(table.floor.planner.closed(own.rooms_closed(number)))
                 for number, table in enumerate(made._current())
@@ -405,14 +398,14 @@ class Building:
         while True:
             tables = self._current()
             endpoints = (
-                endpoint_of("start", start, self.floors),
-                endpoint_of("goal", goal, self.floors),
+                checks.endpoint_of("start", start, self.floors),
+                checks.endpoint_of("goal", goal, self.floors),
             )
             closed = self._closed(asked.blocked, endpoints, network)
             search = LinkSearch(network, tables, endpoints, closed, asked.at)
             found = answers.found(search, endpoints, limits, began)
             if not found[0].solved:
-                refused = refusal_of(endpoints, self.floors, closed)
+                refused = checks.refusal_of(endpoints, self.floors, closed)
                 found = found if refused is None else (answers.refused(refused, endpoints),)
             if all(table.is_current for table in tables):
                 return BuildingAlternatives.of(found, limits, complete=search.is_complete)

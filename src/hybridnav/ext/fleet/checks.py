@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,18 +15,19 @@ from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
-from hybridnav.planner import PlanStatus
+from hybridnav.planner import HybridPlanner, PlanStatus
 from hybridnav.planner.endpoints import places_of_endpoints, read_point, refusal
 from hybridnav.planner.named import check_names
+from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way, under_profile
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from hybridnav._base.typing import LongArray
     from hybridnav.ext.fleet.links import LinkEnd
-    from hybridnav.planner import OutOfOrder
+    from hybridnav.ext.fleet.plan import BuildingPlan
+    from hybridnav.planner import OutOfOrder, Profile
     from hybridnav.search.found import ClosedCells
-
 
 _LEAST_PART = 0.05
 """Share of the largest connected part of a floor that a part with the end of a link has."""
@@ -34,11 +36,8 @@ _LEAST_PART = 0.05
 def check_floors(floors: Sequence[Floor]) -> None:
     """Refuse floors that do not make one building for one robot.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is none, a name occurs twice, or their planners plan by different presets, for
-        different robots, or with headings.
+    Raises `InvalidValueError` when there is none, a name occurs twice, or their planners plan by
+    different presets, for different robots, or with headings.
     """
     if not floors:
         raise InvalidValueError("a building needs at least one floor, got none")
@@ -75,10 +74,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
 
     Links that the robot does not fit in need no free ends.
 
-    Raises
-    ------
-    InvalidValueError
-        When a link is refused.
+    Raises `InvalidValueError` when a link is refused.
     """
     known = {floor.name: floor for floor in floors}
     seen: set[str] = set()
@@ -97,10 +93,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
 def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
     """Refuse a link that stops at no floor of a name, or where this robot cannot stand.
 
-    Raises
-    ------
-    InvalidValueError
-        When an end is refused.
+    Raises `InvalidValueError` when an end is refused.
     """
     for end in link.ends:
         if end.floor not in floors:
@@ -133,10 +126,8 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
 def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Link]) -> None:
     """Refuse to close what is not in a building.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is no such link, floor, door or room, or a door or a room lacks its floor.
+    Raises `InvalidValueError` when there is no such link, floor, door or room, or a door or a room
+    lacks its floor.
     """
     names = tuple(floor.name for floor in floors)
     if item.link is not None:
@@ -169,19 +160,9 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
     A floor may consist of several parts, as two wings without a passage do, but an end lies in none
     that is smaller than a twentieth of the largest.
 
-    Parameters
-    ----------
-    link
-        The link, whose ends have been checked.
-    floors
-        The floors of the building, by their names.
-    parts
-        The parts of each floor.
-
-    Raises
-    ------
-    InvalidValueError
-        When an end lies in such a part.
+    `link`: the link, whose ends have been checked; `floors`: the floors of the building, by their
+    names; `parts`: the parts of each floor. Raises `InvalidValueError` when an end lies in such a
+    part.
     """
     for end in link.ends:
         grid = floors[end.floor].planner.grid
@@ -199,40 +180,21 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
             )
 
 
-def parts_of(
-    floor: Floor, *, allow_unexplored: bool = False, closed: LongArray | None = None
-) -> LongArray:
+def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:
     """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
-    robot may not be.
-
-    Parameters
-    ----------
-    floor
-        The floor.
-    allow_unexplored
-        Whether the robot enters unexplored cells.
-    closed
-        int64 (n,), flat cells that are closed besides.
-    """
+    robot may not be."""
     from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
 
     grid = floor.planner.grid
-    is_open = grid.enterable(allow_unexplored=allow_unexplored).copy()
-    if closed is not None:
-        is_open.ravel()[closed] = False
     around = ndimage.generate_binary_structure(2, 2 if grid.corner_cutting else 1)
-    labels, _ = ndimage.label(is_open, structure=around)
-    found: LongArray = labels.astype(np.int64) - 1
-    return found
+    labels, _ = ndimage.label(grid.enterable(allow_unexplored=allow_unexplored), structure=around)
+    return np.asarray(labels, dtype=np.int64) - 1
 
 
 def check_speed(speed_m_s: float) -> float:
     """Return a speed, refuse what is none.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is not a finite number above 0.
+    Raises `InvalidValueError` when it is not a finite number above 0.
     """
     if not (math.isfinite(speed_m_s) and speed_m_s > 0):
         raise InvalidValueError(
@@ -247,20 +209,9 @@ def check_speed(speed_m_s: float) -> float:
 def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
     """Return the floor of a start or goal, and the point or name on it.
 
-    Parameters
-    ----------
-    what
-        "start" or "goal".
-    given
-        What the caller gave.
-    floors
-        The floors of the building.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is neither, the floor or the name is not known, the name is on several floors, or
-        the point is not two finite numbers.
+    `what`: "start" or "goal"; `given`: what the caller gave; `floors`: the floors of the building.
+    Raises `InvalidValueError` when it is neither, the floor or the name is not known, the name is
+    on several floors, or the point is not two finite numbers.
     """
     if isinstance(given, str):
         index, waypoint = _floor_of_name(given, floors), given
@@ -316,3 +267,106 @@ def refusal_of(
         if status is not None:
             return PlanStatus[status.name.replace("START", kind)]
     return None
+
+
+# Buildings under a profile: planners of its width and costs, the links that it can use, and why
+# there is no route.
+
+_NEAR_M = 1.0
+"""How far from its end a link is entered by who is too wide to stand there, at most."""
+
+
+def floors_under(floors: Sequence[Floor], profile: Profile) -> list[Floor]:
+    """Return floors with planners of the width and the costs of a profile.
+
+    `floors`: the floors; if a profile has costs on one, it plans by costs on all.
+    """
+    by_costs = any(profile.by_costs(floor.rooms) for floor in floors)
+    made: dict[HybridPlanner, HybridPlanner] = {}
+    for floor in floors:
+        if floor.planner not in made:
+            before = floor.planner
+            given = before.topology, before.preset, before.given_costs
+            topology, preset, costs = under_profile(*given, profile, by_costs=by_costs)
+            is_same = (topology, costs) == (given[0], given[2])
+            made[before] = (
+                before if is_same else HybridPlanner(topology, preset=preset, costs=costs)
+            )
+    return [replace(floor, planner=made[floor.planner]) for floor in floors]
+
+
+def profiled(floors: Sequence[Floor], profile: Profile) -> list[ProfiledFloor]:
+    """Return what decides about private rooms on floors with planners as wide as a profile."""
+    planners = [floor.planner for floor in floors]
+    return [ProfiledFloor.of(one.topology, profile, one.preset.planner) for one in planners]
+
+
+def links_under(links: Sequence[Link], floors: Mapping[str, Floor], profile: Profile) -> list[Link]:
+    """Return the links that a profile can use on floors with its planners.
+
+    Where its width has no room at an end, the nearest cell of the same room within a metre is
+    taken; a link without one is left out.
+
+    `links`: the links of the building; `floors`: the floors, by name.
+    """
+    found = []
+    for link in links:
+        radius_m = next(iter(floors.values())).planner.grid.robot_radius_m
+        if link.admits(radius_m, stairs=profile.stairs):
+            ends = [_end_under(end, floors[end.floor]) for end in link.ends]
+            if None not in ends:
+                found.append(replace(link, ends=tuple(end for end in ends if end is not None)))
+    return found
+
+
+def _end_under(end: LinkEnd, floor: Floor) -> LinkEnd | None:
+    """Return the end of a link where the robot of a floor can stand, None for none."""
+    planner, rooms = floor.planner, floor.rooms
+    grid = planner.grid
+    row, col = grid.frame.cell_of(*end.position_m)
+    is_open = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
+    if is_open[row, col]:
+        return end
+    reach = int(_NEAR_M / grid.resolution_m)
+    top, left = max(row - reach, 0), max(col - reach, 0)
+    window = np.s_[top : row + reach + 1, left : col + reach + 1]
+    near = is_open[window]
+    if rooms is not None:
+        near = near & (rooms.label_of[window] == rooms.label_of[row, col])
+    cells = np.argwhere(near) + np.array([top, left])
+    away = np.hypot(*(cells - [row, col]).T)
+    if away.min(initial=np.inf) > reach:
+        return None
+    x, y = grid.frame.points_of(cells[away.argmin()][None])[0].tolist()
+    return replace(end, position_m=(x, y))
+
+
+def reason_under(
+    profile: Profile, plan_under: Callable[[Profile], tuple[BuildingPlan, Sequence[Floor]]]
+) -> str:
+    """Return what of a profile leaves no route over floors, one line; empty where there is none
+    without it.
+
+    `plan_under`: returns the plan of the query under another profile, and the floors of its
+    planners.
+    """
+
+    def passed(other: Profile) -> list[str] | None:
+        plan, floors = plan_under(other)
+        if not plan.solved:
+            return None
+        on = {floor.name: floor for floor in floors}
+        last, words = len(plan.results) - 1, []
+        for number, (name, result) in enumerate(zip(plan.floors, plan.results, strict=True)):
+            guide, rooms = on[name].planner.guide, on[name].rooms
+            if guide is None or rooms is None or result.path is None:
+                continue
+            whole = number == 0, number == last
+            words += in_the_way(profile, rooms, guide, result.path, whole=whole)
+        half_m = (profile.width_m or 0.0) / 2
+        taken = [
+            ride.link for ride in plan.rides if not ride.link.admits(half_m, stairs=profile.stairs)
+        ]
+        return [*words, *(link.name for link in taken)]
+
+    return forbidden(profile, passed)

@@ -11,16 +11,8 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav.cli import common
 from hybridnav.cli.closed import change_closed, list_closed
-from hybridnav.cli.common import (
-    EXIT_NOT_SOLVED,
-    UsageError,
-    answer,
-    check_picture,
-    progress_bar,
-    stage,
-    timings,
-)
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import check_model, read_settings
@@ -55,7 +47,7 @@ def load_floors(
 ) -> hn.ext.fleet.Building:
     """Load a building as the options say."""
     preset = preset_of_floors(reading)
-    with stage(f"reading {file}", seconds, "load"):
+    with common.stage(f"reading {file}", seconds, "load"):
         return hn.ext.fleet.load_building(
             file, robot_radius_m=reading.robot_radius_m, preset=preset, max_cells=reading.max_cells
         )
@@ -80,11 +72,13 @@ def plan_over_floors(
     reading: MapOptions,
 ) -> None:
     """Plan a route over floors, print the answer, and draw it; see `hybridnav plan`."""
-    check_picture(plot)
+    common.check_picture(plot)
     how: dict[str, Any] = {"stairs": not no_stairs, "at": checked_at(at), "profile": profile}
     check_language(language)
     if max_stretch is not None and alternatives == 1:
-        raise UsageError("--max-stretch is for alternatives: add --alternatives N, or leave it out")
+        raise common.UsageError(
+            "--max-stretch is for alternatives: add --alternatives N, or leave it out"
+        )
     typed = _typed("start", start, "from", origin), _typed("goal", goal, "to", to)
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
@@ -92,7 +86,7 @@ def plan_over_floors(
     how["closed_links"], how["blocked"] = _closures(building, blocked or ())
     shut = [item.what for item in building.journal.items()] if building.journal else []
     others: BuildingAlternatives | None = None
-    with stage("planning", {}, "plan"):
+    with common.stage("planning", {}, "plan"):
         if alternatives == 1:
             plans: Sequence[hn.ext.fleet.BuildingPlan] = (building.plan(first, last, **how),)
         else:
@@ -116,7 +110,7 @@ def plan_over_floors(
         figures["alternatives_note"] = others.note
     figures["seconds"] = seconds | figures["seconds"]
     whole = json.dumps(figures, allow_nan=False) + "\n" if as_json else None
-    answer(whole or _summary(map_file, building, figures))
+    common.answer(whole or _summary(map_file, building, figures))
     if plot is not None:
         # They load matplotlib.
         from hybridnav.ext.fleet.plot import plot_building  # noqa: PLC0415
@@ -124,7 +118,7 @@ def plan_over_floors(
 
         save_figure(plot_building(building, plans)[0], plot)
     if not plans[0].solved:
-        raise typer.Exit(EXIT_NOT_SOLVED)
+        raise typer.Exit(common.EXIT_NOT_SOLVED)
 
 
 def _typed(option: str, point: Any, other: str, text: str | None) -> str:
@@ -142,7 +136,7 @@ def _closures(
     for text in blocked:
         kind, colon, rest = text.partition(":")
         if not colon or not rest.strip():
-            raise UsageError(
+            raise common.UsageError(
                 "--blocked must be link:NAME, or FLOOR: and a thing there, as 2:door:7, "
                 f"got {text!r:.80}"
             )
@@ -179,7 +173,7 @@ def _summary(file: Path, building: hn.ext.fleet.Building, figures: dict[str, Any
         lines.append(f"route {number:<4} {cost}, by {by}")
     if figures.get("alternatives_note"):
         lines.append(f"routes     {figures['alternatives_note']}")
-    lines.append(f"seconds    {timings(figures['seconds'])}")
+    lines.append(f"seconds    {common.timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
 
 
@@ -210,10 +204,12 @@ def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:
             if point is None:
                 return name, rest
             if len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-                raise UsageError(f"expected FLOOR:X,Y, finite numbers of metres, got {text!r:.80}")
+                raise common.UsageError(
+                    f"expected FLOOR:X,Y, finite numbers of metres, got {text!r:.80}"
+                )
             return name, point
     if read_point(text) is not None:
-        raise UsageError(
+        raise common.UsageError(
             f"a point of a building needs its floor, as {floors[0]}:{text}, got {text!r:.80}"
         )
     floor, colon, _ = text.partition(":")
@@ -251,13 +247,16 @@ def build_over_floors(
     """Prepare a building for planning, write it to a model, and print a summary."""
     check_model(out)
     if len(preset or ()) > 1:
-        raise UsageError("--preset is taken once for a building: its floors have one")
+        raise common.UsageError("--preset is taken once for a building: its floors have one")
     seconds: dict[str, float] = {}
     reading = replace(reading, preset=preset[0] if preset else None)
     building = load_floors(map_file, reading, seconds)
-    with stage("preparing", seconds, "prepare"), progress_bar("preparing floors") as advance:
+    with (
+        common.stage("preparing", seconds, "prepare"),
+        common.progress_bar("preparing floors") as advance,
+    ):
         building.prepare(progress=advance)
-    with stage(f"writing {out}", seconds, "write"):
+    with common.stage(f"writing {out}", seconds, "write"):
         hn.save(building, out, compress=compress)
     names = ", ".join(printable(floor.name) for floor in building.floors)
     links = ", ".join(printable(link.name) for link in building.links) or "none"
@@ -266,6 +265,6 @@ def build_over_floors(
         f"floors     {len(building.floors)}: {names}",
         f"links      {len(building.links)}: {links}",
         f"robot      radius {building.robot_radius_m:g} m",
-        f"seconds    {timings(seconds)}",
+        f"seconds    {common.timings(seconds)}",
     ]
-    answer("\n".join(lines) + "\n")
+    common.answer("\n".join(lines) + "\n")

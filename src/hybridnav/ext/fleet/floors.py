@@ -93,16 +93,9 @@ class FloorTable:
     It belongs to the map and the costs that its floor's planner had when it was made; after an
     update of the planner it is not `current` any more.
 
-    Parameters
-    ----------
-    floor
-        The floor.
-    positions_m
-        float64 (n, 2), the ends of links on it, `(x, y)` in metres.
-    known
-        Costs and bounds that were computed before, of the same map; None for none.
-    closed
-        Cells that are closed for all plans between the ends; None for none.
+    `positions_m`: float64 (n, 2), the ends of links on it, `(x, y)` in metres; `known`: costs and
+    bounds that were computed before, of the same map; None for none; `closed`: cells that are
+    closed for all plans between the ends; None for none.
     """
 
     def __init__(
@@ -200,10 +193,7 @@ class FloorTable:
     def straight_m(self, waypoint: ArrayLike | str) -> FloatArray:
         """Return lower bounds on the costs between a waypoint and each end, float64 (n,), metres.
 
-        Parameters
-        ----------
-        waypoint
-            A point `(x, y)` in metres, or a name of the floor.
+        `waypoint`: a point `(x, y)` in metres, or a name of the floor.
         """
         return self._safe(self._distance_m(waypoint, self.positions_m))
 
@@ -292,21 +282,10 @@ def building_parts(  # noqa: PLR0913 - a building, taken apart
 ) -> list[Part]:
     """Describe a building; planners that several floors share are described once.
 
-    Parameters
-    ----------
-    floors, links, known
-        Of the building; what is known of the costs between links, floor by floor.
-    facts
-        Its `speed_m_s` and its `profiles`.
-    parts_of
-        Returns the parts of the model of a planner.
-    compress
-        Whether the arrays of its maps are deflated.
-
-    Raises
-    ------
-    InvalidValueError
-        When it has too many maps.
+    `floors`, `links`, `known`: of the building; what is known of the costs between links, floor by
+    floor; `facts`: its `speed_m_s` and its `profiles`; `parts_of`: returns the parts of the model
+    of a planner; `compress`: whether the arrays of its maps are deflated. Raises
+    `InvalidValueError` when it has too many maps.
     """
     planners = list({id(floor.planner): floor.planner for floor in floors}.values())
     if len(planners) > _MOST_MAPS:

@@ -1,23 +1,36 @@
-"""What is wrong with the graph of a building that others have made, on the maps of its floors."""
+"""What is wrong with the graph of a building that others have made, and with its routes."""
 
 from __future__ import annotations
 
+import math
+import time
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
 from hybridnav.ext.graphs.gather import Findings, shown
+from hybridnav.ext.graphs.judge import LEAST_AREA_M2, excess_of
 from hybridnav.ext.graphs.waypoint_graph import add_one_way, components_of, cut_off, one_way_nodes
-from hybridnav.maps.checks import checked_type
+from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.planner.settings import ShortestSettings
+from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import LongArray
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import FloatArray, LongArray
+    from hybridnav.ext.fleet.building import Building
+    from hybridnav.ext.fleet.graph_network import GraphRoute, Position
+    from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.ext.graphs.gather import Finding
+    from hybridnav.ext.graphs.judge import Excess
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +111,8 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
 
 
 def _checked_floors(network: BuildingNetwork) -> dict[str, GraphCheck]:
-    """Return what is wrong on each floor, by its name.
-
-    Routes there and back may lead over other floors, by the links of the graph that this robot fits
-    in.
-    """
+    """Return what is wrong on each floor, by its name; routes there and back may lead over others,
+    by the links of the graph that this robot fits in."""
     one_way = one_way_nodes(network.n_nodes, network.edges())
     checks = {}
     for floor in network.floors.values():
@@ -174,3 +184,267 @@ def _parts(network: BuildingNetwork) -> LongArray:
         labels = part_at[index][tuple(floor.placed.cells[free].T)]
         found[floor.base + free] = whole[bases[index] + labels]
     return found
+
+
+# How the routes on the graph of a building compare with its shortest ones, over all floors.
+
+Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
+_MOST_EXAMPLES = 100
+_ROUNDED = 1.0 - 1e-9
+"""Factor on the optimum below which no route costs, sums being rounded."""
+
+
+@dataclass(frozen=True)
+class RouteCounts:
+    """Routes between some pairs of points, beside the optimum of the building.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import RouteCounts
+    >>> counts = RouteCounts({"solved": 3, "no path, wrong": 1}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> counts.pairs, counts.inconsistent
+    (4, 1)
+    """
+
+    answers: dict[Answer, int]
+    """Number of pairs by the answer of the graph."""
+    loss: Excess | None
+    """Cost of the solved routes over the optimum, less 1; None if none is solved."""
+    steps: float
+    """Mean number of straight lines and rides of the solved routes."""
+    expanded: float
+    """Mean number of nodes that the searches of the solved routes have expanded."""
+    seconds: tuple[float, float]
+    """Median of the wall-clock seconds for a route on the graph, and for one by the building."""
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs."""
+        return sum(self.answers.values())
+
+    @property
+    def inconsistent(self) -> int:
+        """Number of pairs whose answer the building contradicts."""
+        return self.answers.get("contradicted", 0) + self.answers.get("no path, wrong", 0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        loss = None if self.loss is None else vars(self.loss) | {}
+        return {
+            "pairs": self.pairs,
+            "answers": dict(self.answers),
+            "loss": loss,
+            "steps": self.steps,
+            "expanded": self.expanded,
+            "seconds": {"graph": self.seconds[0], "building": self.seconds[1]},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingGraphReport:
+    """Consistency, loss and efficiency of the routes on the graph of a building. Made by
+    `judge_building_graph`.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import BuildingGraphReport, RouteCounts
+    >>> counts = RouteCounts({"solved": 3}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> BuildingGraphReport({"one floor": counts}, ()).counts["one floor"].inconsistent
+    0
+    """
+
+    counts: dict[str, RouteCounts]
+    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; kinds without pairs
+    are left out."""
+    contradictions: tuple[str, ...]
+    """The first 100 pairs whose answer the building contradicts, and why, one line each."""
+
+
+@dataclass(frozen=True)
+class _Judged:
+    answer: Answer
+    cost: float
+    optimum: float
+    steps: int
+    expanded: int
+    seconds: tuple[float, float]
+    is_same_floor: bool
+
+
+def judge_building_graph(
+    matched: MatchedGraph,
+    *,
+    pairs: int = 400,
+    seed: int = 0,
+    stairs: bool = True,
+    clear_edges_only: bool = False,
+) -> BuildingGraphReport:
+    """Compare routes on the graph of a building with its own, over all floors.
+
+    Half of the pairs have both ends on one floor, half on two. A route runs straight from the start
+    to the nearest node in sight of it. It takes the edges and rides that cost least to the nearest
+    node in sight of the goal, and runs straight to the goal, as in `evaluate --graph`. Rides have
+    the charge of the building, whatever the graph states, and the distance from the nodes of the
+    graph to the ends of the building's link. The optimum is that of `Building.plan`.
+
+    An answer is `solved`, or `contradicted` where the route leads through a wall, takes a ride that
+    the building does not have, or costs less than the optimum. It is `no path, wrong` where the
+    building has a route and the graph has none, and `no path, right` where neither has. It is `no
+    node in sight` where the graph does not reach an end.
+
+    Parameters
+    ----------
+    matched
+        The graph, matched to the building.
+    pairs
+        Number of random pairs of free cells, in parts of 1 m² or more.
+    seed
+        Seed of the pairs.
+    stairs
+        Whether the robot takes stairs.
+    clear_edges_only
+        Whether edges and rides that the robot cannot follow are left out; else the graph is taken
+        as it is.
+
+    Returns
+    -------
+    BuildingGraphReport
+        The figures.
+
+    Raises
+    ------
+    InvalidValueError
+        When the planners of the building do not find shortest paths in free space, or there is no
+        pair.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, building_graph
+    >>> from hybridnav.ext.fleet import judge_building_graph, match_graph
+    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
+    >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
+    >>> matched = match_graph(house, building_graph(house, build=build_route_graph))
+    >>> judge_building_graph(matched, pairs=20).counts["all"].answers
+    {'solved': 20}
+    """
+    checked_type("matched", matched, MatchedGraph)
+    checked_between("pairs", pairs, 1, 1e6)
+    building = matched.building
+    _check_planners(building)
+    network = BuildingNetwork(matched, stairs=stairs, clear_edges_only=clear_edges_only)
+    judged: list[_Judged] = []
+    contradictions: list[str] = []
+    for start, goal in drawn_pairs(building, pairs, np.random.default_rng(seed)):
+        one, why = _judged(network, start, goal, stairs=stairs)
+        judged.append(one)
+        if why and len(contradictions) < _MOST_EXAMPLES:
+            ends = (_end(building, end) for end in (start, goal))
+            where = " to ".join(f"{name}:{x:.2f},{y:.2f}" for name, (x, y) in ends)
+            contradictions.append(f"{where}: {why}")
+    groups = {
+        "one floor": [one for one in judged if one.is_same_floor],
+        "two floors": [one for one in judged if not one.is_same_floor],
+        "all": judged,
+    }
+    return BuildingGraphReport(
+        {name: _counts(group) for name, group in groups.items() if group}, tuple(contradictions)
+    )
+
+
+def _check_planners(building: Building) -> None:
+    preset = building.floors[0].planner.preset
+    settings = preset.planner
+    is_plain = isinstance(settings, ShortestSettings) and not settings.allow_unexplored
+    if not is_plain or settings.epsilon or settings.budget_s:
+        raise InvalidValueError(
+            f"the building is planned by preset {preset.name}, and routes are compared with "
+            "shortest paths in free space: load it with preset shortest"
+        )
+
+
+def drawn_pairs(
+    building: Building, count: int, rng: np.random.Generator
+) -> list[tuple[Position, Position]]:
+    """Draw pairs of centres of free cells, every second one on two floors if there are several."""
+    cells_of: dict[int, FloatArray] = {}
+    for index, floor in enumerate(building.floors):
+        labels = parts_of(floor)
+        area_m2 = np.bincount(labels[labels >= 0], minlength=1).astype(np.float64)
+        area_m2 *= floor.planner.grid.cell_area_m2
+        is_inside = (labels >= 0) & ~outside_of(floor.planner.grid)
+        large = np.argwhere(is_inside & (area_m2[labels] >= LEAST_AREA_M2))
+        if len(large):
+            cells_of[index] = large.astype(np.float64) + 0.5
+    if not cells_of:
+        raise InvalidValueError(
+            f"no floor has a part of {LEAST_AREA_M2:g} m² of free space for a robot radius of "
+            f"{building.robot_radius_m:g} m: lower the radius"
+        )
+    floors = list(cells_of)
+    found = []
+    for number in range(count):
+        first = int(rng.choice(floors))
+        others = [floor for floor in floors if floor != first] if number % 2 else []
+        last = int(rng.choice(others)) if others else first
+        start, goal = (cells_of[at][rng.integers(len(cells_of[at]))] for at in (first, last))
+        found.append(((first, start), (last, goal)))
+    return found
+
+
+def _judged(
+    network: BuildingNetwork, start: Position, goal: Position, *, stairs: bool
+) -> tuple[_Judged, str]:
+    """Return the answer of a graph to one pair, and why the building contradicts it."""
+    began = time.perf_counter()
+    route = network.route(start, goal)
+    graph_s = time.perf_counter() - began
+    building = network.building
+    ends = [_end(building, end) for end in (start, goal)]
+    began = time.perf_counter()
+    plan = building.plan(ends[0], ends[1], stairs=stairs)
+    seconds = graph_s, time.perf_counter() - began
+    answer, why = _answer(route, plan)
+    cost, steps, expanded = math.inf, 0, 0
+    if not isinstance(route, str):
+        cost, expanded = route.cost, route.expanded
+        steps = sum(len(line) - 1 for line in route.lines) + len(route.rides)
+    is_same_floor = start[0] == goal[0]
+    return _Judged(answer, cost, plan.cost, steps, expanded, seconds, is_same_floor), why
+
+
+def _answer(route: GraphRoute | str, plan: BuildingPlan) -> tuple[Answer, str]:
+    """Return the answer of a graph, and why the plan of the building contradicts it."""
+    if isinstance(route, str):
+        if route:
+            return "no node in sight", ""
+        if not plan.solved:
+            return "no path, right", ""
+        by = ", ".join(ride.link.name for ride in plan.rides)
+        way = f" by {by}" if by else ""
+        return "no path, wrong", f"the graph has no route, and the building has one{way}"
+    if route.fault:
+        return "contradicted", route.fault
+    if route.cost < plan.lower_bound * _ROUNDED:
+        return "contradicted", f"it costs {route.cost:.3f} m, below {plan.lower_bound:.3f} m"
+    return "solved", ""
+
+
+def _counts(judged: Sequence[_Judged]) -> RouteCounts:
+    counted = Counter(one.answer for one in judged)
+    answers = {answer: counted[answer] for answer in get_args(Answer) if counted[answer]}
+    solved = [one for one in judged if one.answer == "solved"]
+    compared = np.array([(one.cost, one.optimum) for one in solved if one.optimum > 0])
+    excess = excess_of(*compared.T) if len(compared) else None
+    efforts = [(one.steps, one.expanded) for one in solved] or [(0, 0)]
+    seconds = np.median([one.seconds for one in judged], axis=0).tolist()
+    steps, expanded = np.mean(efforts, axis=0).tolist()
+    return RouteCounts(answers, excess, steps, expanded, tuple(seconds))
+
+
+def _end(building: Building, end: Position) -> tuple[str, FloatArray]:
+    """Return the name of a floor, and a point on it in metres."""
+    floor = building.floors[end[0]]
+    return floor.name, floor.planner.grid.frame.points_of_grid(end[1][None])[0]

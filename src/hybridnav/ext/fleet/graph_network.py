@@ -11,13 +11,7 @@ import numpy as np
 
 from hybridnav.ext.fleet.graph_match import AT_LINK_M
 from hybridnav.ext.fleet.link_nodes import node_at
-from hybridnav.ext.graphs.attach import (
-    PlacedGraph,
-    adjacency,
-    nearest_only,
-    placed_points,
-    shortest_routes,
-)
+from hybridnav.ext.graphs import attach
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
@@ -25,7 +19,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.building import Building
     from hybridnav.ext.fleet.graph_match import MatchedGraph, MatchedLink
     from hybridnav.ext.fleet.link_nodes import FloorGraph, Point
-    from hybridnav.ext.graphs.attach import Network, Offsets
     from hybridnav.maps import OccupancyGrid
 
 Position = tuple[int, "FloatArray"]
@@ -71,10 +64,10 @@ class PlacedFloor:
     free: BoolArray
     """bool (rows, cols), the cells that may be entered."""
     sight: Sight
-    placed: PlacedGraph
+    placed: attach.PlacedGraph
     is_clear: BoolArray
     """bool (m,), the edges that the robot can follow."""
-    network: Network
+    network: attach.Network
     """All edges that routes may use."""
     base: int
     """Number of its first node among those of all floors."""
@@ -87,7 +80,7 @@ class PlacedFloor:
         grid = building.floor(graph.name).planner.grid
         free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
         sight = Sight(free)
-        placed = PlacedGraph.of(graph.graph, grid, free)
+        placed = attach.PlacedGraph.of(graph.graph, grid, free)
         is_clear = placed.clear_edges(sight)
         edges = placed.edges[is_clear] if clear_edges_only else placed.edges
         network = placed.network(sight, edges)
@@ -95,7 +88,7 @@ class PlacedFloor:
 
     def sees(self, node: int, point: Point) -> bool:
         """Return whether a robot can drive straight from a node to a point."""
-        at, _, is_free = placed_points(np.array([point]), self.grid, self.free)
+        at, _, is_free = attach.placed_points(np.array([point]), self.grid, self.free)
         if not (self.placed.is_free[node] and is_free[0]):
             return False
         return bool(self.sight.clear(self.placed.positions[node, None], at)[0])
@@ -109,14 +102,8 @@ class BuildingNetwork:
     `graphs.GraphMethod`, floor by floor. A ride costs what the building's link charges, and the
     straight way from the nodes of the graph to the ends of that link.
 
-    Parameters
-    ----------
-    matched
-        The graph, matched to its building.
-    stairs
-        Whether the robot takes stairs.
-    clear_edges_only
-        Whether edges and rides that the robot cannot follow are left out.
+    `matched`: the graph, matched to its building; `stairs`: whether the robot takes stairs;
+    `clear_edges_only`: whether edges and rides that the robot cannot follow are left out.
     """
 
     def __init__(
@@ -174,11 +161,11 @@ class BuildingNetwork:
             return self._found([(first, np.stack([start[1], goal[1]]))], [], 0)
         ends = []
         for what, floor, (_, at) in (("start", first, start), ("goal", last, goal)):
-            seen = None if floor is None else nearest_only(floor.network.in_sight(at[None]))
+            seen = None if floor is None else attach.nearest_only(floor.network.in_sight(at[None]))
             if floor is None or seen is None or not seen[0][-1]:
                 return f"no node in sight of the {what}"
             ends.append(_of_all(seen, floor))
-        costs, (nodes,), expanded = shortest_routes(self._graph, ends[0], ends[1])
+        costs, (nodes,), expanded = attach.shortest_routes(self._graph, ends[0], ends[1])
         if not math.isfinite(costs[0]):
             return ""
         legs, rides = self._legs(nodes.tolist())
@@ -290,7 +277,7 @@ class BuildingNetwork:
             lengths.append(length * floor.grid.resolution_m)
         edges.append(np.array(list(self.lanes), dtype=np.int64).reshape(-1, 2))
         lengths.append(np.array([lane.cost for lane in self.lanes.values()], dtype=np.float64))
-        return adjacency(self.n_nodes, np.concatenate(edges), np.concatenate(lengths))
+        return attach.adjacency(self.n_nodes, np.concatenate(edges), np.concatenate(lengths))
 
 
 def _n_passed(floor: PlacedFloor, nodes: list[int], point: FloatArray) -> int:
@@ -299,7 +286,7 @@ def _n_passed(floor: PlacedFloor, nodes: list[int], point: FloatArray) -> int:
     return len(nodes) - len(floor.network.without_passed(point, here))
 
 
-def _of_all(seen: Offsets, floor: PlacedFloor) -> Offsets:
+def _of_all(seen: attach.Offsets, floor: PlacedFloor) -> attach.Offsets:
     """Return nodes in sight of a point with their numbers among all nodes, and metres."""
     offsets, nodes, away = seen
     return offsets, nodes + floor.base, away * floor.grid.resolution_m

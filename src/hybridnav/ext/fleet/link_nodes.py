@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link
+from hybridnav.ext.graphs.gather import free_name
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import place_of_name
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.graphs import WaypointGraph
-
 
 # Graphs of several floors, joined by links, as fleets and map editors exchange them.
 
@@ -274,12 +274,8 @@ def node_at(graph: WaypointGraph, point: tuple[float, float]) -> int | None:
 def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph, int]]:
     """Return the floors that a link stops at, and the node at its end on each.
 
-    Parameters
-    ----------
-    building
-        A building with nodes at all ends, as `join_links` returns it.
-    link
-        One of its links.
+    `building`: a building with nodes at all ends, as `join_links` returns it; `link`: one of its
+    links.
     """
     found = []
     for end in link.ends:
@@ -293,12 +289,7 @@ def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph,
 def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
     """Return a graph with a node at the end of each of some links, joined in both directions.
 
-    Parameters
-    ----------
-    graph
-        The graph.
-    stubs
-        The ends, and the nodes that they are joined to.
+    `stubs`: the ends, and the nodes that they are joined to.
     """
     n = graph.n_nodes
     points = np.concatenate([graph.points, [end for _, end, _ in stubs]])
@@ -309,9 +300,7 @@ def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
     for link, _, _ in stubs:
         wanted = f"link {link}"
         numbered = (f"{wanted} ({number})" for number in itertools.count(2))
-        name = next(name for name in itertools.chain([wanted], numbered) if name not in taken)
-        taken.add(name)
-        names.append(name)
+        names.append(free_name(itertools.chain([wanted], numbered), taken))
     facts = {n + at: {"link": link} for at, (link, _, _) in enumerate(stubs)}
     return replace(
         graph,

@@ -251,16 +251,9 @@ START, GOAL = -1, -2
 class LinkNetwork:
     """The ends of the links of a building, and the rides between them.
 
-    Parameters
-    ----------
-    links
-        The links that may be used.
-    floor_of
-        Index of each floor, by its name.
-    rows
-        Row in its floor's table of each end, by link and floor.
-    speed_m_s
-        Metres per second, by which rides are charged.
+    `links`: the links that may be used; `floor_of`: index of each floor, by its name; `rows`: row
+    in its floor's table of each end, by link and floor; `speed_m_s`: metres per second, by which
+    rides are charged.
     """
 
     def __init__(
@@ -305,14 +298,9 @@ class LinkNetwork:
     ) -> ChosenParts | None:
         """Return the cheapest route with at least one ride; None if there is none.
 
-        Parameters
-        ----------
-        first
-            float64 (n_ends,), the cost from the start to each end, infinite on other floors.
-        last
-            float64 (n_ends,), that from each end to the goal.
-        costs_on
-            Returns the costs between the ends on a floor, float64, by their rows in its table.
+        `first`: float64 (n_ends,), the cost from the start to each end, infinite on other floors;
+        `last`: float64 (n_ends,), that from each end to the goal; `costs_on`: returns the costs
+        between the ends on a floor, float64, by their rows in its table.
 
         Notes
         -----
@@ -349,16 +337,9 @@ class LinkNetwork:
     ) -> np.ndarray:
         """Relax the costs of all ends from those at which rides have ended.
 
-        Parameters
-        ----------
-        onward
-            int64 (k,), these ends.
-        left
-            float64 (n_ends,), the cost at which each is left.
-        costs_on
-            As in `cheapest`.
-        known
-            The cost at which each end is reached, and from which end; both are overwritten.
+        `onward`: int64 (k,), these ends; `left`: float64 (n_ends,), the cost at which each is left;
+        `costs_on`: as in `cheapest`; `known`: the cost at which each end is reached, and from which
+        end; both are overwritten.
         """
         reached, came = known
         fresh = np.zeros(len(reached), dtype=np.bool_)

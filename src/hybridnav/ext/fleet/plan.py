@@ -204,14 +204,7 @@ def cost_of(results: Sequence[PlanResult], rides: Sequence[Ride]) -> float:
 class Answers:
     """Makes the plans of a building.
 
-    Parameters
-    ----------
-    floors
-        Its floors.
-    network
-        The links that may be used.
-    speed_m_s
-        Metres per second that the robot drives.
+    `network`: the links that may be used; `speed_m_s`: metres per second that the robot drives.
     """
 
     def __init__(self, floors: Sequence[Floor], network: LinkNetwork, speed_m_s: float) -> None:
@@ -231,16 +224,9 @@ class Answers:
     ) -> tuple[BuildingPlan, ...]:
         """Search routes, and return them as plans.
 
-        Parameters
-        ----------
-        search
-            The search of a query.
-        endpoints
-            Its start and goal.
-        limits
-            Most routes, and cost of one over that of the first, at most.
-        began
-            When the query began, by `time.perf_counter`.
+        `search`: the search of a query; `endpoints`: its start and goal; `limits`: most routes, and
+        cost of one over that of the first, at most; `began`: when the query began, by
+        `time.perf_counter`.
         """
         count, stretch = limits
         if count == 1:

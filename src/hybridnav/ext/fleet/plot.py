@@ -243,17 +243,11 @@ def _draw_ground(
 
 def _mark(link: Link, canvas: Canvas, *, is_taken: bool) -> Line2D:
     """Return the mark of a link, filled where the route takes it."""
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=_MARKS[link.kind],
-        markersize=_POINTS * canvas.sizes.line,
-        markerfacecolor=style.PATH if is_taken else style.FREE,
-        markeredgecolor=style.PATH if is_taken else style.INK,
-        markeredgewidth=1.2 * canvas.sizes.line,
-        zorder=8.5,
-    )
+    line = canvas.sizes.line
+    face, edge = (style.PATH, style.PATH) if is_taken else (style.FREE, style.INK)
+    look: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "zorder": 8.5}
+    look |= {"markersize": _POINTS * line, "markeredgewidth": 1.2 * line}
+    return Line2D([], [], linestyle="none", marker=_MARKS[link.kind], **look)
 
 
 def _draw_end(

@@ -74,18 +74,9 @@ class LinkSearch:
     planned. Routes are searched by these numbers, and the first part of the best one that is not
     planned yet is planned, until all parts of the best one are.
 
-    Parameters
-    ----------
-    network
-        The links that may be used.
-    tables
-        The table of each floor.
-    endpoints
-        Start and goal.
-    closed
-        Closed cells of floors, by index, in place of those of their tables.
-    at
-        Where in a room a path starts or ends.
+    `network`: the links that may be used; `tables`: the table of each floor; `endpoints`: start and
+    goal; `closed`: closed cells of floors, by index, in place of those of their tables; `at`: where
+    in a room a path starts or ends.
 
     Notes
     -----
@@ -153,10 +144,7 @@ class LinkSearch:
     def ranked(self, max_cost: Callable[[float], float]) -> Iterator[ChosenParts]:
         """Yield the cheapest route of each sequence of links, by cost; no link occurs twice.
 
-        Parameters
-        ----------
-        max_cost
-            Cost that no route exceeds, by that of the first one.
+        `max_cost`: cost that no route exceeds, by that of the first one.
         """
         known: set[tuple[int, ...]] = set()
         most = math.inf
@@ -381,12 +369,8 @@ class LinkSearch:
 def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:
     """Return the effort of a query.
 
-    Parameters
-    ----------
-    planned
-        The effort of each plan that was made for it.
-    seconds
-        Wall-clock seconds of all; what the stages of the plans leave is called `links`.
+    `planned`: the effort of each plan that was made for it; `seconds`: wall-clock seconds of all;
+    what the stages of the plans leave is called `links`.
     """
     stages: dict[str, float] = {}
     for stats in planned:

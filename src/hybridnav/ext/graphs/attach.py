@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
     from hybridnav.maps import OccupancyGrid
     from hybridnav.refine import Sight
-
 
 _CANDIDATES = 100
 """Nearest nodes of a point that are tested for sight."""
@@ -50,25 +49,14 @@ class Network:
     ) -> Network:
         """Prepare a graph.
 
-        Parameters
-        ----------
-        sight
-            Tests of segments.
-        positions
-            float64 (n, 2), the nodes, (row, col) in grid units.
-        edges
-            int64 (m, 2), tail and head of each edge.
-        usable
-            int64 (k,), the nodes in free space; None for all.
+        `sight`: tests of segments; `positions`: float64 (n, 2), the nodes, (row, col) in grid
+        units; `edges`: int64 (m, 2), tail and head of each edge; `usable`: int64 (k,), the nodes in
+        free space; None for all.
         """
         usable = np.arange(len(positions)) if usable is None else usable
         steps = positions[edges[:, 1]] - positions[edges[:, 0]]
         lengths = np.hypot(steps[:, 0], steps[:, 1])
         return cls(sight, positions, adjacency(len(positions), edges, lengths), usable)
-
-    def with_candidates(self, candidates: int) -> Network:
-        """Return the network with another number of nodes that are tested for sight."""
-        return replace(self, candidates=candidates)
 
     @cached_property
     def _tree(self) -> KDTree:
@@ -79,16 +67,8 @@ class Network:
     def in_sight(self, points: FloatArray) -> Offsets:
         """Return the usable nodes in sight of points, among the nearest of each.
 
-        Parameters
-        ----------
-        points
-            float64 (p, 2), free positions.
-
-        Returns
-        -------
-        tuple
-            int64 (p + 1,) offsets, int64 (k,) nodes, the nearest of each point first, and float64
-            (k,) distances to them.
+        `points`: float64 (p, 2), free positions. Returns int64 (p + 1,) offsets, int64 (k,) nodes,
+        the nearest of each point first, and float64 (k,) distances to them.
         """
         near = min(self.candidates, len(self.usable))
         if not near:
@@ -104,10 +84,7 @@ class Network:
     def join(self, starts: FloatArray, goals: FloatArray) -> Attached:
         """Find the nodes in sight of pairs.
 
-        Parameters
-        ----------
-        starts, goals
-            float64 (p, 2), free positions.
+        `starts`, `goals`: float64 (p, 2), free positions.
         """
         return Attached(self, starts, goals, self.in_sight(starts), self.in_sight(goals))
 
@@ -121,12 +98,8 @@ class Network:
         """Return the nodes of a route without the first, if a robot at a point has passed it, and
         sees the next one.
 
-        Parameters
-        ----------
-        point
-            float64 (2,), where the robot is.
-        nodes
-            int64 (k,), the nodes; those in walls or outside the map are never seen.
+        `point`: float64 (2,), where the robot is; `nodes`: int64 (k,), the nodes; those in walls or
+        outside the map are never seen.
         """
         if len(nodes) < 2 or not self._is_usable[nodes[1]]:  # noqa: PLR2004
             return nodes
@@ -177,11 +150,8 @@ class Attached:
         last one likewise; here only if the next node is in sight. Ends that see each other need no
         graph.
 
-        Returns
-        -------
-        tuple
-            For each pair float64 (k, 2), the positions from start to goal, or None; and int64 (p,),
-            the number of nodes that the search has expanded.
+        Returns for each pair float64 (k, 2), the positions from start to goal, or None; and int64
+        (p,), the number of nodes that the search has expanded.
         """
         starts, goals = nearest_only(self.from_start), nearest_only(self.from_goal)
         lengths, passed, expanded = shortest_routes(self.network.graph, starts, goals)
@@ -203,14 +173,8 @@ def adjacency(
 ) -> tuple[LongArray, LongArray, FloatArray]:
     """Return the first edge of each node, and head and length of each edge, by their tails.
 
-    Parameters
-    ----------
-    n_nodes
-        Number of nodes.
-    edges
-        int64 (m, 2), tail and head of each edge.
-    lengths
-        float64 (m,), length of each edge.
+    `n_nodes`: number of nodes; `edges`: int64 (m, 2), tail and head of each edge; `lengths`:
+    float64 (m,), length of each edge.
     """
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     edges = edges[order]
@@ -231,18 +195,10 @@ def shortest_routes(
 ) -> tuple[FloatArray, list[LongArray], LongArray]:
     """Return the shortest routes between ends and the nodes that they join.
 
-    Parameters
-    ----------
-    graph
-        First edge of each node, head and length of each edge, as `adjacency` returns them.
-    starts, goals
-        The nodes that each end joins, as `Network.in_sight` returns them.
-
-    Returns
-    -------
-    tuple
-        float64 (p,) lengths, infinite for none; the nodes of each route from first to last; int64
-        (p,) number of expanded nodes.
+    `graph`: first edge of each node, head and length of each edge, as `adjacency` returns them;
+    `starts`, `goals`: the nodes that each end joins, as `Network.in_sight` returns them. Returns
+    float64 (p,) lengths, infinite for none; the nodes of each route from first to last; int64 (p,)
+    number of expanded nodes.
     """
     room = 64 * len(starts[0])
     while True:
@@ -287,16 +243,8 @@ class PlacedGraph:
     ) -> PlacedGraph:
         """Place a graph on a map.
 
-        Parameters
-        ----------
-        graph
-            The graph.
-        grid
-            The map.
-        free
-            bool (rows, cols), the cells that may be entered.
-        along_lines
-            Whether edges run along their lines, instead of straight.
+        `free`: bool (rows, cols), the cells that may be entered; `along_lines`: whether edges run
+        along their lines, instead of straight.
         """
         positions, cells, is_free = placed_points(graph.points, grid, free)
         lines = graph.lines if along_lines else {}
@@ -306,10 +254,7 @@ class PlacedGraph:
     def clear_edges(self, sight: Sight) -> BoolArray:
         """Return which edges stay in free space, bool (m,), by exact tests.
 
-        Parameters
-        ----------
-        sight
-            Tests of segments of the same free cells.
+        `sight`: tests of segments of the same free cells.
         """
         clear = np.asarray(self.is_free[self.edges].all(axis=1), dtype=np.bool_)
         tails, heads = (self.positions[self.edges[clear, end]] for end in (0, 1))
@@ -335,12 +280,7 @@ class PlacedGraph:
     def network(self, sight: Sight, edges: LongArray) -> Network:
         """Return the graph with some of its edges, ready for routes.
 
-        Parameters
-        ----------
-        sight
-            Tests of segments of the same free cells.
-        edges
-            int64 (k, 2), the edges to use.
+        `sight`: tests of segments of the same free cells; `edges`: int64 (k, 2), the edges to use.
         """
         return Network.of(sight, self.positions, edges, np.flatnonzero(self.is_free))
 
@@ -350,20 +290,9 @@ def placed_points(
 ) -> tuple[FloatArray, LongArray, BoolArray]:
     """Place points on a map.
 
-    Parameters
-    ----------
-    points
-        float64 (n, 2), `(x, y)` in metres.
-    grid
-        The map.
-    free
-        bool (rows, cols), the cells that may be entered.
-
-    Returns
-    -------
-    tuple
-        float64 (n, 2) positions, rounded; int64 (n, 2) the cell that each lies in, by the rule of
-        `Frame.cells_of`, -1 outside the map; bool (n,), whether it is free.
+    `points`: float64 (n, 2), `(x, y)` in metres; `free`: bool (rows, cols), the cells that may be
+    entered. Returns float64 (n, 2) positions, rounded; int64 (n, 2) the cell that each lies in, by
+    the rule of `Frame.cells_of`, -1 outside the map; bool (n,), whether it is free.
     """
     cells = grid.frame.cells_of(points)
     is_inside = ((cells >= 0) & (cells < free.shape)).all(axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,18 +50,10 @@ class Nodes:
     ) -> None:
         """Add nodes one by one, unless one within a distance sees them.
 
-        Parameters
-        ----------
-        candidates
-            float64 (k, 2), positions in the order in which they are tried.
-        kind
-            Their kind.
-        spacing_cells
-            The distance; 0 for nodes that are needed, whatever the number of nodes.
-        most
-            Number of nodes at which to stop; None for `most` of all.
-        doors
-            The door of each; None for none.
+        `candidates`: float64 (k, 2), positions in the order in which they are tried; `kind`: their
+        kind; `spacing_cells`: the distance; 0 for nodes that are needed, whatever the number of
+        nodes; `most`: number of nodes at which to stop; None for `most` of all; `doors`: the door
+        of each; None for none.
         """
         most = self.most if most is None else most
         most = most if spacing_cells else len(self) + len(candidates)
@@ -85,16 +77,8 @@ def add_landmarks(
 ) -> None:
     """Add nodes at doors, rooms and free places.
 
-    Parameters
-    ----------
-    nodes
-        What they are added to.
-    topology
-        The map.
-    is_kept
-        bool (n_components,), the parts of free space that get nodes.
-    spacing_cells
-        Places within this distance and in sight of another node are left out.
+    `is_kept`: bool (n_components,), the parts of free space that get nodes; `spacing_cells`: places
+    within this distance and in sight of another node are left out.
     """
     space = nodes.space
     if topology.pyramid.rooms is not None:
@@ -174,17 +158,9 @@ def bend_round_corners(
 ) -> None:
     """Add bends until pairs round corners see one node over which the way is short.
 
-    Parameters
-    ----------
-    chosen
-        The nodes, which are added to.
-    is_kept
-        bool (n_components,), the parts of free space that get nodes.
-    rng
-        Source of random numbers.
-    bends_cells
-        Distance within which one bend stands for all that it sees, in the first round; and how far
-        bends are moved off the blocked cell then.
+    `chosen`: the nodes, which are added to; `is_kept`: bool (n_components,), the parts of free
+    space that get nodes; `bends_cells`: distance within which one bend stands for all that it sees,
+    in the first round; and how far bends are moved off the blocked cell then.
     """
     space = chosen.space
     reach = _NEAREST_CELLS, max(_FARTHEST_M / space.grid.resolution_m, 2.0)
@@ -212,20 +188,14 @@ def bend_round_corners(
 def bend_paths(chosen: Nodes, edges: LongArray, pairs: tuple[FloatArray, FloatArray]) -> None:
     """Add the bends of shortest paths whose routes are too long.
 
-    Parameters
-    ----------
-    chosen
-        The nodes, which are added to.
-    edges
-        int64 (m, 2), the edges, each once.
-    pairs
-        float64 (p, 2), starts and goals.
+    `chosen`: the nodes, which are added to; `edges`: int64 (m, 2), the edges, each once; `pairs`:
+    float64 (p, 2), starts and goals.
     """
     space = chosen.space
     paths = space.paths(*pairs)
     both = np.concatenate([edges, edges[:, ::-1]])
-    network = Network.of(space.sight, chosen.positions, both).with_candidates(MANY_CANDIDATES)
-    lengths = network.join(*pairs).best()
+    network = Network.of(space.sight, chosen.positions, both)
+    lengths = replace(network, candidates=MANY_CANDIDATES).join(*pairs).best()
     is_long = lengths > (1 + _LONG) * paths.length_cells
     bends = bends_of(paths, np.flatnonzero(is_long).tolist())
     chosen.add(space.moved_off(bends, RIM_CELLS), "bend", _LEAST_CELLS)
@@ -255,10 +225,7 @@ class Corners:
     def of(cls, free: BoolArray) -> Corners:
         """Find the corners.
 
-        Parameters
-        ----------
-        free
-            bool (rows, cols).
+        `free`: bool (rows, cols).
         """
         rows, cols = free.shape[0] - 1, free.shape[1] - 1
         beside = np.stack(
@@ -290,23 +257,10 @@ class Corners:
         The way over the corner is taut. Random pairs of a whole map are far apart; these are near
         each other, where one detour counts.
 
-        Parameters
-        ----------
-        space
-            Free space.
-        draws
-            Number of draws at each corner; many are no such pair.
-        rng
-            Source of random numbers.
-        reach_cells
-            The least and the greatest distance of an end from the corner, in cells; its logarithm
-            is uniform.
-
-        Returns
-        -------
-        tuple
-            float64 (n, 2) starts and goals, and float64 (n,) the lengths of the ways over the
-            corners, at least those of the shortest paths.
+        `space`: free space; `draws`: number of draws at each corner; many are no such pair;
+        `reach_cells`: the least and the greatest distance of an end from the corner, in cells; its
+        logarithm is uniform. Returns float64 (n, 2) starts and goals, and float64 (n,) the lengths
+        of the ways over the corners, at least those of the shortest paths.
         """
         sight = space.sight
         corners = np.repeat(self.positions, draws, axis=0)

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 
-
 # Edges of a route graph: a spanner of sight, joined wherever free space is.
 
 _NEAREST = 200
@@ -51,15 +50,8 @@ class SightPairs:
     def among(self, needed: LongArray) -> LongArray:
         """Return the pairs that edges may join among the nearest nodes of each.
 
-        Parameters
-        ----------
-        needed
-            int64 (k, 2), pairs in sight that count although others are nearer.
-
-        Returns
-        -------
-        LongArray
-            int64 (m, 2), lower node first.
+        `needed`: int64 (k, 2), pairs in sight that count although others are nearer. Returns int64
+        (m, 2), lower node first.
         """
         from scipy.spatial import KDTree  # noqa: PLC0415 - most uses of the package need no graph
 
@@ -87,22 +79,10 @@ class SightPairs:
 def sight_edges(nodes: Nodes, known: SightPairs, stretch: float, needed: LongArray) -> LongArray:
     """Choose edges between nodes in sight of each other.
 
-    Parameters
-    ----------
-    nodes
-        The nodes.
-    known
-        The pairs of these nodes.
-    stretch
-        For two nodes in sight, a route over the chosen edges is at most this many times as long as
-        the segment between them.
-    needed
-        int64 (k, 2), pairs in sight that count although others are nearer.
-
-    Returns
-    -------
-    LongArray
-        int64 (m, 2), lower node first, by length.
+    `known`: the pairs of these nodes; `stretch`: for two nodes in sight, a route over the chosen
+    edges is at most this many times as long as the segment between them; `needed`: int64 (k, 2),
+    pairs in sight that count although others are nearer. Returns int64 (m, 2), lower node first, by
+    length.
 
     Notes
     -----
@@ -124,18 +104,9 @@ def sight_edges(nodes: Nodes, known: SightPairs, stretch: float, needed: LongArr
 def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
     """Find paths that join parts of a graph which free space connects.
 
-    Parameters
-    ----------
-    nodes
-        The nodes.
-    edges
-        The edges between them.
-
-    Returns
-    -------
-    list of FloatArray
-        For each part but the largest in its part of free space, positions on the shortest path to
-        one of the nearest nodes of another part, (row, col) in grid units.
+    `edges`: the edges between them. Returns for each part but the largest in its part of free
+    space, positions on the shortest path to one of the nearest nodes of another part, (row, col) in
+    grid units.
     """
     positions = nodes.positions
     part = components_of(len(positions), edges, "weak")

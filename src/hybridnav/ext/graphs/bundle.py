@@ -197,10 +197,7 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
 def check_bundle(folder: PathLike) -> dict[str, int]:
     """Return the numbers of rooms of a bundle that would be replaced, empty for a new folder.
 
-    Raises
-    ------
-    InvalidValueError
-        When the folder is none, or holds other files.
+    Raises `InvalidValueError` when the folder is none, or holds other files.
     """
     path = Path(folder)
     try:
@@ -226,10 +223,7 @@ def check_bundle(folder: PathLike) -> dict[str, int]:
 def checked_masks(costs: Sequence[str]) -> dict[str, CostSpec]:
     """Return the masks that some texts state, by kind.
 
-    Raises
-    ------
-    InvalidValueError
-        When one is no mask, or a second one of its kind.
+    Raises `InvalidValueError` when one is no mask, or a second one of its kind.
     """
     found: dict[str, CostSpec] = {}
     for spec in parse_costs(costs):

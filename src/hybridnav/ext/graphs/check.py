@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.topology.rooms import Rooms
 
-
 _PAIRS = 2000
 """Random free points; the share that sees a node is counted."""
 _HALVINGS = 24
@@ -296,25 +295,10 @@ def add_rooms_and_doors(  # noqa: PLR0913, PLR0917 - one call, all of it needed
 ) -> tuple[Counts, Counts]:
     """Add doors that no edge passes, and rooms without nodes.
 
-    Parameters
-    ----------
-    findings
-        What they are added to.
-    topology
-        The map; without rooms nothing is added.
-    placed
-        The graph on the map.
-    is_clear
-        bool (m,), the edges that the robot can follow.
-    space
-        Free space.
-    is_large
-        bool (n_components,), the parts of free space that need nodes.
-
-    Returns
-    -------
-    tuple
-        Number of doors that edges pass and of all, of rooms with nodes and of all.
+    `topology`: the map; without rooms nothing is added; `placed`: the graph on the map; `is_clear`:
+    bool (m,), the edges that the robot can follow; `space`: free space; `is_large`: bool
+    (n_components,), the parts of free space that need nodes. Returns number of doors that edges
+    pass and of all, of rooms with nodes and of all.
     """
     if topology.pyramid.rooms is None:
         return (0, 0), (0, 0)

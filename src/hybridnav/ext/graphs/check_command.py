@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,36 +10,17 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli import options
-from hybridnav.cli.common import (
-    EXIT_NOT_SOLVED,
-    UsageError,
-    answer,
-    check_output,
-    check_picture,
-    stage,
-    timings,
-)
+from hybridnav.cli import common, options
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
-from hybridnav.ext.graphs.findings_report import (
-    FAIL_ON,
-    SHOWN,
-    FailOnOption,
-    check_level,
-    count_line,
-    fails,
-    found_figures,
-    found_lines,
-    write_page,
-)
+from hybridnav.ext.graphs import findings_report as telling
+from hybridnav.ext.graphs.fleet_options import respond
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav.ext.fleet import BuildingGraphCheck, BuildingGraphReport
     from hybridnav.ext.graphs import Finding, GraphCheck
-
 
 AlignOption = Annotated[
     bool,
@@ -92,30 +72,33 @@ def _check_over_floors(
     _check_given(ignore, KINDS | BUILDING_KINDS, fail_on, out)
     seconds: dict[str, float] = {}
     names = _names_of(match or ())
-    with stage(f"reading {graph_file}", seconds, "graph"):
+    with common.stage(f"reading {graph_file}", seconds, "graph"):
         graph = hn.ext.fleet.load_building_graph(graph_file)
     building = load_floors(map_file, reading, seconds)
-    with stage("checking", seconds, "check"):
+    with common.stage("checking", seconds, "check"):
         matched = match_graph(building, graph, floors=names, align=align)
         found = check_building_graph(matched)
     report = None
     if pairs:
-        with stage("comparing routes", seconds, "routes"):
+        with common.stage("comparing routes", seconds, "routes"):
             report = judge_building_graph(matched, pairs=pairs, stairs=not no_stairs)
     from hybridnav.ext.graphs.findings_report import building_facts, render_building_check  # noqa: PLC0415
 
     cases = () if report is None else report.contradictions
     whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
     wrong = _counted(whole, ignore)
-    more = [f"{'' if n else 'routes':<10} {_line(text)}" for n, text in enumerate(cases[:SHOWN])]
+    more = [
+        f"{'' if n else 'routes':<10} {_line(text)}"
+        for n, text in enumerate(cases[: telling.SHOWN])
+    ]
     if not align and matched.away_m > SAME_POINT_M:
         away = f"links stop up to {matched.away_m:.2f} m from those of the building"
         more.append(f"hint       {away}: --align, if floors have other frames than their maps")
     facts = [(name, _line(text)) for name, text in building_facts(found, report)]
     lines = [*_summary(facts, wrong), *more]
-    _respond(_building_figures(found, report, wrong), lines, seconds, as_json=as_json)
+    respond(_building_figures(found, report, wrong), lines, seconds, as_json=as_json)
     if out is not None:
-        write_page(render_building_check(found, report), out)
+        telling.write_page(render_building_check(found, report), out)
     # An answer that the building contradicts is an error.
     _end(wrong, fail_on, is_refuted=bool(cases))
 
@@ -126,9 +109,11 @@ def _names_of(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         name, equals, own = text.rpartition("=")
         if not equals or not name or not own:
-            raise UsageError(f"--match must be NAME=FLOOR, got {text!r:.80}")
+            raise common.UsageError(f"--match must be NAME=FLOOR, got {text!r:.80}")
         if name in names:
-            raise UsageError(f"--match has floor {name!r:.80} of the graph twice, expected once")
+            raise common.UsageError(
+                f"--match has floor {name!r:.80} of the graph twice, expected once"
+            )
         names[name] = own
     return names
 
@@ -142,14 +127,14 @@ def _building_figures(
         "graph": found.matched.name,
         "robot_radius_m": found.matched.building.robot_radius_m,
         "floors": {
-            name: _sizes(check) | {"findings": found_figures(wrong[name])}
+            name: _sizes(check) | {"findings": telling.found_figures(wrong[name])}
             for name, check in found.floors.items()
         },
         "links": {
             link.drawn.name: None if link.own is None else link.own.name
             for link in found.matched.links
         },
-        "findings": found_figures(wrong[""]),
+        "findings": telling.found_figures(wrong[""]),
         "routes": None
         if report is None
         else {name: counts.to_dict() for name, counts in report.counts.items()},
@@ -198,7 +183,7 @@ def check(
     out: options.OutOption[Path | None] = None,
     floor: options.GraphFloorOption = None,
     ignore: IgnoreOption = None,
-    fail_on: FailOnOption = FAIL_ON,
+    fail_on: telling.FailOnOption = telling.FAIL_ON,
     along_lines: LinesOption = False,
     rooms_file: options.RoomsOption = None,
     align: AlignOption = False,
@@ -222,23 +207,23 @@ def check(
 
     del align, match, pairs, no_stairs  # of a building
     _check_given(ignore, KINDS, fail_on, out)
-    check_picture(plot)
+    common.check_picture(plot)
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
-    with stage(f"reading {graph_file}", seconds, "graph"):
+    with common.stage(f"reading {graph_file}", seconds, "graph"):
         graph = hn.ext.graphs.load_graph(graph_file, floor=floor)
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)
-    with stage("checking", seconds, "check"):
+    with common.stage("checking", seconds, "check"):
         found = hn.ext.graphs.check_graph(topology, graph, along_lines=along_lines)
     from hybridnav.ext.graphs.findings_report import check_facts, render_check  # noqa: PLC0415 - on demand
 
     wrong = _counted({"": found.findings}, ignore)
     facts = [(name, printable(text)) for name, text in check_facts(found)]
-    _respond(_figures(found, wrong[""]), _summary(facts, wrong), seconds, as_json=as_json)
+    respond(_figures(found, wrong[""]), _summary(facts, wrong), seconds, as_json=as_json)
     if out is not None:
-        write_page(render_check(found), out)
+        telling.write_page(render_check(found), out)
     if plot is not None:
         from hybridnav.ext.graphs import plot_graph_check  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
@@ -250,11 +235,13 @@ def check(
 def _check_given(
     ignored: list[str] | None, known: Collection[str], level: str, out: Path | None
 ) -> None:
-    check_level(level)
-    check_output(out, "--out", (".html",))
+    telling.check_level(level)
+    common.check_output(out, "--out", (".html",))
     unknown = [kind for kind in ignored or () if kind not in known]
     if unknown:
-        raise UsageError(f"--ignore must be one of {', '.join(known)}, got {unknown[0]!r:.80}")
+        raise common.UsageError(
+            f"--ignore must be one of {', '.join(known)}, got {unknown[0]!r:.80}"
+        )
 
 
 def _counted(
@@ -269,23 +256,18 @@ def _counted(
 
 def _summary(facts: Sequence[tuple[str, str]], wrong: Mapping[str, list[Finding]]) -> list[str]:
     lines = [f"{name:<10} {text}" for name, text in facts]
-    lines.append(count_line(chain.from_iterable(wrong.values())))
+    lines.append(telling.count_line(chain.from_iterable(wrong.values())))
     for name, findings in wrong.items():
-        lines += found_lines(findings, f" on floor {name}" if name else "")
+        lines += telling.found_lines(findings, f" on floor {name}" if name else "")
     return lines
-
-
-def _respond(
-    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
-) -> None:
-    whole = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
-    answer((whole if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
 
 
 def _end(wrong: Mapping[str, list[Finding]], level: str, *, is_refuted: bool = False) -> None:
     """End the command with 1 where something is as bad as a level."""
-    if (is_refuted and level != "never") or fails(chain.from_iterable(wrong.values()), level):
-        raise typer.Exit(EXIT_NOT_SOLVED)
+    if (is_refuted and level != "never") or telling.fails(
+        chain.from_iterable(wrong.values()), level
+    ):
+        raise typer.Exit(common.EXIT_NOT_SOLVED)
 
 
 def _sizes(check: GraphCheck) -> dict[str, Any]:
@@ -307,5 +289,5 @@ def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
         **_sizes(found),
         "doors": {"passed": found.doors[0], "all": found.doors[1]},
         "rooms": {"with_node": found.rooms[0], "all": found.rooms[1]},
-        "findings": found_figures(wrong),
+        "findings": telling.found_figures(wrong),
     }

@@ -45,16 +45,8 @@ class _Line:
 class ChainGraph:
     """A plane graph of chains of cells.
 
-    Parameters
-    ----------
-    nodes
-        float64 (n, 2), centres of cells.
-    kinds
-        What each node is for, as `Sketch` has it.
-    strands
-        The chains between them.
-    passage
-        How much room there is.
+    `nodes`: float64 (n, 2), centres of cells; `kinds`: what each node is for, as `Sketch` has it;
+    `strands`: the chains between them; `passage`: how much room there is.
     """
 
     def __init__(
@@ -92,12 +84,8 @@ class ChainGraph:
     def prune(self, small: float, small_narrow: tuple[float, float]) -> None:
         """Leave out one side of each small ring, the one with less room.
 
-        Parameters
-        ----------
-        small
-            Length of a small ring in cells.
-        small_narrow
-            The same where the side has less room than is asked for: a little less, and none.
+        `small`: length of a small ring in cells; `small_narrow`: the same where the side has less
+        room than is asked for: a little less, and none.
         """
         comfort, lines = self._passage.comfort, self._lines
         order = sorted(lines, key=lambda k: (min(lines[k].narrow, comfort), -lines[k].length, k))
@@ -188,12 +176,8 @@ class ChainGraph:
     def straightened(self, step: int, bend: float) -> Sketch:
         """Return the drawing with straight edges, and nodes where chains bend.
 
-        Parameters
-        ----------
-        step
-            Cells between those of a chain at which it may bend.
-        bend
-            Cost of a bend, in cells of a chain as far off its straight edge as it may be.
+        `step`: cells between those of a chain at which it may bend; `bend`: cost of a bend, in
+        cells of a chain as far off its straight edge as it may be.
         """
         index = {node: k for k, node in enumerate(self._positions)}
         positions, kinds = list(self._positions.values()), list(self._kinds.values())
@@ -268,16 +252,8 @@ def drop_ends(sketch: Sketch, reach: float, far: float, step: int) -> None:
 
     Who joins a graph at its nearest node would go all the way along from there.
 
-    Parameters
-    ----------
-    sketch
-        The graph.
-    reach
-        Distance in cells within which positions see a dead end.
-    far
-        Distance within which they must see another node.
-    step
-        Cells between the positions that are looked at.
+    `reach`: distance in cells within which positions see a dead end; `far`: distance within which
+    they must see another node; `step`: cells between the positions that are looked at.
     """
     space, at, kinds = sketch.passage.space, sketch.positions, sketch.kinds
     spots: FloatArray = np.argwhere(space.free[::step, ::step]).astype(np.float64) * step + 0.5
@@ -311,16 +287,8 @@ def drop_ends(sketch: Sketch, reach: float, far: float, step: int) -> None:
 def add_chords(sketch: Sketch, reach: float, detour: float, least_rad: float) -> None:
     """Join nodes that see each other where the way between them is long.
 
-    Parameters
-    ----------
-    sketch
-        The graph.
-    reach
-        Length of the longest chord in cells.
-    detour
-        Least length of that way, in lengths of the chord.
-    least_rad
-        Least angle between a chord and another edge of its nodes.
+    `reach`: length of the longest chord in cells; `detour`: least length of that way, in lengths of
+    the chord; `least_rad`: least angle between a chord and another edge of its nodes.
     """
     from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import asdict
 from functools import partial
@@ -13,40 +12,10 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli import options
-from hybridnav.cli.common import (
-    UsageError,
-    answer,
-    check_output,
-    check_picture,
-    progress_bar,
-    stage,
-    timings,
-)
+from hybridnav.cli import common, options
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
 from hybridnav.ext.fleet.command import load_floors
-from hybridnav.ext.graphs.fleet_options import (
-    ENDINGS,
-    LOSS_PAIRS,
-    STYLES,
-    AnchorOption,
-    Bundle,
-    BundleOption,
-    Fleet,
-    KeepOption,
-    LanesOption,
-    NodesOption,
-    NoDoorsOption,
-    OperationsOption,
-    PointsOption,
-    ReportOption,
-    StyleOption,
-    VehiclesOption,
-    check_homes,
-    check_style,
-    read_points,
-    warn_of_loss,
-)
+from hybridnav.ext.graphs import fleet_options as given
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -55,7 +24,7 @@ if TYPE_CHECKING:
 
 _ENDINGS = {
     "nav2": (".geojson", ".json"),
-    **ENDINGS,
+    **given.ENDINGS,
     "rooms": (".csv", ".geojson"),
     "places": (".csv", ".geojson"),
 }
@@ -88,22 +57,22 @@ def export(
     map_file: options.MapOrBuildingArgument,
     out: options.OutOption[Path | None] = None,
     force: options.ForceOption = False,
-    bundle: BundleOption = None,
+    bundle: given.BundleOption = None,
     costs: options.CostsOption = None,
-    operations: OperationsOption = False,
+    operations: given.OperationsOption = False,
     kind: FormatOption = "nav2",
-    style: StyleOption = "lanes",
-    points: PointsOption = None,
-    keep: KeepOption = None,
-    nodes: NodesOption = None,
+    style: given.StyleOption = "lanes",
+    points: given.PointsOption = None,
+    keep: given.KeepOption = None,
+    nodes: given.NodesOption = None,
     spacing_m: SpacingOption = None,
-    lanes_m: LanesOption = None,
+    lanes_m: given.LanesOption = None,
     frame: options.FrameOption[str] = "map",
     floor: options.GraphFloorOption = None,
-    anchor: AnchorOption = None,
-    vehicles: VehiclesOption = None,
-    no_doors: NoDoorsOption = False,
-    report: ReportOption = None,
+    anchor: given.AnchorOption = None,
+    vehicles: given.VehiclesOption = None,
+    no_doors: given.NoDoorsOption = False,
+    report: given.ReportOption = None,
     rooms_file: options.RoomsOption = None,
     as_json: options.JsonOption = False,
     plot: options.PlotOption = None,
@@ -119,12 +88,12 @@ def export(
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
     """
     others = {"--out": out, f"--format {kind}": kind != "nav2"}
-    robot = Bundle.checked(bundle, Bundle(tuple(costs or ()), operations), others)
+    robot = given.Bundle.checked(bundle, given.Bundle(tuple(costs or ()), operations), others)
     out = bundle or _checked_out(kind, out, force=force)
-    check_picture(plot)
-    fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    common.check_picture(plot)
+    fleet = given.Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     of_graphs = {
-        "--style": None if style == STYLES[0] else style,
+        "--style": None if style == given.STYLES[0] else style,
         "--points": points,
         "--keep": keep,
         "--nodes": nodes,
@@ -133,9 +102,11 @@ def export(
         "--report": report,
         "--plot": plot,
     }
-    check_homes(of_graphs, [each for each in _ENDINGS if each not in _PARTS], f"--format {kind}")
-    check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
-    named, lifts = read_points(points) if points else ({}, ())
+    given.check_homes(
+        of_graphs, [each for each in _ENDINGS if each not in _PARTS], f"--format {kind}"
+    )
+    given.check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
+    named, lifts = given.read_points(points) if points else ({}, ())
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
     model = load_model(map_file, settings, seconds, reading)
@@ -144,28 +115,28 @@ def export(
         model, settings, seconds, rooms_file=rooms_file, find_rooms=kind != "places"
     )
     if kind in _PARTS:
-        with stage(f"writing {out}", seconds, "write"):
+        with common.stage(f"writing {out}", seconds, "write"):
             parts = _write_parts(topology, kind, (out, map_file), frame)
-        _respond(*parts, seconds, as_json=as_json)
+        given.respond(*parts, seconds, as_json=as_json)
         return
-    own = keep is not None and keep.suffix in ENDINGS.get(kind, ())
+    own = keep is not None and keep.suffix in given.ENDINGS.get(kind, ())
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
     for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
     began = time.perf_counter()
     build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
-    with progress_bar("building the graph") as advance:
+    with common.progress_bar("building the graph") as advance:
         graph = build(topology, progress=advance, **for_lanes)
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
-    with stage(f"writing {out}", seconds, "write"):
+    with common.stage(f"writing {out}", seconds, "write"):
         aim = fleet or (robot and robot._replace(lifts=lifts))
         left_out = _write_graph(topology, graph, aim, out, frame)
     is_few = fleet is not None or nodes is not None
-    pairs = LOSS_PAIRS if report is None and is_few else report
+    pairs = given.LOSS_PAIRS if report is None and is_few else report
     judged = None
     if pairs is not None:
-        with stage("comparing routes", seconds, "report"):
+        with common.stage("comparing routes", seconds, "report"):
             judged = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
     figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
     figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
@@ -175,8 +146,8 @@ def export(
     after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
     figures |= {"changes": changes} if changes else {}
-    _respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
-    warn_of_loss({graph.grid.name: judged} if judged is not None and is_few else {})
+    given.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
+    given.warn_of_loss({graph.grid.name: judged} if judged is not None and is_few else {})
     if plot is not None:
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
 
@@ -210,10 +181,10 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     out = _checked_out(kind, out, force=force)
-    check_style(style, {"--nodes": nodes}, {})
-    fleet = Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
+    given.check_style(style, {"--nodes": nodes}, {})
+    fleet = given.Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None:
-        raise UsageError(
+        raise common.UsageError(
             f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
         )
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
@@ -225,17 +196,17 @@ def _export_over_floors(
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
         built = build(topology)
-        reports.append(hn.ext.graphs.judge_route_graph(built, pairs=LOSS_PAIRS))
+        reports.append(hn.ext.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
         return built
 
     began = time.perf_counter()
-    with progress_bar("building the graphs") as advance:
+    with common.progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
             building, name=map_file.stem, build=judging, progress=advance
         )
     judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
     seconds["graph"] = round(time.perf_counter() - began, 6)
-    with stage(f"writing {out}", seconds, "write"):
+    with common.stage(f"writing {out}", seconds, "write"):
         left_out = fleet.write_building(align_floors(graph), out)
     figures = {
         "graph": str(out),
@@ -255,8 +226,8 @@ def _export_over_floors(
         lines.append(f"{'nearest':>10} {_line(judged[floor.name].nearest)}")
     links = ", ".join(printable(link.name) for link in graph.links) or "none"
     lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
-    _respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
-    warn_of_loss(judged)
+    given.respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
+    given.warn_of_loss(judged)
 
 
 def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
@@ -270,13 +241,6 @@ def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
     return lines or ["changed    nothing"] * bool(changes)
 
 
-def _respond(
-    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
-) -> None:
-    text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
-    answer((text if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
-
-
 def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
@@ -284,24 +248,24 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
 def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
     """Refuse formats that are none, files of other ones, and to write over a file."""
     if out is None:
-        raise UsageError("--out is missing: give a file, or a folder with --bundle")
+        raise common.UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
-        raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
-    check_output(out, "--out", _ENDINGS[kind])
+        raise common.UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    common.check_output(out, "--out", _ENDINGS[kind])
     if out.is_file() and not force:
-        raise UsageError(f"{printable(out)} exists: add --force to write over it")
+        raise common.UsageError(f"{printable(out)} exists: add --force to write over it")
     return out
 
 
 def _write_graph(
     topology: hn.TopologicalMap,
     graph: RouteGraph,
-    aim: Fleet | Bundle | None,
+    aim: given.Fleet | given.Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
-    if isinstance(aim, Fleet):
+    if isinstance(aim, given.Fleet):
         return aim.write(topology, graph, out)
     if aim is not None:
         return hn.ext.graphs.export_bundle(topology, graph, out, frame=frame, **aim._asdict())

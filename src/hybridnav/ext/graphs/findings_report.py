@@ -59,12 +59,7 @@ def count_line(findings: Iterable[Finding]) -> str:
 def found_lines(findings: Iterable[Finding], on: str = "") -> list[str]:
     """Return lines on findings, each with its first cases.
 
-    Parameters
-    ----------
-    findings
-        The findings.
-    on
-        Where all of them are, such as " on floor 2".
+    `on`: where all of them are, such as " on floor 2".
     """
     lines = []
     for each in findings:
@@ -129,12 +124,7 @@ def building_facts(
 ) -> list[tuple[str, str]]:
     """Return the figures of the check of a building's graph, each with its name.
 
-    Parameters
-    ----------
-    check
-        The check.
-    report
-        What came of its routes; None if they were not compared.
+    `report`: what came of its routes; None if they were not compared.
     """
     matched, building = check.matched, check.matched.building
     n_links = sum(link.own is not None for link in matched.links)
@@ -166,15 +156,7 @@ def building_facts(
 def render_check(check: GraphCheck) -> str:
     """Return the page on a check as one HTML text without references to other files.
 
-    Parameters
-    ----------
-    check
-        What to show.
-
-    Returns
-    -------
-    str
-        An HTML document, to be written as UTF-8.
+    `check`: what to show. Returns an HTML document, to be written as UTF-8.
     """
     heading = "Findings" if check.findings else "Nothing is wrong"
     part = {"heading": heading, "findings": check.findings, "picture": _picture(check, None)}
@@ -186,17 +168,8 @@ def render_building_check(check: BuildingGraphCheck, report: BuildingGraphReport
     """Return the page on the graph of a building, with a table of its routes, and a picture of each
     floor.
 
-    Parameters
-    ----------
-    check
-        What to show.
-    report
-        What came of its routes; None if they were not compared.
-
-    Returns
-    -------
-    str
-        An HTML document, to be written as UTF-8.
+    `check`: what to show; `report`: what came of its routes; None if they were not compared.
+    Returns an HTML document, to be written as UTF-8.
     """
     parts = [_part("The whole graph", check.findings)]
     parts += [
@@ -216,7 +189,7 @@ def _part(name: str, findings: tuple[Finding, ...]) -> dict[str, Any]:
 
 def _rows(report: BuildingGraphReport) -> list[list[str]]:
     """Return the table of routes, its heads first."""
-    from hybridnav.ext.fleet.graph_judge import Answer  # noqa: PLC0415 - buildings alone need it
+    from hybridnav.ext.fleet.graph_check import Answer  # noqa: PLC0415 - buildings alone need it
 
     answers = get_args(Answer)
     heads = [*answers, "loss mean", "p95", "most", "steps", "expanded", "graph, ms", "building, ms"]

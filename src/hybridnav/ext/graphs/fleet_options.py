@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -10,7 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli.common import UsageError, complain
+from hybridnav.cli.common import UsageError, answer, complain, timings
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
-_MOST_PAIRS = 1_000_000
 LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 """Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
 
@@ -76,7 +76,7 @@ ReportOption = Annotated[
         "--report",
         metavar="N",
         min=1,
-        max=_MOST_PAIRS,
+        max=1_000_000,
         help="Compare the routes of N random pairs with shortest paths.",
     ),
 ]
@@ -132,10 +132,7 @@ class Bundle(NamedTuple):
         """Return the options, None for no bundle. Refuse folders that hold other files, costs that
         are no masks, and options that do not go with a bundle, or without one.
 
-        Raises
-        ------
-        InvalidValueError, UsageError
-            When one of them is given.
+        Raises `InvalidValueError` or `UsageError` when one of them is given.
         """
         from hybridnav.ext.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
 
@@ -172,10 +169,8 @@ class Fleet:
     ) -> Fleet | None:
         """Return the options, None for a format that has none of them.
 
-        Raises
-        ------
-        UsageError
-            When an option is for another format, or one that the format needs is missing.
+        Raises `UsageError` when an option is for another format, or one that the format needs is
+        missing.
         """
         check_homes({"--floor": floor}, ENDINGS, f"--format {kind}")
         check_homes({"--anchor": anchor}, ("osm",), f"--format {kind}")
@@ -188,9 +183,8 @@ class Fleet:
         if kind == "lif" and not vehicles:
             raise UsageError("--format lif needs --vehicle MANUFACTURER.SERIES: who drives")
         place = None if anchor is None else _anchor(anchor)
-        return cls(
-            kind, "0" if floor is None else floor, place, tuple(vehicles or ()), not no_doors
-        )
+        own = "0" if floor is None else floor
+        return cls(kind, own, place, tuple(vehicles or ()), not no_doors)
 
     def write(self, topology: hn.TopologicalMap, graph: RouteGraph, out: Path) -> tuple[str, ...]:
         """Write a file of one floor; return what it does not hold."""
@@ -208,14 +202,17 @@ class Fleet:
         return hn.ext.graphs.export_lif(building, out, vehicle_types=self.vehicles)
 
 
-def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
-    """Return the named points of a YAML file, in metres, and which of them are lifts.
+def respond(
+    figures: dict[str, Any], lines: list[str], seconds: dict[str, float], *, as_json: bool
+) -> None:
+    """Print figures as JSON, or lines, with the seconds that it took."""
+    whole = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    answer((whole if as_json else "\n".join([*lines, f"seconds    {timings(seconds)}"])) + "\n")
 
-    Raises
-    ------
-    UsageError
-        When it is no mapping of names to points or poses, or has a name twice.
-    """
+
+def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
+    """Return the named points of a YAML file, in metres, and which of them are lifts. Raises
+    `UsageError` when it is no mapping of names to points or poses, or has a name twice."""
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
 
     given, lifts = read_yaml(path, what="points", error=MapError), {}

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
 
-
 Point = tuple[float, float]
 Severity = Literal["error", "warning", "note"]
 """Errors stop a robot or a reader, warnings may; notes are what graphs leave out on purpose too."""
@@ -239,6 +238,13 @@ def edge_text(name: Name | None, tail: Name, head: Name) -> str:
     return f"edge{own} from {shown(tail)} to {shown(head)}"
 
 
+def free_name(wanted: Iterable[str], taken: set[Any]) -> str:
+    """Return the first of some names that is not taken, which it is then."""
+    found = next(name for name in wanted if name not in taken)
+    taken.add(found)
+    return found
+
+
 def _one_line(text: str) -> str:
     """Return a name without line breaks, control codes and lone surrogates, and not too long."""
     plain = "".join(letter if letter.isprintable() else "?" for letter in " ".join(text.split()))
@@ -248,10 +254,7 @@ def _one_line(text: str) -> str:
 class Gathered:
     """Nodes and edges in the order in which a reader finds them; edges may come first.
 
-    Parameters
-    ----------
-    where
-        The file, as messages begin with it.
+    `where`: the file, as messages begin with it.
     """
 
     def __init__(self, where: str) -> None:
@@ -277,14 +280,8 @@ class Gathered:
     def add_node(self, name: Any, point: Point | None, facts: Mapping[str, Any]) -> None:
         """Add a node; edges go to the last one of an id, as in Nav2.
 
-        Parameters
-        ----------
-        name
-            Its id, of any type.
-        point
-            `(x, y)` in metres; None if there is none, and then the node is left out.
-        facts
-            All else.
+        `name`: its id, of any type; `point`: `(x, y)` in metres; None if there is none, and then
+        the node is left out; `facts`: all else.
         """
         name = name_of(name)
         if name in self._index or name in self._lost:
@@ -311,18 +308,9 @@ class Gathered:
     ) -> None:
         """Add a directed edge.
 
-        Parameters
-        ----------
-        endpoints
-            Ids of its tail and head.
-        facts
-            All else.
-        name
-            Its id; None for none.
-        cost
-            Its cost as stated; None for none.
-        line
-            Points `[x, y]` in metres along which it is drawn.
+        `endpoints`: ids of its tail and head; `facts`: all else; `name`: its id; None for none;
+        `cost`: its cost as stated; None for none; `line`: points `[x, y]` in metres along which it
+        is drawn.
         """
         tail, head = map(name_of, endpoints)
         edge = len(self._edge_names)
@@ -381,19 +369,8 @@ class Gathered:
 
         Edges to nodes that are not there are left out.
 
-        Parameters
-        ----------
-        kind
-            Its format.
-        name
-            Its name; what pictures and tables cannot hold is replaced.
-        frame
-            Name of its frame.
-
-        Raises
-        ------
-        InvalidValueError
-            When no node has a point.
+        `name`: its name; what pictures and tables cannot hold is replaced; `frame`: name of its
+        frame. Raises `InvalidValueError` when no node has a point.
         """
         if not self._names:
             raise InvalidValueError(

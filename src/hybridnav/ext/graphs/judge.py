@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.search.mesh import MeshPaths
-
 
 LEAST_AREA_M2 = 1.0
 """Area in square metres below which a part of free space gets no nodes: scans have many."""
@@ -47,10 +46,7 @@ class FreeSpace:
     def of(cls, grid: OccupancyGrid) -> FreeSpace:
         """Prepare the free space of a map.
 
-        Raises
-        ------
-        InvalidValueError
-            When the map allows corner cutting.
+        Raises `InvalidValueError` when the map allows corner cutting.
         """
         if grid.corner_cutting:
             raise InvalidValueError(
@@ -69,10 +65,7 @@ class FreeSpace:
         No door joins them with it, as the margin of its image; none do where no other part is as
         large as 1 m².
 
-        Parameters
-        ----------
-        rooms
-            The rooms, if there are some: a part that holds cells of one is inside.
+        `rooms`: the rooms, if there are some: a part that holds cells of one is inside.
         """
         part_of = self.component_of[self.free]
         is_inside = ~outside_of(self.grid)[self.free]
@@ -85,10 +78,7 @@ class FreeSpace:
         """Return which parts of free space get nodes, bool (n_components,): those of 1 m² or more
         that do not lie outside the building.
 
-        Parameters
-        ----------
-        rooms
-            The rooms, if there are some.
+        `rooms`: the rooms, if there are some.
         """
         return self._is_large & ~self.outside(rooms)
 
@@ -105,16 +95,9 @@ class FreeSpace:
     def joins(self, tails: FloatArray, heads: FloatArray) -> BoolArray:
         """Return which positions an edge may join, there and back.
 
-        Parameters
-        ----------
-        tails, heads
-            float64 (n, 2), positions inside free cells, as for `Sight.clear`.
-
-        Returns
-        -------
-        BoolArray
-            bool (n,), whether the segment stays in free space, and Nav2's walks between the cells
-            of its ends too.
+        `tails`, `heads`: float64 (n, 2), positions inside free cells, as for `Sight.clear`. Returns
+        bool (n,), whether the segment stays in free space, and Nav2's walks between the cells of
+        its ends too.
         """
         joined = self.sight.clear(tails, heads)
         ends = self.cells_at(tails), self.cells_at(heads)
@@ -125,15 +108,8 @@ class FreeSpace:
     def joinable(self, path: FloatArray) -> FloatArray:
         """Return positions on the cells of a path that edges may join one after the other.
 
-        Parameters
-        ----------
-        path
-            float64 (n, 2), a path in free space; its ends lie inside cells.
-
-        Returns
-        -------
-        FloatArray
-            float64 (k, 2), both ends, and as few centres of cells as are found between.
+        `path`: float64 (n, 2), a path in free space; its ends lie inside cells. Returns float64 (k,
+        2), both ends, and as few centres of cells as are found between.
         """
         centres = cells_of_line(self.free, path) + 0.5
         chain = np.concatenate([path[:1], centres, path[-1:]])
@@ -149,18 +125,9 @@ class FreeSpace:
     def moved_off(self, bends: FloatArray, away_cells: float) -> FloatArray:
         """Move positions off the blocked cell that paths bend round there, into a free cell.
 
-        Parameters
-        ----------
-        bends
-            float64 (n, 2), lattice corners with one blocked cell of four.
-        away_cells
-            How far along rows, and along columns, where there is room, and elsewhere `RIM_CELLS`;
-            no whole number.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n, 2).
+        `bends`: float64 (n, 2), lattice corners with one blocked cell of four; `away_cells`: how
+        far along rows, and along columns, where there is room, and elsewhere `RIM_CELLS`; no whole
+        number. Returns float64 (n, 2).
         """
         row, col = bends.astype(np.int64).T
         below = ~(self.free[row - 1, col - 1] & self.free[row - 1, col])
@@ -185,19 +152,9 @@ class FreeSpace:
     ) -> tuple[FloatArray, FloatArray]:
         """Draw pairs of centres of free cells with a path between them.
 
-        Parameters
-        ----------
-        count
-            Number of pairs.
-        rng
-            Source of random numbers.
-        is_kept
-            bool (n_components,), the parts of free space that they are drawn in, as of `kept`.
-
-        Returns
-        -------
-        tuple
-            float64 (count, 2) starts and goals; empty where no part has two cells.
+        `count`: number of pairs; `is_kept`: bool (n_components,), the parts of free space that they
+        are drawn in, as of `kept`. Returns float64 (count, 2) starts and goals; empty where no part
+        has two cells.
         """
         cells = np.argwhere(self.free)
         component = self.component_of[self.free]
@@ -323,7 +280,7 @@ def judge_route_graph(
             "lower least_m or the robot's radius"
         )
     network = Network.of(space.sight, graph.positions, graph.edges)
-    attached = network.with_candidates(MANY_CANDIDATES).join(starts, goals)
+    attached = replace(network, candidates=MANY_CANDIDATES).join(starts, goals)
     return GraphReport(
         pairs=len(starts),
         in_sight=float(attached.direct.mean()),
@@ -335,12 +292,8 @@ def judge_route_graph(
 def excess_of(lengths: FloatArray, optimum: FloatArray) -> Excess:
     """Return by how much routes are longer than the optimum.
 
-    Parameters
-    ----------
-    lengths
-        float64 (n,), the routes, infinite for none.
-    optimum
-        float64 (n,), the shortest paths, above 0.
+    `lengths`: float64 (n,), the routes, infinite for none; `optimum`: float64 (n,), the shortest
+    paths, above 0.
     """
     solved = np.isfinite(lengths)
     excess = np.maximum(lengths[solved] / optimum[solved] - 1.0, 0.0)

@@ -38,19 +38,9 @@ def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:
 def edge_metadata(graph: RouteGraph, chain: Sequence[int]) -> dict[str, Any]:
     """Return what is known of an edge, or of a chain of edges as one.
 
-    Parameters
-    ----------
-    graph
-        The graph.
-    chain
-        Indices of edges, in the order passed: the room is that of the middle one, doors are those
-        of all, measures the least.
-
-    Returns
-    -------
-    dict
-        `class` (door or free), `room`, `door`, `doors`, `lane`, and in metres `width_m`,
-        `clearance_m`, `left_m`, `right_m`.
+    `chain`: indices of edges, in the order passed: the room is that of the middle one, doors are
+    those of all, measures the least. Returns `class` (door or free), `room`, `door`, `doors`,
+    `lane`, and in metres `width_m`, `clearance_m`, `left_m`, `right_m`.
     """
     edges = list(chain)
     doors = list(dict.fromkeys(door for edge in edges for door in graph.edge_doors[edge]))
@@ -79,7 +69,6 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
 
 # What is known of the nodes and edges of a route graph: rooms, doors, widths.
 
-
 FARTHEST_M = 10.0
 """Distance in metres up to which free space beside an edge is measured."""
 
@@ -87,14 +76,7 @@ FARTHEST_M = 10.0
 def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> RouteGraph:
     """Make a route graph, with all that is known of its nodes and edges.
 
-    Parameters
-    ----------
-    topology
-        The map.
-    nodes
-        The nodes.
-    edges
-        int64 (m, 2), tail and head of each edge.
+    `edges`: int64 (m, 2), tail and head of each edge.
     """
     grid = topology.grid
     edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]

@@ -40,20 +40,9 @@ class GraphMethod:
     not used: they may be in any unit. Without a node in sight of an end the method gives up; where
     edges do not lead from one node to the other it answers that there is no path.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    graph
-        The graph, taken as it is: an edge through a wall becomes part of paths, which the harness
-        reports.
-    clear_edges_only
-        Whether edges that the robot cannot follow are left out instead.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map allows corner cutting.
+    `graph`: the graph, taken as it is: an edge through a wall becomes part of paths, which the
+    harness reports; `clear_edges_only`: whether edges that the robot cannot follow are left out
+    instead. Raises `InvalidValueError` when the map allows corner cutting.
     """
 
     region_of = None

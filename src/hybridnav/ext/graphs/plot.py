@@ -16,9 +16,11 @@ from hybridnav.viz.maps import ground_entries
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from hybridnav._base.typing import FloatArray
     from hybridnav.ext.graphs import GraphCheck, RouteGraph
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.viz.canvas import View
     from hybridnav.viz.layout import Entry
-
 
 _COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
 _MARKS = "sD^vo<>phP"
@@ -72,8 +74,7 @@ def plot_graph_check(
     """
     grid, graph = check.grid, check.graph
     view = known_view(grid).holding(graph.points, _MARGIN_M)
-    canvas = Canvas.opened(ax, width_in, view)
-    draw_cells(canvas, grid, grid.classes, style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED))
+    canvas = _opened(ax, width_in, view, grid)
     line = canvas.sizes.line
     entries: list[Entry] = []
     for chosen, name, colour, width in (
@@ -90,7 +91,7 @@ def plot_graph_check(
             canvas.add_lines(drawn, colors=colour, linewidths=width * line, zorder=2)
             entries.append((Line2D([], [], **look), name))
     entries += _draw_arrows(canvas, check, line)
-    entries += _draw_nodes(canvas, check, line)
+    entries += _draw_nodes(canvas, graph.points[check.is_free], ("nodes", style.INK, "o", 2.2))
     entries += _draw_findings(canvas, check, line)
     what = f"{check.count:,} findings" if check.findings else "nothing found"
     counts = [f"{graph.n_nodes:,} nodes", f"{graph.n_edges:,} edges", what]
@@ -99,15 +100,24 @@ def plot_graph_check(
     return canvas.ax
 
 
-def _draw_nodes(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
-    """Draw the nodes where the robot fits."""
-    points = check.graph.points[check.is_free]
+def _opened(ax: Axes | None, width_in: float, view: View, grid: OccupancyGrid) -> Canvas:
+    """Return axes with the cells of a map."""
+    canvas = Canvas.opened(ax, width_in, view)
+    draw_cells(canvas, grid, grid.classes, style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED))
+    return canvas
+
+
+def _draw_nodes(
+    canvas: Canvas, points: FloatArray, look: tuple[str, str, str, float]
+) -> list[Entry]:
+    """Draw nodes by their name, colour, mark and size in line widths; return their entry."""
+    name, colour, mark, size = look
     if not len(points):
         return []
-    look: dict[str, Any] = {"color": style.INK, "marker": "o", "linestyle": "none"}
-    look["markersize"] = 2.2 * line
-    canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **look)
-    return [(Line2D([], [], **look), "nodes")]
+    marks: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none"}
+    marks["markersize"] = size * canvas.sizes.line
+    canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **marks)
+    return [(Line2D([], [], **marks), name)]
 
 
 def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
@@ -220,27 +230,14 @@ def plot_route_graph(
     'graph'
     """
     grid = graph.grid
-    canvas = Canvas.opened(ax, width_in, known_view(grid))
-    classes = (style.BLOCKED, style.FREE, style.UNEXPLORED)
-    draw_cells(canvas, grid, grid.classes, style.rgb(*classes))
-    ends = np.sort(graph.edges, axis=1)
-    ends = unique_rows(ends).rows
+    canvas = _opened(ax, width_in, known_view(grid), grid)
+    ends = unique_rows(np.sort(graph.edges, axis=1)).rows
     line = canvas.sizes.line
     canvas.add_lines(graph.points[ends], colors=style.ARC, linewidths=0.35 * line, zorder=2)
     entries: list[Entry] = [(Line2D([], [], color=style.ARC, linewidth=0.5 * line), "edges")]
     kinds = np.array(graph.kinds)
-    for kind, (name, colour, mark, size) in _KINDS.items():
-        points = graph.points[kinds == kind]
-        if not len(points):
-            continue
-        look: dict[str, Any] = {
-            "color": colour,
-            "marker": mark,
-            "markersize": size * line,
-            "linestyle": "none",
-        }
-        canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **look)
-        entries.append((Line2D([], [], **look), name))
+    for kind, look in _KINDS.items():
+        entries += _draw_nodes(canvas, graph.points[kinds == kind], look)
     counts = [f"{graph.n_nodes:,} nodes", f"{graph.n_edges:,} edges"]
     words = [grid.name, *counts] if title is None else [title]
     finish(canvas, [*entries, *ground_entries(grid)], words)

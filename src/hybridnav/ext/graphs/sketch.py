@@ -48,16 +48,8 @@ def settled(positions: FloatArray) -> FloatArray:
 class Sketch:
     """A graph of straight edges.
 
-    Parameters
-    ----------
-    positions
-        float64 (n, 2), (row, col) in grid units.
-    kinds
-        int64 (n,), what each node is for.
-    edges
-        int64 (m, 2).
-    passage
-        How much room there is.
+    `positions`: float64 (n, 2), (row, col) in grid units; `kinds`: int64 (n,), what each node is
+    for; `edges`: int64 (m, 2); `passage`: how much room there is.
     """
 
     def __init__(
@@ -107,12 +99,8 @@ class Sketch:
     def snap(self, angle_rad: float, most: float) -> None:
         """Set edges along the main directions of walls, where there is room.
 
-        Parameters
-        ----------
-        angle_rad
-            Angle that turns the rows of the grid into a main direction.
-        most
-            How far nodes move at most, in cells.
+        `angle_rad`: angle that turns the rows of the grid into a main direction; `most`: how far
+        nodes move at most, in cells.
         """
         turn = turn_of(angle_rad)
         turned = self.positions @ turn.T
@@ -137,12 +125,8 @@ class Sketch:
     def simplify(self, near: float, longest: float) -> None:
         """Merge nodes that are near each other, and drop bends that edges can do without.
 
-        Parameters
-        ----------
-        near
-            Distance in cells below which nodes without a purpose are merged with others.
-        longest
-            Length of the longest edge that a dropped bend may leave, in cells.
+        `near`: distance in cells below which nodes without a purpose are merged with others;
+        `longest`: length of the longest edge that a dropped bend may leave, in cells.
         """
         beside = self.neighbours()
         waiting = list(beside)
@@ -213,16 +197,9 @@ class Sketch:
     def keep(self, known: FloatArray, edges: LongArray, same: LongArray, near: float) -> None:
         """Keep a graph before where the robot can follow it, and add what it lacks.
 
-        Parameters
-        ----------
-        known
-            float64 (k, 2), the nodes of that graph.
-        edges
-            int64 (m, 2), its edges.
-        same
-            int64 (n,), which node of it each node is, -1 for none.
-        near
-            Distance in cells within which one of its nodes stands for a node that it sees.
+        `known`: float64 (k, 2), the nodes of that graph; `edges`: int64 (m, 2), its edges; `same`:
+        int64 (n,), which node of it each node is, -1 for none; `near`: distance in cells within
+        which one of its nodes stands for a node that it sees.
         """
         from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 
@@ -301,13 +278,8 @@ class Sketch:
     def add_points(self, points: FloatArray, near: float) -> None:
         """Add nodes at points, each joined to the nearest edge where that is in sight.
 
-        Parameters
-        ----------
-        points
-            float64 (k, 2).
-        near
-            Distance in cells from its ends, and from a point, within which an edge gets no node
-            for the point: it is joined to the end, or led through the point.
+        `points`: float64 (k, 2); `near`: distance in cells from its ends, and from a point, within
+        which an edge gets no node for the point: it is joined to the end, or led through the point.
         """
         for node in self._with_nodes(points):
             if (self.edges == node).any():

@@ -76,22 +76,11 @@ def lines_of(
 ) -> tuple[BoolArray, BoolArray]:
     """Find the cells of strands.
 
-    Parameters
-    ----------
-    part_of
-        int32 (rows, cols), the connected part of each free cell, -1 elsewhere and along the rim.
-    clearance
-        float64 (rows, cols), distance to the next cell that is not free, in cells.
-    rooms
-        The rooms; each gets a strand if it has room for one.
-    layout
-        What strands are to be like.
-
-    Returns
-    -------
-    tuple
-        bool (rows, cols), the cells of the lines, 4-connected and one cell wide; bool (rows, cols),
-        those at which lines end on purpose.
+    `part_of`: int32 (rows, cols), the connected part of each free cell, -1 elsewhere and along the
+    rim; `clearance`: float64 (rows, cols), distance to the next cell that is not free, in cells;
+    `rooms`: the rooms; each gets a strand if it has room for one; `layout`: what strands are to be
+    like. Returns bool (rows, cols), the cells of the lines, 4-connected and one cell wide; bool
+    (rows, cols), those at which lines end on purpose.
     """
     free = part_of >= 0
     inside = _without_specks(part_of, layout.speck)
@@ -191,17 +180,9 @@ _SIDES = ((0, 1), (-1, 0), (0, -1), (1, 0))
 def strands_of(lines: BoolArray, marks: BoolArray) -> tuple[LongArray, list[Strand]]:
     """Return lines as a graph.
 
-    Parameters
-    ----------
-    lines
-        bool (rows, cols), 4-connected lines one cell wide.
-    marks
-        bool (rows, cols), cells of lines that are nodes, beside crossings and ends.
-
-    Returns
-    -------
-    tuple
-        int64 (n, 2), the cell of each node; the strands between them, some of them rings.
+    `lines`: bool (rows, cols), 4-connected lines one cell wide; `marks`: bool (rows, cols), cells
+    of lines that are nodes, beside crossings and ends. Returns int64 (n, 2), the cell of each node;
+    the strands between them, some of them rings.
     """
     lines = np.pad(lines, 1)
     cols = lines.shape[1]
@@ -329,19 +310,9 @@ def crossing(
 ) -> tuple[list[int], FloatArray] | None:
     """Find two edges that cross, or one that a node lies on.
 
-    Parameters
-    ----------
-    positions
-        float64 (n, 2), the nodes.
-    edges
-        int64 (m, 2).
-    touching
-        Distance from an edge at which a node lies on it.
-
-    Returns
-    -------
-    tuple
-        One edge or two, and where, float64 (2,); None if there are none.
+    `positions`: float64 (n, 2), the nodes; `edges`: int64 (m, 2); `touching`: distance from an edge
+    at which a node lies on it. Returns one edge or two, and where, float64 (2,); None if there are
+    none.
     """
     import shapely  # noqa: PLC0415 - on demand
 

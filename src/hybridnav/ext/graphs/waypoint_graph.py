@@ -296,14 +296,7 @@ class RouteGraph:
 def add_components(findings: Findings, graph: WaypointGraph, component: LongArray) -> None:
     """Add components that free space connects, and nodes that cannot be both reached and left.
 
-    Parameters
-    ----------
-    findings
-        What they are added to.
-    graph
-        The graph.
-    component
-        int64 (n,), the connected part of free space in which each node lies, -1 for none.
+    `component`: int64 (n,), the connected part of free space in which each node lies, -1 for none.
     """
     weak = components_of(graph.n_nodes, graph.edges, "weak")
     points = graph.points.tolist()
@@ -325,12 +318,7 @@ def one_way_nodes(n_nodes: int, edges: LongArray) -> LongArray:
 
     Routes lead from and to the largest strong component of each weak one.
 
-    Parameters
-    ----------
-    n_nodes
-        Number of nodes.
-    edges
-        int64 (m, 2), tail and head of each edge.
+    `n_nodes`: number of nodes; `edges`: int64 (m, 2), tail and head of each edge.
     """
     weak = components_of(n_nodes, edges, "weak")
     strong = components_of(n_nodes, edges, "strong")
@@ -348,18 +336,9 @@ def cut_off(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int
 
     Nodes without edges are left out.
 
-    Parameters
-    ----------
-    part_of
-        int64 (n,), the connected part of free space in which each node lies, -1 for none.
-    component
-        int64 (n,), the component of each node.
-
-    Yields
-    ------
-    tuple
-        The first node of a component, the number of its nodes in that part, and that of the largest
-        one there.
+    `part_of`: int64 (n,), the connected part of free space in which each node lies, -1 for none;
+    `component`: int64 (n,), the component of each node. Yields the first node of a component, the
+    number of its nodes in that part, and that of the largest one there.
     """
     size = np.bincount(component, minlength=1)
     for part in np.unique(part_of[part_of >= 0]).tolist():
@@ -372,15 +351,9 @@ def cut_off(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int
 def components_of(n_nodes: int, edges: LongArray, kind: Literal["weak", "strong"]) -> LongArray:
     """Return the component of each node of a graph, int64 (n,).
 
-    Parameters
-    ----------
-    n_nodes
-        Number of nodes.
-    edges
-        int64 (m, 2), tail and head of each edge.
-    kind
-        Whether the nodes of a component are joined whatever the directions of edges (weak), or each
-        can be reached from each (strong).
+    `n_nodes`: number of nodes; `edges`: int64 (m, 2), tail and head of each edge; `kind`: whether
+    the nodes of a component are joined whatever the directions of edges (weak), or each can be
+    reached from each (strong).
     """
     from scipy.sparse import coo_array  # noqa: PLC0415 - on demand
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415

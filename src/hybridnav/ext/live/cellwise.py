@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.merging import merge_pairs
-from hybridnav.ext.live.kernels.rings import box_groups, box_round
+from hybridnav.ext.live.kernels.near import box_groups, box_round
 from hybridnav.ext.live.state import PLACE, State
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.maps.islands import unique_rows
@@ -33,12 +33,8 @@ class CellDraft:
     surviving cells within the merge distance; what is left of them makes places of its own. Levels
     below the places are made when they are read (see `levels`).
 
-    Parameters
-    ----------
-    before
-        The version before.
-    criterion
-        When two fields merge; its linkage is "throats" or "radius".
+    `before`: the version before; `criterion`: when two fields merge; its linkage is "throats" or
+    "radius".
     """
 
     def __init__(self, before: State, criterion: Criterion) -> None:

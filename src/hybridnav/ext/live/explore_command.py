@@ -11,17 +11,9 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli import options
-from hybridnav.cli.common import (
-    UsageError,
-    answer,
-    check_output,
-    check_writable,
-    extent_line,
-    progress_bar,
-    timings,
-)
+from hybridnav.cli import common, options
 from hybridnav.cli.reading import check_room_to_be
+from hybridnav.ext.live.map_command import map_lines
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.names import read_point
 
@@ -83,10 +75,10 @@ def explore(
     --out writes the robot's map, a ROS map (.yaml).
     """
     point = None if start is None else _point(start)
-    check_output(out, "--out", (".yaml", ".yml"))
+    common.check_output(out, "--out", (".yaml", ".yml"))
     if out is not None:
-        check_writable(out.with_suffix(".pgm"), "--out")
-    check_output(plot, "--plot", (".gif",))
+        common.check_writable(out.with_suffix(".pgm"), "--out")
+    common.check_output(plot, "--plot", (".gif",))
     world = hn.load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells).grid
     check_room_to_be(world)
     if out is not None:
@@ -94,7 +86,7 @@ def explore(
     from hybridnav.ext.live import explore as exploring  # noqa: PLC0415 - loads numba
 
     maps = _Maps(frames)
-    with progress_bar("exploring") as advance:
+    with common.progress_bar("exploring") as advance:
         done = exploring.explore(
             world,
             point,
@@ -109,7 +101,7 @@ def explore(
         hn.write_ros_map(done.grid, out)
     if plot is not None:
         maps.draw(done.grid, plot)
-    answer(_figures(done) if as_json else _summary(done, world, out))
+    common.answer(_figures(done) if as_json else _summary(done, world, out))
 
 
 class _Maps:
@@ -133,7 +125,7 @@ class _Maps:
         from hybridnav.ext.live import ReplayAnimation, replay  # noqa: PLC0415 - loads matplotlib
 
         animation = ReplayAnimation(most_frames=self._most)
-        with progress_bar("drawing") as advance:
+        with common.progress_bar("drawing") as advance:
             for step in replay([*self._grids, last]):
                 animation.add(step)
                 advance(step.number + 1, len(self._grids) + 1)
@@ -144,14 +136,18 @@ def _rule(text: str) -> By:
     from hybridnav.ext.live.explore import By  # noqa: PLC0415 - loads numba
 
     if text not in get_args(By):
-        raise UsageError(f"--by must be one of {', '.join(get_args(By))}, got {printable(text)}")
+        raise common.UsageError(
+            f"--by must be one of {', '.join(get_args(By))}, got {printable(text)}"
+        )
     return cast("By", text)
 
 
 def _point(text: str) -> tuple[float, float]:
     point = read_point(text)
     if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-        raise UsageError(f"--start must be two finite numbers X,Y in metres, got {text!r:.80}")
+        raise common.UsageError(
+            f"--start must be two finite numbers X,Y in metres, got {text!r:.80}"
+        )
     return point[0], point[1]
 
 
@@ -163,7 +159,7 @@ def _check_kept(map_file: Path, out: Path) -> None:
     if map_file.suffix.lower() in {".yaml", ".yml"}:
         kept |= {file.resolve() for file in files_of(map_file)}
     if not kept.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
-        raise UsageError(
+        raise common.UsageError(
             f"--out {str(out)!r:.80} would replace the floor plan, expected another name: "
             "choose one"
         )
@@ -187,24 +183,18 @@ def _figures(done: Exploration) -> str:
 
 
 def _summary(done: Exploration, world: hn.OccupancyGrid, out: Path | None) -> str:
-    rows, cols = done.grid.shape
-    counts = done.grid.class_counts()
-    kinds = ", ".join(f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
     known = math.floor(1000 * done.share_known) / 10  # 100 % means all
     ended = "no goal is left: a door may be closed in the map"
     if done.share_known == 1.0:
         ended = "nothing in reach is unknown"
     if not done.is_complete:
         ended = "ended by --most-goals"
-    name = printable(world.name if out is None else out)
     lines = [
-        f"map        {name}, {cols} x {rows} cells of {done.grid.resolution_m:g} m",
-        extent_line(done.grid),
-        f"cells      {kinds}",
+        *map_lines(done.grid, world.name if out is None else out),
         f"driven     {done.driven_m:.1f} m, {len(done.points):,} scans, {done.n_goals:,} goals",
         f"known      {known:g} % of what the robot can reach, {ended}",
         f"given up   {done.n_given_up:,} cells that stayed unexplored from beside them",
         f"doubts     {done.n_looks_again:,} spots where doubtful cells or gaps were seen again",
-        f"seconds    {timings(done.seconds)}",
+        f"seconds    {common.timings(done.seconds)}",
     ]
     return "\n".join(lines) + "\n"

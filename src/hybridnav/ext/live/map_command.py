@@ -33,12 +33,7 @@ def is_bag(path: Path) -> bool:
 def open_log(path: Path, topic: str | None = None, frame: str | None = None) -> ScanLog:
     """Open a log of scans.
 
-    Parameters
-    ----------
-    path
-        The file or folder.
-    topic, frame
-        As in `BagLog`, for bags.
+    `path`: the file or folder; `topic`, `frame`: as in `BagLog`, for bags.
     """
     if is_bag(path):
         return hn.ext.live.BagLog(path, topic=topic, frame=frame)
@@ -175,16 +170,17 @@ def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noq
         figures = {"map": str(out), "rows": rows, "cols": cols, "resolution_m": grid.resolution_m}
         answer(json.dumps(figures | {"cells": grid.class_counts()}) + "\n")
     else:
-        answer("\n".join(_map_lines(grid, out)) + "\n")
+        answer("\n".join(map_lines(grid, out)) + "\n")
     return True
 
 
-def _map_lines(grid: hn.OccupancyGrid, out: Path) -> list[str]:
+def map_lines(grid: hn.OccupancyGrid, name: str | Path) -> list[str]:
+    """Return the lines on a map of this name or file: its cells, its extent, their classes."""
     rows, cols = grid.shape
     counts = grid.class_counts()
     kinds = (f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
     return [
-        f"map        {printable(out)}, {cols} x {rows} cells of {grid.resolution_m:g} m",
+        f"map        {printable(name)}, {cols} x {rows} cells of {grid.resolution_m:g} m",
         extent_line(grid),
         f"cells      {', '.join(kinds)}",
     ]
@@ -223,7 +219,7 @@ def _figures(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) ->
 def _summary(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
     recorded = f", recorded in {log.duration_s:.0f} s" if log.duration_s > 0 else ""
     lines = [
-        *_map_lines(grid, out),
+        *map_lines(grid, out),
         f"scans      {log.n_scans:,}{recorded}",
         f"log        {log.summary()}",
         f"seconds    {seconds:.3f}",

@@ -39,8 +39,6 @@ _DPI = 100
 
 
 class _Frame(NamedTuple):
-    """What a frame shows."""
-
     number: int
     grid: OccupancyGrid
     place_of: IntArray
@@ -210,8 +208,7 @@ def _write_rooms(canvas: Canvas, rooms: OnlineRooms) -> None:
     """Write the names of rooms, and draw doors as dots with their numbers."""
     doors = [door for door in rooms.doors.values() if not door.is_gap]
     dots = Line2D(
-        [door.position[0] for door in doors],
-        [door.position[1] for door in doors],
+        *np.reshape([door.position for door in doors], (-1, 2)).T,
         color=style.PATH,
         marker="o",
         markersize=2 * DOOR_POINTS * canvas.sizes.line,

@@ -12,7 +12,7 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.cellwise import CellDraft
 from hybridnav.ext.live.identities import check_sides, settle, shift_of
-from hybridnav.ext.live.kernels import rings as _ring_kernels
+from hybridnav.ext.live.kernels import near as _ring_kernels
 from hybridnav.ext.live.state import State, pyramid_of, state_of
 from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import OccupancyGrid
@@ -237,7 +237,8 @@ class OnlinePyramid:
         InvalidValueError
             When cells of the grid changed that no update stated.
         """
-        return pyramid_of(self._with_levels, self._box(), self)
+        built = self.merge_distance_m, self.linkage, self.seed
+        return pyramid_of(self._with_levels, self._box(), self.grid, built)
 
     @cached_property
     def place_numbers(self) -> LongArray:
@@ -309,14 +310,8 @@ def with_levels(state: State, box: Box, criterion: Criterion) -> State:
     Each of these places is dissolved into its cells and contracted again, beside places that stay
     as they are, until its surviving cell alone is left.
 
-    Parameters
-    ----------
-    state
-        The version; it stays as it is.
-    box
-        All cells, by the rows and columns of the tiles.
-    criterion
-        When two fields merge; its linkage is "throats" or "radius".
+    `state`: the version; it stays as it is; `box`: all cells, by the rows and columns of the tiles;
+    `criterion`: when two fields merge; its linkage is "throats" or "radius".
     """
     if state.has_levels:
         return state
@@ -369,10 +364,7 @@ def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
 
     Cells by which the map grew are left out, as updates look at them anyway.
 
-    Raises
-    ------
-    InvalidValueError
-        When the newer grid does not cover the older one, cell on cell.
+    Raises `InvalidValueError` when the newer grid does not cover the older one, cell on cell.
     """
     rows, cols = shift_of(before, after, otherwise="begin a new replay")
     changed = np.zeros(after.shape, np.bool_)

@@ -364,15 +364,8 @@ def faults_of(levels: Iterable[Level]) -> list[str]:
     A boundary is a set of cracks that are joined in 2 x 2 blocks with exactly two of them. Two
     fields have as many arcs as boundaries.
 
-    Parameters
-    ----------
-    levels
-        Levels, such as those of a pyramid.
-
-    Returns
-    -------
-    list of str
-        A line on each level whose arcs are others; none if all is well.
+    `levels`: levels, such as those of a pyramid. Returns a line on each level whose arcs are
+    others; none if all is well.
     """
     return [fault for level in levels for fault in _faults(level)]
 

@@ -11,15 +11,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav.cli import options
-from hybridnav.cli.common import (
-    EXIT_NOT_SOLVED,
-    EXIT_SOLVED,
-    UsageError,
-    answer,
-    check_output,
-    progress_bar,
-)
+from hybridnav.cli import common, options
 from hybridnav.errors import MapError
 from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -73,12 +65,12 @@ def replay(
 
     Rooms of --rooms are those of the first map, and their names are followed.
     """
-    check_output(plot, "--plot", (".gif",))
+    common.check_output(plot, "--plot", (".gif",))
     is_log = _is_log(files)
     if not is_log and (scans is not None or every != 1 or resolution_m is not None):
-        raise UsageError("--every, --scans and --resolution are for a log, got map files")
+        raise common.UsageError("--every, --scans and --resolution are for a log, got map files")
     if is_log and rooms_file is not None:
-        raise UsageError("--rooms is for map files, got a log: its rooms are found")
+        raise common.UsageError("--rooms is for map files, got a log: its rooms are found")
     from hybridnav.ext.live import ReplayFigures  # noqa: PLC0415 - loads numba
     from hybridnav.ext.live import replay as follow  # noqa: PLC0415
 
@@ -88,7 +80,7 @@ def replay(
 
         animation = ReplayAnimation(most_frames=frames)
     log = _Log(files[0], scans, max_cells) if is_log else None
-    with progress_bar("replaying") as advance:
+    with common.progress_bar("replaying") as advance:
         if log is None:
             grids = _read(files, robot_radius_m, max_cells, advance)
         else:
@@ -104,20 +96,20 @@ def replay(
     found = figures.figures() | ({} if log is None else {"log": log.summary()})
     if animation is not None and plot is not None:
         animation.save(plot)
-    answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _summary(found))
-    raise typer.Exit(EXIT_NOT_SOLVED if found["faults"] else EXIT_SOLVED)
+    common.answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _summary(found))
+    raise typer.Exit(common.EXIT_NOT_SOLVED if found["faults"] else common.EXIT_SOLVED)
 
 
 def _is_log(files: Sequence[Path]) -> bool:
     """Return whether the one file is a log and no map."""
     maps = [file.suffix.lower() in _MAP_ENDINGS for file in files]
     if any(maps) and not all(maps):
-        raise UsageError(
+        raise common.UsageError(
             f"{printable(files[maps.index(False)])} is no map file, expected .yaml or .yml as the "
             "others: replay a log alone"
         )
     if not any(maps) and len(files) > 1:
-        raise UsageError(f"got {len(files)} logs, expected one: replay them one by one")
+        raise common.UsageError(f"got {len(files)} logs, expected one: replay them one by one")
     return not any(maps)
 
 
@@ -143,14 +135,7 @@ def _with_rooms(
 class _Log:
     """A log that is replayed.
 
-    Parameters
-    ----------
-    file
-        The log.
-    most_scans
-        Scans to read, None for all.
-    max_cells
-        Scans that need more cells are left out.
+    `most_scans`: scans to read, None for all; `max_cells`: scans that need more cells are left out.
     """
 
     def __init__(self, file: Path, most_scans: int | None, max_cells: int) -> None:

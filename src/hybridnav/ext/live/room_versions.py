@@ -11,16 +11,8 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.ext.live import rooms_window as window
 from hybridnav.ext.live.identities import placed, shift_of
-from hybridnav.ext.live.rooms_window import (
-    DoorEvents,
-    OnlineDoor,
-    RoomCells,
-    beside_rooms,
-    doors_of,
-    follow_doors,
-    renew,
-)
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names
@@ -65,7 +57,7 @@ class OnlineRooms:
     belong to them up to 0.25 m."""
     names: Mapping[int, str]
     """The names that people gave, by the number of the room."""
-    doors: Mapping[int, OnlineDoor] = field(repr=False)
+    doors: Mapping[int, window.OnlineDoor] = field(repr=False)
     """All boundaries between rooms by number, gaps included."""
     points: Mapping[str, Point]
     """Named points, `(x, y)` in metres: they stay whatever the rooms."""
@@ -115,7 +107,7 @@ class OnlineRooms:
             if not NUMBERED.fullmatch(name)
         }
         number_of = np.append(np.array(numbers, np.int32), np.int32(NO_ROOM))[labels.label_of]
-        found = doors_of(number_of, grid, (0, 0), labels.doors)
+        found = window.doors_of(number_of, grid, (0, 0), labels.doors)
         doors = {door.number: door for door in sorted(found, key=lambda door: door.number)}
         return cls(
             grid,
@@ -178,22 +170,22 @@ class OnlineRooms:
         differs = (measured != grid.measured) | (was_outside != outside)
         if grid.shape != self.grid.shape:  # rooms reach into new cells, known or not
             new = placed(np.zeros(self.grid.shape, np.bool_), grid.shape, (rows, cols), 1)
-            differs |= new & beside_rooms(number_of, grid)
+            differs |= new & window.beside_rooms(number_of, grid)
         moved = replace(self, grid=grid, number_of=frozen(number_of), low=low, _outside=outside)
         if not differs.any():
-            return RoomsUpdate(moved, (), (), {}, {}, (), DoorEvents((), (), (), {}, {}), {})
-        before = RoomCells(number_of, (measured == CellClass.FREE) & ~was_outside)
-        found = renew(before, grid, outside, differs, (self.least_area_m2, self._next[0]))
-        events = found.events
+            return RoomsUpdate(moved, (), (), {}, {}, (), window.DoorEvents((), (), (), {}, {}), {})
+        before = window.RoomCells(number_of, (measured == CellClass.FREE) & ~was_outside)
+        settings = self.least_area_m2, self._next[0]
+        number_of, events = window.renew(before, grid, outside, differs, settings)
         # How wide a door is, walls decide that lie in no room and at any distance.
         known = {n: door.position for n, door in self.doors.items()}
-        new_doors, door_events = follow_doors(
-            self.doors, doors_of(found.number_of, grid, low, known), self._next[1]
+        new_doors, door_events = window.follow_doors(
+            self.doors, window.doors_of(number_of, grid, low, known), self._next[1]
         )
         lost = {n: self.names[n] for n in events.died if n in self.names}
         version = replace(
             moved,
-            number_of=frozen(found.number_of),
+            number_of=frozen(number_of),
             names=MappingProxyType({n: name for n, name in self.names.items() if n not in lost}),
             doors=MappingProxyType(new_doors),
             _next=(self._next[0] + len(events.born), self._next[1] + len(door_events.born)),
@@ -296,7 +288,7 @@ class RoomsUpdate:
     """Old rooms that fell into several new ones, with these."""
     changed: tuple[int, ...]
     """Rooms that kept their number, but have other cells."""
-    doors: DoorEvents
+    doors: window.DoorEvents
     """What became of the doors."""
     lost_names: dict[int, str]
     """Names of rooms that died, by the number these had."""

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.maps.room_labels import Point
 
-
 _MARGIN_M = 0.3
 """A changed cell touches the rooms within this distance: walls belong to rooms up to 0.25 m."""
 _CONTEXT_M = 10.0
@@ -44,45 +43,19 @@ class RoomCells(NamedTuple):
     """bool (rows, cols), free cells inside the building, as measured."""
 
 
-class Renewed(NamedTuple):
-    """Rooms after a change."""
-
-    number_of: IntArray
-    """int32 (rows, cols), the number of the room of each cell of the map."""
-    events: Events
-    """What became of the rooms."""
-
-
-class _Part(NamedTuple):
-    """The part of the map that is looked at."""
-
-    window: Box
-    """Its cells."""
-    room_of: IntArray
-    """int32, the rooms beside that stay, -1 where rooms are to be found; see `renewed_rooms`."""
-
-
 def renew(
     before: RoomCells,
     grid: OccupancyGrid,
     outside: BoolArray,
     differs: BoolArray,
     settings: tuple[float, int],
-) -> Renewed:
+) -> tuple[IntArray, Events]:
     """Find the rooms anew that changed cells touch; all others keep their free cells.
 
-    Parameters
-    ----------
-    before
-        The rooms before.
-    grid
-        The map now.
-    outside
-        bool (rows, cols), its free cells outside of the building.
-    differs
-        bool (rows, cols), cells that changed; at least one.
-    settings
-        The least area of a room in square metres, and the least number that no room has had.
+    `before`: the rooms before; `grid`: the map now; `outside`: bool (rows, cols), its free cells
+    outside of the building; `differs`: bool (rows, cols), cells that changed; at least one;
+    `settings`: the least area of a room in square metres, and the least number that no room has
+    had.
     """
     free = (grid.measured == CellClass.FREE) & ~outside
     touched = _touched(before.number_of, differs, grid)
@@ -109,16 +82,8 @@ def renew(
     # Outlines that people draw hold walls and furniture far from free cells.
     number_of[np.isin(number_of, died)] = NO_ROOM
     changed = set(np.unique(np.append(old[moved], new[moved])).tolist()) - {NO_ROOM}
-    return Renewed(
-        number_of,
-        Events(
-            matches.born,
-            died,
-            matches.merged,
-            matches.split,
-            tuple(sorted((changed & has) - set(matches.born))),
-        ),
-    )
+    kept = tuple(sorted((changed & has) - set(matches.born)))
+    return number_of, Events(matches.born, died, matches.merged, matches.split, kept)
 
 
 def beside_rooms(number_of: IntArray, grid: OccupancyGrid) -> BoolArray:
@@ -176,8 +141,9 @@ def _part(
     differs: BoolArray,
     touched: list[int],
     grid: OccupancyGrid,
-) -> _Part:
-    """Return the rooms to find, and what lies beside, in a window with some of the map around."""
+) -> tuple[Box, IntArray]:
+    """Return a window with some of the map around the rooms to find, and the rooms beside that stay
+    in it, -1 where rooms are to be found; see `renewed_rooms`."""
     of_rooms, box = box_of_rooms(number_of, touched), bounds(differs)
     box = box if of_rooms is None else box.joined(of_rooms)
     box, found = _to_find(number_of, free, differs, touched, box)
@@ -190,7 +156,7 @@ def _part(
     stays = free[inside] & np.isin(number, beside)
     room_of: IntArray = np.where(stays, number, np.int32(LEFT_OUT))
     room_of[box.inside(window)][found] = NO_ROOM
-    return _Part(window, room_of)
+    return window, room_of
 
 
 def _to_find(
@@ -246,17 +212,11 @@ def match(
     bears the number of the one with which it shares the most cells, the least number on a tie; a
     room that stayed bears its own.
 
-    Parameters
-    ----------
-    old
-        int32 (rows, cols), the old rooms that were given up, -1 elsewhere.
-    labels
-        int32 (rows, cols), the rooms now: the numbers of those that stay, and labels of those that
-        were found anew; -1 elsewhere.
-    first
-        The least label of a room that was found anew, and the least number that no room has had.
-    areas_staying
-        int64 (n,), the free cells of each room that stayed by its number, where it was before.
+    `old`: int32 (rows, cols), the old rooms that were given up, -1 elsewhere; `labels`: int32
+    (rows, cols), the rooms now: the numbers of those that stay, and labels of those that were found
+    anew; -1 elsewhere; `first`: the least label of a room that was found anew, and the least number
+    that no room has had; `areas_staying`: int64 (n,), the free cells of each room that stayed by
+    its number, where it was before.
     """
     first_label, first_number = first
     areas = np.bincount(labels[labels >= 0], minlength=first_label)
@@ -361,16 +321,9 @@ def doors_of(
 ) -> list[OnlineDoor]:
     """Return the doors between rooms.
 
-    Parameters
-    ----------
-    number_of
-        int32 (rows, cols), the number of the room of each cell, -1 for none.
-    grid
-        The map of these cells.
-    low
-        Row and column of cell (0, 0) in the lasting numbering.
-    known
-        A point of each door that has a number; see `RoomBoundaries.numbers`.
+    `number_of`: int32 (rows, cols), the number of the room of each cell, -1 for none; `grid`: the
+    map of these cells; `low`: row and column of cell (0, 0) in the lasting numbering; `known`: a
+    point of each door that has a number; see `RoomBoundaries.numbers`.
     """
     rooms = np.flatnonzero(np.bincount(number_of.ravel() + 1)[1:])
     dense = np.full(int(rooms.max(initial=NO_ROOM)) + 2, NO_ROOM, np.int32)

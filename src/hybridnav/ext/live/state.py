@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import Linkage
-
 
 # The table of places.
 
@@ -49,12 +48,7 @@ class PlaceTable:
 
     A new version copies the table when it first changes it, which takes 10 us for 3,000 places.
 
-    Parameters
-    ----------
-    numbers
-        int64 (n,), ascending; None for no place.
-    rows
-        `PLACE` (n,), read-only.
+    `numbers`: int64 (n,), ascending; None for no place; `rows`: `PLACE` (n,), read-only.
     """
 
     def __init__(self, numbers: LongArray | None = None, rows: AnyArray | None = None) -> None:
@@ -219,30 +213,6 @@ class State(NamedTuple):
 # Versions made from dense pyramids, and dense pyramids from versions.
 
 
-class Settings(Protocol):
-    """What a version of a pyramid was built from."""
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        """The map."""
-        ...
-
-    @property
-    def merge_distance_m(self) -> float:
-        """U_d in metres."""
-        ...
-
-    @property
-    def linkage(self) -> Linkage:
-        """The distance that stays below it."""
-        ...
-
-    @property
-    def seed(self) -> int:
-        """Breaks ties."""
-        ...
-
-
 def state_of(pyramid: DualGraphPyramid) -> State:
     """Return the first version of a pyramid, without the levels above its places."""
     level = pyramid[pyramid.place_level]
@@ -277,20 +247,16 @@ def state_of(pyramid: DualGraphPyramid) -> State:
     return State(tiles, places, n_ends, level.n_vertices)
 
 
-def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
+def pyramid_of(
+    state: State, box: Box, grid: OccupancyGrid, built: tuple[float, Linkage, int]
+) -> DualGraphPyramid:
     """Return a version as dense arrays.
 
-    Parameters
-    ----------
-    state
-        The version.
-    box
-        The cells of its grid among those of the tiles.
-    settings
-        Its grid, and what it was built with.
+    `box`: the cells of its grid among those of the tiles; `built`: the merge distance in metres,
+    the linkage and the seed by which it was built.
     """
     cells = state.tiles.read(box)
-    differs = cells["class"] != settings.grid.classes
+    differs = cells["class"] != grid.classes
     if differs.any():
         row, col = np.argwhere(differs)[0].tolist()
         raise InvalidValueError(
@@ -301,18 +267,10 @@ def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
     record = _record_of(cells)
     record.vertex_parent[cells["place"].ravel() == NO_PLACE] = -1
     stats = BuildStats()
-    pyramid = DualGraphPyramid(
-        settings.grid,
-        settings.merge_distance_m,
-        settings.linkage,
-        settings.seed,
-        stats,
-        None,
-        record,
-    )
+    pyramid = DualGraphPyramid(grid, *built, stats, None, record)
     n_levels = int(np.count_nonzero(state.vertex_ends[1:SURVIVES])) + 1
     stats.tops.append(n_levels - 1)
-    stats.sizes.extend(record.sizes(settings.grid.shape[1], n_levels))
+    stats.sizes.extend(record.sizes(grid.shape[1], n_levels))
     return pyramid
 
 

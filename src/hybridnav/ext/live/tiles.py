@@ -88,21 +88,11 @@ class Box(NamedTuple):
 
     def common(self, other: Box) -> Box:
         """Return the intersection with another box."""
-        return Box(
-            max(self.low_row, other.low_row),
-            max(self.low_col, other.low_col),
-            min(self.high_row, other.high_row),
-            min(self.high_col, other.high_col),
-        )
+        return Box(*map(max, self[:2], other[:2]), *map(min, self[2:], other[2:]))
 
     def joined(self, other: Box) -> Box:
         """Return the least box that holds this one and another one."""
-        return Box(
-            min(self.low_row, other.low_row),
-            min(self.low_col, other.low_col),
-            max(self.high_row, other.high_row),
-            max(self.high_col, other.high_col),
-        )
+        return Box(*map(min, self[:2], other[:2]), *map(max, self[2:], other[2:]))
 
     def inside(self, outer: Box) -> tuple[slice, slice]:
         """Return the slices by which an array of the outer box holds this one."""
@@ -152,10 +142,7 @@ class Tiles:
     Arrays of a version never change: those of a tile are copied when they first change. All that a
     kernel reads is read-only, those copies too, because it takes arrays of one type only.
 
-    Parameters
-    ----------
-    tiles
-        Tiles, their arrays read-only, by row and column of tiles.
+    `tiles`: tiles, their arrays read-only, by row and column of tiles.
     """
 
     def __init__(self, tiles: Mapping[tuple[int, int], Tile]) -> None:
@@ -204,14 +191,8 @@ class Tiles:
     ) -> Differing:
         """Return the cells of boxes whose class is another than that given for a map.
 
-        Parameters
-        ----------
-        boxes
-            Boxes on the map without common cells.
-        classes
-            uint8 (rows, cols), `CellClass` of the cells of the map.
-        low
-            Row and column of its first cell.
+        `boxes`: boxes on the map without common cells; `classes`: uint8 (rows, cols), `CellClass`
+        of the cells of the map; `low`: row and column of its first cell.
         """
         found, count = np.empty((_FEW_ROWS, 4), np.int64), 0
         for box in boxes:
@@ -308,20 +289,6 @@ class Tiles:
             runs, count = _tile_kernels.moved_cells(old, new, runs, count)
         sums: LongArray = _tile_kernels.sums_of(runs, count)
         return sums
-
-    def differing_tiles(self, before: Tiles) -> Iterator[tuple[Tile, Tile]]:
-        """Yield the tiles that this version does not share with another one: theirs, and its own.
-
-        Their records may be shared or not.
-        """
-        for row in sorted(self._rows.keys() | before._rows.keys()):
-            mine, theirs = self._rows.get(row, {}), before._rows.get(row, {})
-            if mine is theirs:
-                continue
-            for col in sorted(mine.keys() | theirs.keys()):
-                old, new = theirs.get(col, _EMPTY), mine.get(col, _EMPTY)
-                if old.place is not new.place or old.of_class is not new.of_class:
-                    yield old, new
 
     def arrays(self) -> dict[tuple[int, int], Tile]:
         """Return each tile, by row and column of tiles."""

@@ -1,6 +1,6 @@
-from .opening import Opening as Opening
+from .page import Opening as Opening
 from .page import save_page as save_page
-from .serving import serve as serve
+from .command import serve as serve
 from .session import Session as Session
 from .site import Site as Site
 

@@ -18,23 +18,17 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from hybridnav._base.extension import extension
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
+from hybridnav.ext.page import requests as ask
 from hybridnav.ext.page.drawing import GRID
-from hybridnav.ext.page.finding import Finder
-from hybridnav.ext.page.opening import PreparingError
-from hybridnav.ext.page.page import ASSETS, POLICY, asset, exported, exported_floor, live_page
-from hybridnav.ext.page.requests import (
-    AlternativesQuery,
-    At,
-    ClosingChange,
-    Edit,
-    Favour,
-    Find,
-    PartQuery,
-    PlanQuery,
-    Save,
-    Stand,
-    Undo,
-    checked,
+from hybridnav.ext.page.kept import Finder
+from hybridnav.ext.page.page import (
+    ASSETS,
+    POLICY,
+    PreparingError,
+    asset,
+    exported,
+    exported_floor,
+    live_page,
 )
 from hybridnav.ext.page.session import ConflictError
 
@@ -47,7 +41,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-    from hybridnav.ext.page.opening import Opening
+    from hybridnav.ext.page.page import Opening
     from hybridnav.ext.page.session import Session
     from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
@@ -121,18 +115,9 @@ def make_app(
 ) -> ASGIApp:
     """Return the application of a page.
 
-    Parameters
-    ----------
-    shown
-        What it shows: a site, or one that is still being prepared.
-    token
-        The first part of every path.
-    port
-        The port on 127.0.0.1.
-    folder
-        The only folder in which anything is written.
-    allow_edits
-        Whether programs may change what others see, as people may on the page.
+    `shown`: what it shows: a site, or one that is still being prepared; `token`: the first part of
+    every path; `port`: the port on 127.0.0.1; `folder`: the only folder in which anything is
+    written; `allow_edits`: whether programs may change what others see, as people may on the page.
     """
     at = f"/{token}"
     routes = [
@@ -166,23 +151,29 @@ class _Answers:
             f"{floor}/costs/{{preset}}.json": lambda one: on(one).costs(one.path_params["preset"]),
         }
         posts: dict[str, tuple[type[BaseModel], Callable[[Request, Any], Any]]] = {
-            f"{at}/plan": (PlanQuery, lambda _, query: self._planned(query)),
-            f"{at}/optimum": (PlanQuery, lambda _, query: self._planned(query, **_OPTIMUM)),
+            f"{at}/plan": (ask.PlanQuery, lambda _, query: self._planned(query)),
+            f"{at}/optimum": (ask.PlanQuery, lambda _, query: self._planned(query, **_OPTIMUM)),
             f"{at}/closed": (
-                ClosingChange,
+                ask.ClosingChange,
                 lambda _, change: self._shown.site.closings.describe(change),
             ),
             f"{at}/alternatives": (
-                AlternativesQuery,
+                ask.AlternativesQuery,
                 lambda _, query: self._shown.site.routes(query).alternatives(query),
             ),
-            f"{at}/find": (Find, lambda _, asked: self._finder.find(self._shown.site, asked)),
-            f"{at}/favour": (Favour, lambda _, asked: self._finder.favour(self._shown.site, asked)),
-            f"{floor}/stand": (Stand, lambda request, asked: on(request).stand(asked)),
-            f"{floor}/at": (At, lambda request, asked: on(request).room_at(asked)),
-            f"{floor}/edit": (Edit, lambda request, asked: on(request).edit(asked)),
-            f"{floor}/undo": (Undo, lambda request, asked: on(request).undo(asked.version)),
-            f"{floor}/save": (Save, lambda request, asked: on(request).save(asked)),
+            f"{at}/find": (
+                ask.Find,
+                lambda _, asked: self._finder.find(self._shown.site.named, asked),
+            ),
+            f"{at}/favour": (
+                ask.Favour,
+                lambda _, asked: self._finder.favour(self._shown.site.named, asked),
+            ),
+            f"{floor}/stand": (ask.Stand, lambda request, asked: on(request).stand(asked)),
+            f"{floor}/at": (ask.At, lambda request, asked: on(request).room_at(asked)),
+            f"{floor}/edit": (ask.Edit, lambda request, asked: on(request).edit(asked)),
+            f"{floor}/undo": (ask.Undo, lambda request, asked: on(request).undo(asked.version)),
+            f"{floor}/save": (ask.Save, lambda request, asked: on(request).save(asked)),
         }
         files = {at: self._export, floor: self._export_floor}
         tile = f"{floor}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
@@ -205,11 +196,11 @@ class _Answers:
         """Return the session of the floor in an address, once it is there."""
         return self._shown.site.floor(request.path_params["floor"])
 
-    def _planned(self, query: PlanQuery, **update: Any) -> dict[str, Any]:
+    def _planned(self, query: ask.PlanQuery, **update: Any) -> dict[str, Any]:
         return self._shown.site.routes(query).plan(query.model_copy(update=update))
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
-        site, query = self._shown.site, checked(PartQuery, value) if value else None
+        site, query = self._shown.site, ask.checked(ask.PartQuery, value) if value else None
         return exported(site, request.path_params["kind"], query, self._folder)
 
     def _export_floor(self, request: Request, _: Any) -> tuple[str, bytes]:
@@ -272,7 +263,7 @@ def _post(kind: type[BaseModel], act: Callable[[Request, Any], Any]) -> Any:
         value = await _body(request)
         if isinstance(value, Response):
             return value
-        return _json(await _done(lambda: act(request, checked(kind, value))))
+        return _json(await _done(lambda: act(request, ask.checked(kind, value))))
 
     return answer
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import secrets
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +15,7 @@ from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_output
 from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
+from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
 
@@ -26,7 +29,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
     from hybridnav.ext.page.kept import RoomsFile
-
 
 _ROOMS = "rooms.yaml"
 _TWO = 2
@@ -129,7 +131,6 @@ def _show(
 
 def _serve(source: MapPage | BuildingPage, port: int, *, browser: bool, allow_edits: bool) -> None:
     """Serve a page until Ctrl-C, and print its address."""
-    from hybridnav.ext.page import serve  # noqa: PLC0415 - loads numba and matplotlib
 
     def ready(address: str) -> None:
         answer(f"page       {address}\nCtrl-C     ends it\n")
@@ -314,3 +315,85 @@ def _ends(text: str, names: Sequence[str]) -> list[tuple[int, tuple[float, ...]]
             raise UsageError(no_point if names[0] else refusal)
         ends.append((before[prefix], point))
     return ends
+
+
+# The server on 127.0.0.1.
+
+
+def serve(
+    shown: Site | Opening,
+    folder: Path,
+    *,
+    port: int = 0,
+    allow_edits: bool = False,
+    ready: Callable[[str], object] | None = None,
+) -> None:
+    """Serve a page on 127.0.0.1 until Ctrl-C.
+
+    Parameters
+    ----------
+    shown
+        The content of the page: a site, or one that is prepared meanwhile.
+    folder
+        The only folder in which anything is written.
+    port
+        The port; 0 for a free one.
+    allow_edits
+        Whether programs that call the server may change the map for others, as people may.
+    ready
+        Called with the address, which holds a token that nobody can guess.
+
+    Raises
+    ------
+    InvalidValueError
+        When the port is taken or out of range, or the extra `view` is not installed.
+    HybridNavError
+        When the map cannot be prepared.
+
+    Examples
+    --------
+    >>> from contextlib import suppress
+    >>> from pathlib import Path
+    >>> from hybridnav.ext.page import Session, Site, serve
+    >>> grid = hn.example_map("figure1")
+    >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
+    >>> model = hn.load("figure1.hnm")
+    >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
+    >>> site = Site.of_map(Session(model, topology, model.fitted(None)))
+    >>> def ready(address):
+    ...     print(address[:17])
+    ...     raise KeyboardInterrupt  # as Ctrl-C does
+    >>> with suppress(KeyboardInterrupt):
+    ...     serve(site, Path(), ready=ready)
+    http://127.0.0.1:
+    """
+    try:
+        from hybridnav.ext.page import app  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        raise InvalidValueError(
+            f"the page needs the package {error.name}, which is not installed: "
+            "pip install 'hybridnav[view]'"
+        ) from None
+    from hybridnav.ext.page import Opening  # noqa: PLC0415 - loads numba and matplotlib
+
+    opening = shown if isinstance(shown, Opening) else None
+    token = secrets.token_urlsafe(24)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", "expected one from 0 to 65535")
+            raise InvalidValueError(f"port {port} cannot be used: {reason}") from None
+        listening.listen(app.MOST_CONNECTIONS)
+        port = listening.getsockname()[1]
+        server = app.make_server(
+            app.make_app(shown, token=token, port=port, folder=folder, allow_edits=allow_edits)
+        )
+        if opening is not None:
+            opening.begin(on_failure=lambda: setattr(server, "should_exit", True))
+        if ready is not None:
+            ready(f"http://127.0.0.1:{port}/{token}/")
+        server.run(sockets=[listening])
+    if opening is not None and opening.problem is not None:
+        raise opening.problem

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of, named_ends
+from hybridnav.ext.page import requests as ask
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import natural_key
 from hybridnav.planner import Blocked, PlanResult, load_preset, plan_alternatives, preset_names
@@ -20,13 +20,6 @@ from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.ext.page.requests import (
-        AlternativesQuery,
-        FloorClosed,
-        PartQuery,
-        PathQuery,
-        PlanQuery,
-    )
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, Journal, Preset, Tour
@@ -78,7 +71,7 @@ def level_graph(level: Level) -> dict[str, Any]:
     looped = level.is_self_loop & places.large[level.arcs[:, 0]]
     lines["loops"] = _lines(places.loops(looped), level.grid)
     dots = {
-        name: in_grid(places.positions[mask & places.large], level.grid)
+        name: ask.in_grid(places.positions[mask & places.large], level.grid)
         for name, mask in (("unexplored_dots", ~places.free), ("free_dots", places.free))
     }
     areas = level.areas[places.free & places.large]
@@ -87,18 +80,13 @@ def level_graph(level: Level) -> dict[str, Any]:
 
 
 def _lines(lines: list[FloatArray], grid: OccupancyGrid) -> list[Any]:
-    return in_grid(np.stack(lines), grid) if lines else []
+    return ask.in_grid(np.stack(lines), grid) if lines else []
 
 
 def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
     """Return what a page needs to know of a map before it draws its cells.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    n_zooms
-        Number of sizes of its tiles.
+    `n_zooms`: number of sizes of its tiles.
     """
     up, along = grid.frame.axes_m.tolist()
     return {
@@ -200,7 +188,7 @@ def _door(door: Door, grid: OccupancyGrid) -> dict[str, Any]:
         "kind": door.kind,
         "passable": door.passable,
         "width_m": round(door.width_m, 2),
-        "at": in_grid(door.position, grid),
+        "at": ask.in_grid(door.position, grid),
     }
 
 
@@ -213,16 +201,9 @@ GRID = "grid-astar"
 class PagePlanning:
     """The planners of one topological map, made when a preset is first asked for.
 
-    Parameters
-    ----------
-    model
-        The map or model.
-    topology
-        Its topological map with rooms.
-    settings
-        The preset that the page begins with; its section `pyramid` holds for all.
-    costs
-        Costs given beside the presets, None for none.
+    `model`: the map or model; `topology`: its topological map with rooms; `settings`: the preset
+    that the page begins with; its section `pyramid` holds for all; `costs`: costs given beside the
+    presets, None for none.
     """
 
     def __init__(
@@ -255,10 +236,7 @@ class PagePlanning:
     def planner(self, name: str) -> HybridPlanner:
         """Return the planner of a preset.
 
-        Raises
-        ------
-        HybridNavError
-            When there is no such preset, or it cannot plan on this map.
+        Raises `HybridNavError` when there is no such preset, or it cannot plan on this map.
         """
         with self._making:
             if name not in self._planners:
@@ -273,25 +251,25 @@ class PagePlanning:
             preset = load_preset(name).model_copy(update={"pyramid": self._settings.pyramid})
         return self._model.planner(preset, topology=self.topology, costs=self._costs)
 
-    def plan(self, query: PlanQuery) -> dict[str, Any]:
+    def plan(self, query: ask.PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
         planner, points = self._under(query), self._points(query)
         closed = self._closed(query)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
         result = planner.plan(*points, blocked=closed)
-        tour = tour_of(planner, [result], named_ends(query, points))
+        tour = tour_of(planner, [result], ask.named_ends(query, points))
         facts, explanation = self._facts(result), result.explanation
         if explanation is not None and not facts["why"]:
             facts["why"] = " ".join(explanation.words(query.language))
         return facts | self._itinerary(tour, query.language)
 
-    def on_floor(self, query: PartQuery) -> PlanResult:
+    def on_floor(self, query: ask.PartQuery) -> PlanResult:
         """Return the plan itself, to be written."""
         points, closed = self._points(query), self._closed(query)
         return self._under(query).plan(*points, blocked=closed)
 
-    def _under(self, query: PathQuery) -> HybridPlanner:
+    def _under(self, query: ask.PathQuery) -> HybridPlanner:
         """Return the planner of the preset of a query, under its profile."""
         planner = self.planner(query.preset)
         return planner if query.profile is None else planner.under(query.profile)
@@ -305,7 +283,7 @@ class PagePlanning:
         """The links that join a map with others: none."""
         return []
 
-    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
+    def alternatives(self, query: ask.AlternativesQuery) -> dict[str, Any]:
         """Return some routes by other doors."""
         start, goal = self._points(query)
         planner, closed = self._under(query), self._closed(query)
@@ -313,39 +291,37 @@ class PagePlanning:
         routes = [
             self._facts(each.result)
             | self._itinerary(
-                tour_of(planner, [each.result], named_ends(query, (start, goal))), query.language
+                tour_of(planner, [each.result], ask.named_ends(query, (start, goal))),
+                query.language,
             )
             | {"overlap": round(each.overlap, 3)}
             for each in found
         ]
         return {"routes": routes, "complete": found.complete, "note": found.note}
 
-    def _points(self, query: PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        start, goal = (in_metres(end.point, self.grid) for end in (query.start, query.goal))
+    def _points(self, query: ask.PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        start, goal = (ask.in_metres(end.point, self.grid) for end in (query.start, query.goal))
         if not self.planner(query.preset).needs_headings:
             return start, goal
         yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
         return (*start, yaw), (*goal, yaw)
 
-    def _closed(self, query: PathQuery) -> Blocked | None:
+    def _closed(self, query: ask.PathQuery) -> Blocked | None:
         if query.closed.links:
             raise InvalidValueError(f"one map has no links, got {query.closed.links[0]!r:.80}")
         asked = next(map(self.blocked, query.closed.floors), None)
         shut = None if self.journal is None or query.all_open else self.journal.closures()
         return asked | shut if asked and shut else asked or shut
 
-    def blocked(self, closed: FloorClosed) -> Blocked | None:
+    def blocked(self, closed: ask.FloorClosed) -> Blocked | None:
         """Return what is closed, in metres; None for nothing.
 
-        Raises
-        ------
-        InvalidValueError
-            When the corners of an area make no polygon.
+        Raises `InvalidValueError` when the corners of an area make no polygon.
         """
         if not closed:
             return None
         areas: list[list[tuple[float, float]]] = [
-            [in_metres(p, self.grid) for p in ring] for ring in closed.polygons
+            [ask.in_metres(p, self.grid) for p in ring] for ring in closed.polygons
         ]
         for ring in areas:
             if not shapely.Polygon(ring).is_valid:
@@ -357,10 +333,10 @@ class PagePlanning:
     def _facts(self, result: PlanResult) -> dict[str, Any]:
         """Return the figures and the line of a plan."""
         path = result.path
-        lines = [] if path is None else [in_grid(path.points, self.grid)]
+        lines = [] if path is None else [ask.in_grid(path.points, self.grid)]
         parts = [{"floor": 0, "line": line} for line in lines]
         length_m = None if path is None else path.length_m
-        return facts_of(result, parts) | {"length_m": finite(length_m)}
+        return ask.facts_of(result, parts) | {"length_m": ask.finite(length_m)}
 
     def _itinerary(self, tour: Tour, language: str) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
@@ -374,6 +350,6 @@ class PagePlanning:
                 }
                 for leg in tour.legs
             ],
-            "words": lines_of(tour.instructions, language, [(0, self.grid)]),
+            "words": ask.lines_of(tour.instructions, language, [(0, self.grid)]),
             "places": list(route.places) if route is not None else [],
         }

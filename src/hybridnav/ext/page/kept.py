@@ -1,15 +1,17 @@
-"""What a page keeps in files: its rooms with unsaved changes, and what is out of order."""
+"""What a page keeps in files: rooms with unsaved changes, what is out of order, favourites."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import threading
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
+from hybridnav.maps.names import folded, matching
 from hybridnav.planner import OutOfOrder
 from hybridnav.topology.rooms.files import save_rooms
 
@@ -17,10 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from hybridnav.ext.page.requests import ClosingChange
+    from hybridnav.ext.page.requests import ClosingChange, Favour, Find
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planner import Journal, Profile
-
 
 # The profiles, and what is out of order until it is opened again.
 
@@ -80,17 +81,8 @@ _MOST_BYTES = 10_000_000
 class RoomsFile:
     """A file of rooms inside one folder, and its journal `.NAME.edits` beside it.
 
-    Parameters
-    ----------
-    folder
-        The only folder that is written to.
-    name
-        Name of the file in it.
-
-    Raises
-    ------
-    RoomsError
-        When the file is a link that leads out of the folder.
+    `folder`: the only folder that is written to; `name`: name of the file in it. Raises
+    `RoomsError` when the file is a link that leads out of the folder.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -118,10 +110,7 @@ class RoomsFile:
     def is_changed(self, *, since_told: bool = False) -> bool:
         """Return whether somebody else has changed the file since it was read or written here.
 
-        Parameters
-        ----------
-        since_told
-            Whether to overlook the change that the last call returned.
+        `since_told`: whether to overlook the change that the last call returned.
         """
         now = self._digest()
         known = {self._seen, self._told} if since_told else {self._seen}
@@ -131,10 +120,7 @@ class RoomsFile:
     def save(self, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         """Write rooms whole or not at all, and end the journal.
 
-        Raises
-        ------
-        RoomsError
-            When the file cannot be written; the old one and the journal stay.
+        Raises `RoomsError` when the file cannot be written; the old one and the journal stay.
         """
         self._check_inside(self.path)
         save_rooms(self.path, rooms, grid)
@@ -165,3 +151,85 @@ class RoomsFile:
             changes = found.get("changes") if isinstance(found, dict) else None
             return changes if isinstance(changes, list) else []
         return []
+
+
+# Rooms by name on a page: found as people type them, and the favourites that are kept.
+
+_FILE = ".hybridnav-favourites.json"
+_MOST_OF_FAVOURITES = 1_000_000
+_MOST_FOUND = 200
+
+
+class Named(NamedTuple):
+    """A site by its `name`, those of its `floors`, and of the `places` that robots go to."""
+
+    name: str
+    floors: tuple[str, ...]
+    places: list[tuple[int, str]]
+
+
+class Finder:
+    """Finds rooms and named points of a site, its favourites first. Threads may share it.
+
+    Favourites stand in one file of the folder, so that they outlive the page, whose address is
+    another one each time.
+
+    `folder`: the folder of the map or building.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder.resolve() / _FILE
+        self._lock = threading.Lock()
+        self._kept: dict[str, list[list[str]]] = {}
+        with suppress(OSError, ValueError, TypeError, AttributeError, RecursionError):
+            if not self._file.is_symlink() and self._file.stat().st_size <= _MOST_OF_FAVOURITES:
+                found = json.loads(self._file.read_text(encoding="utf-8"))
+                self._kept = {name: _pairs(pairs) for name, pairs in found.items()}
+
+    def find(self, site: Named, asked: Find) -> dict[str, Any]:
+        """Return the rooms and points that a text may mean, the best first: `FLOOR:NAME`, or a name
+        of any floor, as `hybridnav.maps.names.matching` has it. All of them for an empty text."""
+        floor, text = None, asked.text
+        before, colon, after = text.partition(":")
+        for number, name in enumerate(site.floors):
+            if colon and folded(before) == folded(name):
+                floor, text = number, after
+        known = [named for named in site.places if floor in {None, named[0]}]
+        kept = self._kept.get(site.name, [])
+        found = [
+            {
+                "floor": known[at][0],
+                "name": known[at][1],
+                "same": folded(known[at][1]) == folded(text),
+                "favourite": [site.floors[known[at][0]], known[at][1]] in kept,
+            }
+            for at in matching(text, [name for _, name in known])
+        ]
+        found.sort(key=lambda each: (not each["same"], not each["favourite"]))
+        return {"found": found[:_MOST_FOUND]}
+
+    def favour(self, site: Named, asked: Favour) -> dict[str, Any]:
+        """Keep a room or point as a favourite, or no longer.
+
+        Raises `InvalidValueError` when there is none of this name, `OSError` when the file cannot
+        be written: the favourite then lasts as long as the page.
+        """
+        if (asked.floor, asked.name) not in set(site.places):
+            raise InvalidValueError(f"no room or point is called {asked.name!r:.80}")
+        named = [site.floors[asked.floor], asked.name]
+        with self._lock:
+            others = [each for each in self._kept.get(site.name, []) if each != named]
+            self._kept[site.name] = [*others, named] if asked.kept else others
+            if self._file.is_symlink():
+                raise InvalidValueError(f"{_FILE} is a link: the page writes through none")
+            replace_file(self._file, json.dumps(self._kept, ensure_ascii=False).encode())
+        return {}
+
+
+def _pairs(value: Any) -> list[list[str]]:
+    """Return pairs of a floor and a name of a file, without what is none."""
+    return [
+        each
+        for each in value
+        if isinstance(each, list) and len(each) == 2 and all(isinstance(part, str) for part in each)  # noqa: PLR2004
+    ]

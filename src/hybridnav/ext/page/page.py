@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 import tempfile
+import threading
+import time
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.graphs.files import export_nav2
-from hybridnav.ext.page.tiles import TILE
+from hybridnav.ext.page.drawing import map_facts
+from hybridnav.ext.page.tiles import TILE, hex_colours, map_layer
 from hybridnav.planner import export_path, export_rooms
 from hybridnav.planner.guide import languages
 from hybridnav.planner.saved import save
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.page.session import Session
     from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Layer, Theme
-
+    from hybridnav.maps import OccupancyGrid
 
 _NAMES = (
     *("texts.js", "scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js"),
@@ -66,10 +70,7 @@ def _texts() -> str:
 def whole_page(data: object) -> str:
     """Return the page with everything inside, which opens without a server.
 
-    Parameters
-    ----------
-    data
-        What the server would answer, as plain values.
+    `data`: what the server would answer, as plain values.
     """
     modules = "\n".join(_plain(asset(name)) for name in _NAMES)
     # `</script>` in a name of a room must not end the script.
@@ -188,22 +189,10 @@ WHOLE = ("model", "path-geojson", "path-csv")
 def exported(site: Site, kind: str, query: PartQuery | None, folder: Path) -> tuple[str, bytes]:
     """Return the name and the content of a file about a whole site.
 
-    Parameters
-    ----------
-    site
-        The site.
-    kind
-        One of `WHOLE`.
-    query
-        The query whose path is written, and the floor; None for the model.
-    folder
-        Where a temporary folder may lie for the time of the writing.
-
-    Raises
-    ------
-    InvalidValueError
-        When the kind is not known, a path is wanted without a query, or the route does not visit
-        the floor.
+    `kind`: one of `WHOLE`; `query`: the query whose path is written, and the floor; None for the
+    model; `folder`: where a temporary folder may lie for the time of the writing. Raises
+    `InvalidValueError` when the kind is not known, a path is wanted without a query, or the route
+    does not visit the floor.
     """
     _check_kind(kind, WHOLE)
     if kind == "model":
@@ -218,19 +207,8 @@ def exported(site: Site, kind: str, query: PartQuery | None, folder: Path) -> tu
 def exported_floor(session: Session, kind: str, folder: Path) -> tuple[str, bytes]:
     """Return the name and the content of a file about a floor.
 
-    Parameters
-    ----------
-    session
-        The floor.
-    kind
-        `nav2` or `rooms`.
-    folder
-        As for `exported`.
-
-    Raises
-    ------
-    InvalidValueError
-        When the kind is not known.
+    `kind`: `nav2` or `rooms`; `folder`: as for `exported`. Raises `InvalidValueError` when the kind
+    is not known.
     """
     _check_kind(kind, [each for each in KINDS if each not in WHOLE])
     topology = session.planning.topology
@@ -263,3 +241,174 @@ def _content(kind: str, write: Callable[[Path], None], folder: Path) -> tuple[st
         raise MapError(
             f"{name} cannot be written: the folder {where} takes no files: {error.strerror}"
         ) from None
+
+
+# A page that opens before its map is prepared: cells first, then rooms, places and routes.
+
+_LOG = logging.getLogger("hybridnav.ext.page")
+
+
+class PreparingError(HybridNavError):
+    """Something was asked for that is not there yet."""
+
+
+class Opening:
+    """A site on a page that begins with the cells of its lowest floor. Threads share it.
+
+    The rooms, places and planners of its floors are prepared in a thread.
+
+    Parameters
+    ----------
+    grid
+        The map of the lowest floor.
+    make
+        Makes the site; it is given what to call with the name of each stage.
+    name
+        Its name on the page; None for the name of the map.
+    floors
+        Names of the floors, from the lowest to the highest; one map has none.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.page import Opening, Session, Site
+    >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
+    >>> model = hn.load("figure1.hnm")
+    >>> def make(tell):
+    ...     tell("finding rooms")
+    ...     topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
+    ...     return Site.of_map(Session(model, topology, model.fitted(None)))
+    >>> opening = Opening(model.grid, make)
+    >>> opening.floor("0").describe()["ready"]
+    False
+    >>> opening.begin()
+    >>> opening.wait()
+    >>> opening.floor("0").describe()["ready"]
+    True
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        make: Callable[[Callable[[str], None]], Site],
+        *,
+        name: str | None = None,
+        floors: Sequence[str] = ("",),
+    ) -> None:
+        self._make, self._floors = make, list(floors)
+        self._name = grid.name if name is None else name
+        self._cells = Cells(grid, lambda: self._stage)
+        self._began = time.monotonic()
+        self._stage = "preparing the map"
+        self._site: Site | None = None
+        self.problem: Exception | None = None
+        """Why it could not be prepared; None while all is well."""
+        self._thread = threading.Thread(target=self._prepare, daemon=True)
+        self._on_failure: Callable[[], object] = lambda: None
+
+    def begin(self, *, on_failure: Callable[[], object] = lambda: None) -> None:
+        """Begin to prepare.
+
+        Parameters
+        ----------
+        on_failure
+            Called, in the thread, when it fails; `problem` then says why.
+        """
+        self._on_failure = on_failure
+        self._began = time.monotonic()
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Wait until all is prepared, or has failed."""
+        self._thread.join()
+
+    def _prepare(self) -> None:
+        try:
+            site = self._make(self._tell)
+            site.sessions[0].describe()  # rooms and their names, while nobody waits for them
+            self._site = site
+            self._tell("preparing routes")
+            for session in dict.fromkeys(site.sessions):
+                planner = session.planning.planner(session.planning.presets[0])
+                planner.prepare(progress=self._count)
+        except Exception as error:  # noqa: BLE001 - it is raised where the page is served
+            self.problem = error
+            self._on_failure()
+        self._tell("")
+
+    def _count(self, done: int, of: int) -> None:
+        self._stage = f"preparing routes, {100 * done // max(of, 1)} %"
+
+    def _tell(self, stage: str) -> None:
+        _LOG.info("%s after %.1f s", stage or "ready", time.monotonic() - self._began)
+        self._stage = stage
+
+    @property
+    def site(self) -> Site:
+        """The site.
+
+        Raises
+        ------
+        PreparingError
+            While it is not there.
+        """
+        if self._site is None:
+            raise PreparingError(f"not yet: {self._stage}")
+        return self._site
+
+    def floor(self, text: str) -> Session | Cells:
+        """Return a floor by its number, as it stands in an address, as far as it is prepared.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such floor.
+        PreparingError
+            When it is not there yet.
+        """
+        return self._cells if self._site is None and text == "0" else self.site.floor(text)
+
+    def state(self) -> dict[str, Any]:
+        """Return how far it is: whether rooms and places are there, and the present step."""
+        return {
+            "ready": self._site is not None,
+            "stage": self._stage,
+            "seconds": round(time.monotonic() - self._began, 1),
+        }
+
+    def describe(self) -> dict[str, Any]:
+        """Return the facts that a page needs beside its maps: the floors alone, until the rest is
+        there."""
+        if self._site is not None:
+            return self._site.describe()
+        facts: dict[str, Any] = {"name": self._name, "ready": False, "floors": self._floors}
+        return facts | {"links": [], "presets": []}
+
+
+class Cells:
+    """A floor that has its cells only."""
+
+    def __init__(self, grid: OccupancyGrid, stage: Callable[[], str]) -> None:
+        self._grid, self._layer, self._stage = grid, map_layer(grid), stage
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page needs to know to draw the cells."""
+        nothing: dict[str, Any] = {"rooms": [], "doors": [], "version": 0, "unsaved": 0}
+        return map_facts(self._grid, self._layer.n_zooms) | {
+            "ready": False,
+            "levels": [],
+            "presets": [],
+            "colours": {"light": hex_colours("light"), "dark": hex_colours("dark")},
+            "can_save": False,
+            "file": "",
+            "no_file": "",
+            "rooms": nothing | {"notice": ""},
+        }
+
+    def layer(self, name: str) -> Layer:
+        """Return the layer `map`.
+
+        Raises `PreparingError` when another one is asked for.
+        """
+        if name != "map":
+            raise PreparingError(f"not yet: {self._stage()}")
+        return self._layer

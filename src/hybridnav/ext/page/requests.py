@@ -1,7 +1,8 @@
-"""What the page may ask for: each request is checked whole before anything is done."""
+"""What the page may ask for, each request checked whole before anything is done, and is told."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -10,15 +11,20 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, RoomUse
+from hybridnav.planner import PlanResult
+from hybridnav.planner.guide import sentences
 from hybridnav.topology.rooms.files.outlines import Outlines
 from hybridnav.topology.rooms.files.paint import cells_inside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from numpy.typing import ArrayLike
 
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.ext.fleet import BuildingPlan
+    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.planner.guide import Instruction
 
 _FAR = 1e7
 """Grid units beyond which nothing lies: a map has fewer cells."""
@@ -193,10 +199,7 @@ _T = TypeVar("_T", bound=BaseModel)
 def checked(kind: type[_T], value: Any) -> _T:
     """Return a request of some kind.
 
-    Raises
-    ------
-    InvalidValueError
-        When a key or value is not as expected; the message names the first.
+    Raises `InvalidValueError` when a key or value is not as expected; the message names the first.
     """
     try:
         return kind.model_validate(value)
@@ -209,10 +212,7 @@ def checked(kind: type[_T], value: Any) -> _T:
 def checked_change(value: dict[str, Any]) -> Change:
     """Return a change of the rooms.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is none.
+    Raises `InvalidValueError` when it is none.
     """
     op = value.get("op")
     kind = _KINDS.get(op) if isinstance(op, str) else None
@@ -233,20 +233,9 @@ _NEAR = 1.0
 def changed(rooms: RoomLabels, change: Change, grid: OccupancyGrid) -> RoomLabels:
     """Return rooms after a change.
 
-    Parameters
-    ----------
-    rooms
-        The rooms before.
-    change
-        What to do, in grid units.
-    grid
-        The map.
-
-    Raises
-    ------
-    InvalidValueError
-        When there is no such room, a name is taken or no name, two rooms do not touch, a line cuts
-        nothing off, or a room would lose its last free cell.
+    `rooms`: the rooms before; `change`: what to do, in grid units. Raises `InvalidValueError` when
+    there is no such room, a name is taken or no name, two rooms do not touch, a line cuts nothing
+    off, or a room would lose its last free cell.
     """
     if isinstance(change, Rename):
         return _renamed(rooms, change)
@@ -283,7 +272,10 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
     if kept == gone:
         raise InvalidValueError(f"{change.room!r:.80} is one room: choose another one to merge")
     label_of = rooms.label_of
-    if not _touch(label_of == kept, label_of == gone):
+    # Loads scipy's filters, which most requests do not need.
+    from scipy.ndimage import binary_dilation  # noqa: PLC0415
+
+    if not (binary_dilation(label_of == kept) & (label_of == gone)).any():
         raise InvalidValueError(
             f"{change.room!r:.80} and {change.other!r:.80} do not touch: only neighbours merge"
         )
@@ -297,16 +289,6 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
         one, private=one.private or other.private, cost=max(one.cost, other.cost)
     )
     return replace(rooms, names=names, label_of=renumbered, points=points, uses=uses)
-
-
-def _touch(one: BoolArray, other: BoolArray) -> bool:
-    """Return whether a cell of one set lies beside a cell of another one."""
-    return bool(
-        (one[:, 1:] & other[:, :-1]).any()
-        or (one[:, :-1] & other[:, 1:]).any()
-        or (one[1:] & other[:-1]).any()
-        or (one[:-1] & other[1:]).any()
-    )
 
 
 def _split(rooms: RoomLabels, change: Split, grid: OccupancyGrid) -> RoomLabels:
@@ -357,3 +339,76 @@ def _with_corner(
     moved = rings[ring].copy()
     moved[int(distances[ring].argmin())] = to
     return [moved if at == ring else each for at, each in enumerate(rings)]
+
+
+# What the page is told of a plan: its figures, and lines with the places that they are about.
+
+_DECIMALS = 3
+_METRE_DECIMALS = 6
+"""Decimals of points in metres: the page converts them there and back."""
+
+
+def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
+    """Return points `(x, y)` in metres as `[column, row]` in grid units."""
+    points = np.asarray(points_m, dtype=np.float64)
+    if not points.size:
+        return []
+    found: list[Any] = np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
+    return found
+
+
+def in_metres(point: Sequence[float], grid: OccupancyGrid) -> tuple[float, float]:
+    """Return a point `[column, row]` in grid units as `(x, y)` in metres."""
+    x, y = grid.frame.points_of_grid([point[1], point[0]]).round(_METRE_DECIMALS).tolist()
+    return x, y
+
+
+def named_ends(query: PathQuery, points: Sequence[Any]) -> list[Any]:
+    """Return what words call the ends of a query: their names, or their points."""
+    ends = (query.start, query.goal)
+    return [end.name or point for end, point in zip(ends, points, strict=True)]
+
+
+def lines_of(
+    instructions: Sequence[Instruction], language: str, floors: Sequence[tuple[int, OccupancyGrid]]
+) -> list[dict[str, Any]]:
+    """Return the lines of instructions, each with the place and the door that it is about.
+
+    `instructions`: what a person does on a route; `language`: code of the language; `floors`:
+    number and map of each floor that is visited, in order. Raises `InvalidValueError` when there
+    are no sentences in this language.
+    """
+    lines: list[dict[str, Any]] = []
+    visited = 0
+    for n_told, each in enumerate(instructions, 1):
+        # Two instructions may make one line: it is about the first of them.
+        while len(sentences(instructions[:n_told], language)) > len(lines):
+            floor, grid = floors[min(visited, len(floors) - 1)]
+            crossed = each.doorway or each.landmark
+            door = None if crossed is None else crossed.door
+            at = in_grid(each.position, grid)
+            lines.append({"floor": floor, "at": at, "door": door})
+        visited += each.kind == "ride"
+    texts = sentences(instructions, language)
+    return [line | {"text": text} for line, text in zip(lines, texts, strict=False)]
+
+
+def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of a plan, and its lines floor by floor; None stands for what is not
+    finite."""
+    why = plan.note if not isinstance(plan, PlanResult) else ""
+    if isinstance(plan, PlanResult):
+        why = plan.settings.get("profile", {}).get("forbids", "")
+    return {
+        "status": str(plan.status),
+        "why": why,
+        "solved": plan.solved,
+        "metric": plan.metric,
+        "parts": parts,
+        "seconds": round(sum(plan.stats.seconds.values()), 6),
+    } | {name: finite(getattr(plan, name)) for name in ("cost", "lower_bound", "gap")}
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number, None for what JSON cannot hold."""
+    return value if value is not None and math.isfinite(value) else None

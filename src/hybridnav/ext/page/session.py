@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError, InvalidValueError
-from hybridnav.ext.page.answers import in_grid, in_metres
 from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, room_facts
-from hybridnav.ext.page.requests import changed, checked_change, rings_of
+from hybridnav.ext.page.requests import changed, checked_change, in_grid, in_metres, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps.names import natural_key
 from hybridnav.planner.named import check_names

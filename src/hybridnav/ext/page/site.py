@@ -6,14 +6,14 @@ import math
 import threading
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Floor
 from hybridnav.ext.fleet.checks import check_closing
 from hybridnav.ext.fleet.plan import GuidedRoute
-from hybridnav.ext.page.answers import facts_of, finite, in_grid, in_metres, lines_of
-from hybridnav.ext.page.kept import Closings
+from hybridnav.ext.page.kept import Closings, Named
+from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, lines_of
 from hybridnav.ext.page.session import Session
 from hybridnav.planner import PROFILES, Tour, load_preset, preset_names
 from hybridnav.planner.saved import Model
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.fleet import BuildingPlan
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
+    from hybridnav.ext.page.drawing import PagePlanning
     from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
-    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder, PlanResult
+    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder
     from hybridnav.topology.rooms import Rooms
 
 _MOST_DIGITS = 3
@@ -44,32 +45,10 @@ _NEAR_M = 1.0
 """Metres from a door within which the end of a link is taken to be at it."""
 
 
-class Routes(Protocol):
-    """What plans between points of the floors of a site, in grid units.
-
-    One floor and several differ here alone: on one map a route is described by its rooms and doors,
-    and others differ from it by these; over floors both go by links.
-    """
-
-    @property
-    def presets(self) -> list[str]:
-        """The names to choose from, the one of the start first."""
-
-    @property
-    def links(self) -> list[dict[str, Any]]:
-        """The links between the floors, as plain values."""
-
-    def plan(self, query: PlanQuery) -> dict[str, Any]:
-        """Return a plan with its certificate; unless it is brief, with words."""
-
-    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
-        """Return some routes that differ for people."""
-
-    def on_floor(self, query: PartQuery) -> PlanResult | Tour:
-        """Return the part of a route on one floor, to be written."""
-
-    def kept(self) -> HybridPlanner | Building:
-        """Return what a model holds."""
+Routes: TypeAlias = "PagePlanning | _OverFloors"
+"""What plans between points of the floors of a site, in grid units. One floor and several differ
+here alone: on one map a route is described by its rooms and doors, and others differ from it by
+these; over floors both go by links."""
 
 
 class Site:
@@ -165,6 +144,17 @@ class Site:
         number = int(text) if is_number else -1
         self._check(number, text)
         return self.sessions[number]
+
+    @property
+    def named(self) -> Named:
+        """The rooms that the robot fits in, and all points, each with the number of its floor."""
+        found: list[tuple[int, str]] = []
+        for number, session in enumerate(self.sessions):
+            rooms = session.planning.topology.rooms
+            fitting = [name for name, fits in zip(rooms.names, rooms.fits, strict=True) if fits]
+            points = [name for name in rooms.labels.points if name not in rooms.names]
+            found += [(number, name) for name in (*fitting, *points)]
+        return Named(self.name, self.names, found)
 
     def _check(self, number: int, given: object) -> None:
         if not 0 <= number < len(self.sessions):
@@ -303,10 +293,8 @@ class _OverFloors:
     def _with(self, preset: str) -> Building:
         """Return the building with planners by a preset, of the rooms as they are now.
 
-        Raises
-        ------
-        HybridNavError
-            When there is no such preset, or it cannot plan on a floor or over floors.
+        Raises `HybridNavError` when there is no such preset, or it cannot plan on a floor or over
+        floors.
         """
         planners = [session.planning.planner(preset) for session in self.sessions]
         with self._making:
@@ -347,10 +335,7 @@ class _OverFloors:
     def on_floor(self, query: PartQuery) -> Tour:
         """Return the parts of a route on one floor, to be written.
 
-        Raises
-        ------
-        InvalidValueError
-            When there is no route, or it does not visit the floor.
+        Raises `InvalidValueError` when there is no route, or it does not visit the floor.
         """
         name = self._building.floors[query.floor].name
         plan = self._outcome(query)

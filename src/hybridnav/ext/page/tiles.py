@@ -82,19 +82,9 @@ class Layer:
     def png(self, zoom: int, row: int, col: int, theme: Theme) -> bytes:
         """Return a tile as PNG, its first row the one of the lowest y.
 
-        Parameters
-        ----------
-        zoom
-            How often the map is halved, from 0 to `n_zooms` - 1.
-        row, col
-            Number of the tile from the origin of the grid, in tiles.
-        theme
-            The colours.
-
-        Raises
-        ------
-        InvalidValueError
-            When there is no such tile.
+        `zoom`: how often the map is halved, from 0 to `n_zooms` - 1; `row`, `col`: number of the
+        tile from the origin of the grid, in tiles. Raises `InvalidValueError` when there is no such
+        tile.
         """
         self._check(zoom, row, col)
         with io.BytesIO() as file:

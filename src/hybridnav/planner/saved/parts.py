@@ -67,10 +67,7 @@ class _PyramidValues(_Values):
 def values_of(kind: type[_T], filed: FiledPart) -> _T:
     """Check the numbers and texts of a part.
 
-    Raises
-    ------
-    ModelError
-        When one is missing, not known, or of another kind.
+    Raises `ModelError` when one is missing, not known, or of another kind.
     """
     try:
         return kind.model_validate(filed.values)
@@ -124,12 +121,8 @@ def grid_part(grid: OccupancyGrid) -> Part:
 def sizes_of(filed: FiledPart, *, max_cells: int) -> dict[str, int]:
     """Return the sizes of the map that a part describes, to which other sizes refer.
 
-    Raises
-    ------
-    ModelError
-        When the sizes are missing.
-    MapError
-        When the map has more than `max_cells` cells.
+    Raises `ModelError` when the sizes are missing, `MapError` when the map has more than
+    `max_cells` cells.
     """
     GRID.check_version(filed)
     rows, cols = (filed.part.sizes.get(name, 0) for name in ("rows", "cols"))
@@ -142,10 +135,7 @@ def sizes_of(filed: FiledPart, *, max_cells: int) -> dict[str, int]:
 def grid_of(filed: FiledPart, known: dict[str, int]) -> OccupancyGrid:
     """Read a grid.
 
-    Raises
-    ------
-    ModelError
-        When the part is not as `grid_part` has written it.
+    Raises `ModelError` when the part is not as `grid_part` has written it.
     """
     values = values_of(_GridValues, filed)
     arrays = GRID.read(filed, {"cells": known["cells"]})
@@ -201,10 +191,7 @@ def rooms_part(rooms: RoomLabels) -> Part:
 def rooms_of(filed: FiledPart, known: dict[str, int]) -> RoomLabels:
     """Read rooms.
 
-    Raises
-    ------
-    ModelError
-        When the part is not as `rooms_part` has written it.
+    Raises `ModelError` when the part is not as `rooms_part` has written it.
     """
     values = values_of(_RoomsValues, filed)
     label_of = ROOMS.read(filed, known)["label_of"]
@@ -234,10 +221,7 @@ def pyramid_of(
 ) -> DualGraphPyramid:
     """Read a pyramid.
 
-    Raises
-    ------
-    ModelError
-        When the part is not as `pyramid_part` has written it.
+    Raises `ModelError` when the part is not as `pyramid_part` has written it.
     """
     values = values_of(_PyramidValues, filed)
     wanted = 1 + (rooms is not None) + (values.region_cells is not None)
@@ -273,10 +257,7 @@ def preset_part(preset: Preset) -> Part:
 def preset_of(filed: FiledPart) -> Preset:
     """Read a preset.
 
-    Raises
-    ------
-    ModelError
-        When it is not valid.
+    Raises `ModelError` when it is not valid.
     """
     PRESET.check_version(filed)
     return values_of(Preset, filed)

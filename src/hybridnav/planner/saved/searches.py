@@ -66,12 +66,7 @@ def made_for(settings: PlannerSettings) -> dict[str, Any]:
 def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
     """Return the parts for the preparations of a planner.
 
-    Parameters
-    ----------
-    prepared
-        `HybridPlanner.prepared`.
-    key
-        Of `made_for`.
+    `prepared`: `HybridPlanner.prepared`; `key`: of `made_for`.
     """
     if isinstance(prepared, meshes.MeshSearch):
         return _mesh_parts(prepared, key)
@@ -83,21 +78,8 @@ def search_of(
 ) -> Prepared | None:
     """Read the preparations for a planner of some settings; return None if the model has none.
 
-    Parameters
-    ----------
-    filed
-        All parts of the model.
-    method
-        The setting `planner.method`.
-    key
-        Of `made_for`.
-    known
-        Sizes of the map.
-
-    Raises
-    ------
-    ModelError
-        When a part is not as it was written.
+    `filed`: all parts of the model; `method`: the setting `planner.method`; `key`: of `made_for`;
+    `known`: sizes of the map. Raises `ModelError` when a part is not as it was written.
     """
     fitting = {part.kind: part for part in filed if part.values.get("made_for") == key["made_for"]}
     if method == "shortest" and MESH.kind in fitting:

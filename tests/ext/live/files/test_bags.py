@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 import hybridnav as hn
 from hybridnav.ext.live.files import bag_files
-from hybridnav.ext.live.files.bag_poses import Transforms
+from hybridnav.ext.live.files.bag_files import Transforms
 from tests.ext.live.files.bag_writer import GRID, KINDS, BagWriter
 from tests.ext.live.files.drive import (
     BEGAN,

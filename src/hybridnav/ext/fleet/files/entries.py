@@ -80,18 +80,9 @@ class Entries:
 def read_building_entries(path: PathLike) -> Entries:
     """Read the description of a building.
 
-    Parameters
-    ----------
-    path
-        The file, YAML.
-
-    Raises
-    ------
-    MapNotFoundError
-        When there is no such file.
-    MapError
-        When it cannot be read, or a key is missing, not known, or has a value of another kind; one
-        line that names the file and the line.
+    `path`: the file, YAML. Raises `MapNotFoundError` when there is no such file, `MapError` when it
+    cannot be read, or a key is missing, not known, or has a value of another kind; one line that
+    names the file and the line.
     """
     marked = read_marked(
         path, what="building", error=MapError, missing=MapNotFoundError, limits=_LIMITS

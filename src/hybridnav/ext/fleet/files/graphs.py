@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.graphs.files.osm_xml import Anchor
     from hybridnav.topology.rooms import Door, Rooms
 
-
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""
 JSON, XML = (".geojson", ".json", ".lif"), (".graphml", ".osm", ".xml")
@@ -129,10 +128,7 @@ def read_open_rmf(
 def floor_in(building: BuildingGraph, floor: str | None, where: str) -> WaypointGraph:
     """Return the graph of a floor, or of the only one.
 
-    Raises
-    ------
-    MapError
-        When there are several and none is chosen.
+    Raises `MapError` when there are several and none is chosen.
     """
     if floor is None and len(building.floors) > 1:
         names = ", ".join(each.name for each in building.floors)

@@ -13,7 +13,6 @@ from hybridnav.errors import MapError
 if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
 
-
 _FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
 _LOOKED_AT = 2**16
 """Bytes of a file that are searched for its floors."""

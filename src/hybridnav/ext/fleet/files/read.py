@@ -138,19 +138,9 @@ def load_floor(
 ) -> Model:
     """Load the map or model of one floor, as `load_building` does.
 
-    Parameters
-    ----------
-    entry
-        The floor.
-    folder
-        The folder of the file that describes the building.
-    robot_radius_m, preset, max_cells
-        As `load_building` takes them.
-
-    Raises
-    ------
-    HybridNavError
-        When it cannot be read; the message names the floor and the line.
+    `folder`: the folder of the file that describes the building; `robot_radius_m`, `preset`,
+    `max_cells`: as `load_building` takes them. Raises `HybridNavError` when it cannot be read; the
+    message names the floor and the line.
     """
     map_file = folder / entry.map_file
     if robot_radius_m is None and not is_model(map_file):

@@ -10,13 +10,12 @@ from xml.parsers import expat
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav._base.yaml_file import Limits
 from hybridnav.errors import MapError
-from hybridnav.ext.graphs.files.osm_xml import parse_xml
+from hybridnav.ext.graphs.files.osm_xml import XmlReader
 from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, point_of
 from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
 
 LIMITS = Limits(max_bytes=2**25, max_values=300_000, aliases=True)
 """How much of a file is read; a map of 90 nodes has 11,000 values."""
@@ -26,19 +25,8 @@ _TEXT = "topological map"
 def read_yaml_graph(data: Any, where: str, name: str) -> WaypointGraph:
     """Read a topological map: a list of nodes (STRANDS) or a mapping with `nodes` (tmap2).
 
-    Parameters
-    ----------
-    data
-        The file as parsed.
-    where
-        What messages begin with.
-    name
-        Name of a graph that has none.
-
-    Raises
-    ------
-    MapError
-        When it is in neither form.
+    `data`: the file as parsed; `where`: what messages begin with; `name`: name of a graph that has
+    none. Raises `MapError` when it is in neither form.
     """
     gathered = Gathered(where)
     if isinstance(data, list):
@@ -116,7 +104,6 @@ def _yaw_of(rotation: Any) -> float:
 
 # Reader of GraphML, element by element: no tree of the file is kept.
 
-_DEEPEST = 100
 _MOST_TEXT = 2**20
 """Characters of one value."""
 _TRUE = ("true", "1")
@@ -125,43 +112,29 @@ _TRUE = ("true", "1")
 def read_graphml(text: str, where: str, name: str) -> WaypointGraph:
     """Read a graph.
 
-    Parameters
-    ----------
-    text
-        The file. Nodes have `x` and `y`, or one of the other attributes of
-        `WaypointGraph.from_networkx`; nested graphs are read as one.
-    where
-        What messages begin with.
-    name
-        Name of a graph that has none.
-
-    Raises
-    ------
-    MapError
-        When it is no GraphML, or declares a document type: entities could make it endless.
+    `text`: the file. Nodes have `x` and `y`, or one of the other attributes of
+    `WaypointGraph.from_networkx`; nested graphs are read as one; `where`: what messages begin with;
+    `name`: name of a graph that has none. Raises `MapError` when it is no GraphML, or declares a
+    document type: entities could make it endless.
     """
     reader = _Reader(where, name)
     parser = expat.ParserCreate("utf-8", namespace_separator=" ")
     parser.buffer_text = True
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
     parser.CharacterDataHandler = reader.characters
-    parser.StartDoctypeDeclHandler = reader.refuse
-    parse_xml(parser, text, where)
+    reader.parse(text, parser)
     if not reader.is_graphml:
         raise MapError(f"{where}: expected GraphML, got other XML")
     return WaypointGraph(**reader.gathered.fields("graphml", reader.name))
 
 
-class _Reader:
-    """What expat calls."""
+class _Reader(XmlReader):
+    deepest, kind = 100, "GraphML"
 
     def __init__(self, where: str, name: str) -> None:
+        super().__init__(where)
         self.gathered = Gathered(where)
         self.name = name
         self.is_graphml = False
-        self._where = where
-        self._depth = 0
         self._is_directed = [True]
         self._keys: dict[str, tuple[str, str]] = {}
         self._defaults: dict[str, dict[str, Any]] = {}
@@ -169,16 +142,9 @@ class _Reader:
         self._key: str | None = None
         self._text: list[str] = []
 
-    def refuse(self, *_: Any) -> None:
-        """Refuse a document type."""
-        raise MapError(f"{self._where}: GraphML with a document type (DOCTYPE) is not read")
-
     def start(self, tag: str, given: dict[str, str]) -> None:
         """Begin an element."""
         tag = tag.rpartition(" ")[2]
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise MapError(f"{self._where}: XML nested more than {_DEEPEST} deep")
         if self._depth == 1:
             self.is_graphml = tag == "graphml"
         elif tag == "key":
@@ -203,7 +169,6 @@ class _Reader:
     def end(self, tag: str) -> None:
         """End an element."""
         tag = tag.rpartition(" ")[2]
-        self._depth -= 1
         if tag == "data" and self._key is not None:
             name, kind = self._keys.get(self._key, (self._key, "string"))
             value = _value("".join(self._text), kind)
@@ -276,19 +241,8 @@ def read_text_graph(text: str, where: str, name: str) -> WaypointGraph:
     """Read a map of blocks `node:`, each with a name, `waypoint:` (x, y, z, and a quaternion),
     `edges:` (a line each: the other node, the action) and `vertices:`.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of the graph.
-
-    Raises
-    ------
-    MapError
-        When a line is not as expected; the text names it.
+    `where`: what messages begin with; `name`: name of the graph. Raises `MapError` when a line is
+    not as expected; the text names it.
     """
     gathered = Gathered(where)
     node, section = _Node(), ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import MapError
@@ -12,7 +13,6 @@ from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-
 
 MOST_ID = 2**32 - 1
 """Nav2 holds ids as unsigned integers of 32 bits."""
@@ -27,19 +27,8 @@ _LINKS = ("links", "edges")
 def read_json_graph(text: str, where: str, name: str) -> WaypointGraph:
     """Read a graph in one of the two forms, told apart by their keys.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of a graph that has none.
-
-    Raises
-    ------
-    MapError
-        When it is in neither form.
+    `where`: what messages begin with; `name`: name of a graph that has none. Raises `MapError` when
+    it is in neither form.
     """
     features, plain = Features(where), NodeLink(where)
     has: set[str] = set()
@@ -215,28 +204,22 @@ _BLANK = re.compile(r"[ \t\n\r]*")
 def members_of(text: str, where: str) -> Iterator[tuple[str, int | None, Any]]:
     """Yield the members of a JSON object, and of its lists each value by itself.
 
-    Parameters
-    ----------
-    text
-        The file. NaN and infinities are read as such, as programs write them.
-    where
-        What messages begin with.
-
-    Yields
-    ------
-    tuple
-        The key of a member, the index in its list (None where it is no list; -1 with no value for
-        an empty one), and the value.
-
-    Raises
-    ------
-    MapError
-        When the text is no JSON object, or too large; one line with the place.
+    `text`: the file. NaN and infinities are read as such, as programs write them; `where`: what
+    messages begin with. Yields the key of a member, the index in its list (None where it is no
+    list; -1 with no value for an empty one), and the value. Raises `MapError` when the text is no
+    JSON object, or too large; one line with the place.
     """
-    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
-        raise MapError(f"{where}: JSON of more than {MOST_VALUES} values is not read")
-    try:
+    with json_errors(text, where, MOST_VALUES):
         yield from _Scanner(text).members()
+
+
+@contextmanager
+def json_errors(text: str, where: str, most_values: int) -> Iterator[None]:
+    """Raise `MapError`, one line with the place, when a text has too many values or is no JSON."""
+    if text.count(",") + text.count("[") + text.count("{") > most_values:
+        raise MapError(f"{where}: JSON of more than {most_values} values is not read")
+    try:
+        yield
     except json.JSONDecodeError as failure:
         at = f"line {failure.lineno}, column {failure.colno}"
         raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None

@@ -14,13 +14,8 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.rmf_read import (
-    MOST_FLOORS,
-    check_link_count,
-    id_fact,
-    list_of,
-    mapping_of,
-)
+from hybridnav.ext.graphs.files import rmf_read as rmf
+from hybridnav.ext.graphs.files.json_graphs import json_errors
 from hybridnav.ext.graphs.files.rmf_write import speed_limit_of
 from hybridnav.ext.graphs.gather import Gathered, pair_of, shown
 from hybridnav.maps.checks import checked_type
@@ -30,7 +25,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.ext.fleet import LinkKind
-
 
 Point = tuple[float, float]
 _MOST_BYTES, _MOST_VALUES = 3 * 2**24, 2**22
@@ -47,26 +41,10 @@ def is_lif(text: str) -> bool:
 def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     """Read layouts: one floor for each `layoutLevelId`, or for each layout that has none.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-
-    Returns
-    -------
-    BuildingGraph
-        Floors in the order of the file, in its one frame. Edges between two floors become links
-        between their nodes: those of one `edgeName` one link, of the kind with which that begins,
-        or else a lift. Times are not stated.
-
-    Raises
-    ------
-    MapError
-        When it is not of this form.
+    `where`: what messages begin with; `name`: name of a building that has none. Returns floors in
+    the order of the file, in its one frame. Edges between two floors become links between their
+    nodes: those of one `edgeName` one link, of the kind with which that begins, or else a lift.
+    Times are not stated. Raises `MapError` when it is not of this form.
     """
     data = _parsed(text, where)
     floors: dict[str, Gathered] = {}
@@ -75,8 +53,8 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     layouts = _layouts(data, where)
     for at, floor, layout in layouts:
         gathered = floors.setdefault(floor, Gathered(f"{where}, level {shown(floor)}"))
-        if len(floors) > MOST_FLOORS:
-            raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
+        if len(floors) > rmf.MOST_FLOORS:
+            raise MapError(f"{where}: more than {rmf.MOST_FLOORS} levels are not read")
         for node in _entries(layout, "nodes", at):
             known = _text(node, "nodeId", at)
             point = pair_of(node.get("nodePosition"))
@@ -96,27 +74,18 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
         FloorGraph(name=floor, graph=WaypointGraph(**gathered.fields("lif", floor)))
         for floor, gathered in kept.items()
     ]
-    meta = mapping_of(data.get("metaInformation"), where, "metaInformation")
+    meta = rmf.mapping_of(data.get("metaInformation"), where, "metaInformation")
     title = str(meta.get("projectIdentification") or name)
     links = _links(crossing, floor_of, point_of, list(kept))
-    check_link_count(len(links), where)
+    rmf.check_link_count(len(links), where)
     return BuildingGraph(name=title, floors=tuple(graphs), links=tuple(links))
 
 
 def _parsed(text: str, where: str) -> dict[str, Any]:
     if len(text) > _MOST_BYTES:
         raise MapError(f"{where}: a layout of more than {_MOST_BYTES} bytes is not read")
-    if text.count(",") + text.count("[") + text.count("{") > _MOST_VALUES:
-        raise MapError(f"{where}: JSON of more than {_MOST_VALUES} values is not read")
-    try:
+    with json_errors(text, where, _MOST_VALUES):
         data = json.loads(text)
-    except json.JSONDecodeError as failure:
-        at = f"line {failure.lineno}, column {failure.colno}"
-        raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None
-    except RecursionError:
-        raise MapError(f"{where}: JSON nested deeper than anything meant") from None
-    except ValueError:  # an integer of more than 4300 digits
-        raise MapError(f"{where}: no JSON: a number has too many digits") from None
     if not isinstance(data, dict) or "layouts" not in data:
         raise MapError(f"{where}: expected a layout in the Layout Interchange Format, 'layouts'")
     return data
@@ -125,17 +94,17 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
 def _layouts(data: dict[str, Any], where: str) -> list[tuple[str, str, dict[str, Any]]]:
     """Return each layout, after what messages about it begin with, and its floor."""
     found = []
-    for number, entry in enumerate(list_of(data.get("layouts"), where, "layouts")):
+    for number, entry in enumerate(rmf.list_of(data.get("layouts"), where, "layouts")):
         at = f"{where}, layout {number}"
-        layout = mapping_of(entry, at, "the layout")
+        layout = rmf.mapping_of(entry, at, "the layout")
         floor = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
         found.append((at, floor, layout))
     return found
 
 
 def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str, Any]]:
-    for number, entry in enumerate(list_of(layout.get(key), where, key)):
-        yield mapping_of(entry, f"{where}, {key} {number}", f"an entry of {key}")
+    for number, entry in enumerate(rmf.list_of(layout.get(key), where, key)):
+        yield rmf.mapping_of(entry, f"{where}, {key} {number}", f"an entry of {key}")
 
 
 def _text(entry: dict[str, Any], key: str, where: str) -> str:
@@ -169,7 +138,7 @@ def _id_in(text: Any, before: str, after: str = "") -> dict[str, int]:
     """Return the whole number that an id holds as `export_lif` writes it, as the fact `id`."""
     if not isinstance(text, str) or not (text.startswith(before) and text.endswith(after)):
         return {}
-    return id_fact(text[len(before) : len(text) - len(after)])
+    return rmf.id_fact(text[len(before) : len(text) - len(after)])
 
 
 def _speed(edge: dict[str, Any]) -> dict[str, Any]:

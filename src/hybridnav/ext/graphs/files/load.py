@@ -8,22 +8,9 @@ from typing import TYPE_CHECKING
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import parse_document
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.ext.fleet.files.graphs import (
-    JSON,
-    XML,
-    floor_in,
-    floors_of_text,
-    read_graph_text,
-    read_open_rmf,
-)
+from hybridnav.ext.fleet.files import graphs as floors
 from hybridnav.ext.graphs import WaypointGraph
 from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
-from hybridnav.ext.graphs.files.graphml_yaml import (
-    is_text_graph,
-    read_graphml,
-    read_text_graph,
-    read_yaml_graph,
-)
 from hybridnav.ext.graphs.files.json_graphs import read_json_graph
 from hybridnav.ext.graphs.files.rmf_read import is_rmf
 
@@ -88,7 +75,7 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     try:
         found = _read(path, suffix, where)
         if not isinstance(found, WaypointGraph):
-            return floor_in(found, floor, where)
+            return floors.floor_in(found, floor, where)
     except InvalidValueError as error:
         raise MapError(str(error)) from None
     if floor is not None:
@@ -101,22 +88,26 @@ def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGr
     try:
         return _read_known(path, suffix, where)
     except MapError as error:
-        if isinstance(error, MapNotFoundError) or suffix in (*JSON, *XML, *_TEXTS):
+        if isinstance(error, MapNotFoundError) or suffix in (*floors.JSON, *floors.XML, *_TEXTS):
             raise
         ending = printable(repr(suffix))[:20]
         raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
 
 
 def _read_known(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
-    name, text = Path(path).stem, read_graph_text(path)
-    building = floors_of_text(text, suffix, where, name)
+    name, text = Path(path).stem, floors.read_graph_text(path)
+    building = floors.floors_of_text(text, suffix, where, name)
     if building is not None:
         return building
-    if suffix in JSON:
+    if suffix in floors.JSON:
         return read_json_graph(text, where, name)
-    if suffix in XML:
-        return read_graphml(text, where, name)
-    if is_text_graph(text):
-        return read_text_graph(text, where, name)
+    if suffix in floors.XML:
+        return graph_yaml.read_graphml(text, where, name)
+    if graph_yaml.is_text_graph(text):
+        return graph_yaml.read_text_graph(text, where, name)
     data = parse_document(text, where, MapError, graph_yaml.LIMITS)
-    return read_open_rmf(data, where, name) if is_rmf(data) else read_yaml_graph(data, where, name)
+    return (
+        floors.read_open_rmf(data, where, name)
+        if is_rmf(data)
+        else graph_yaml.read_yaml_graph(data, where, name)
+    )

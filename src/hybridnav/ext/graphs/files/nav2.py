@@ -70,10 +70,7 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
 def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[str, Any]]:
     """Return the features of a route graph for Nav2, nodes first; see `export_nav2`.
 
-    Raises
-    ------
-    InvalidValueError
-        When Nav2 would refuse the graph, or the frame has no name.
+    Raises `InvalidValueError` when Nav2 would refuse the graph, or the frame has no name.
     """
     name = graph.name if isinstance(graph, WaypointGraph) else graph.grid.name
     if not frame:
@@ -147,17 +144,8 @@ def features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
     Facts of a graph that is from Nav2 stay where they are; those of others go to `metadata`, with
     the id as `name`. Nothing is null and no number infinite: such facts are left out.
 
-    Parameters
-    ----------
-    graph
-        The graph.
-    frame
-        Name of the frame of nodes that state none.
-
-    Raises
-    ------
-    InvalidValueError
-        When a fact is nested deeper than 64 levels, as one that contains itself.
+    `frame`: name of the frame of nodes that state none. Raises `InvalidValueError` when a fact is
+    nested deeper than 64 levels, as one that contains itself.
     """
     used: set[int] = set()
     nodes = _ids(graph.names, used)

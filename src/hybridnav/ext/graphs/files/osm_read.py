@@ -14,21 +14,10 @@ import shapely
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
 from hybridnav.ext.graphs import WaypointGraph
+from hybridnav.ext.graphs.files import osm_xml as osm
 from hybridnav.ext.graphs.files.osm_write import ALONE, ID, ID_BACK
-from hybridnav.ext.graphs.files.osm_xml import (
-    Anchor,
-    OsmData,
-    OsmWay,
-    Tags,
-    anchor_of,
-    levels_of,
-    part_of,
-    points_of,
-    read_osm_xml,
-    title_of,
-)
 from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count, id_fact
-from hybridnav.ext.graphs.gather import Gathered, number_of, shown
+from hybridnav.ext.graphs.gather import Gathered, free_name, number_of, shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,14 +43,14 @@ class OsmFloor:
 
     name: str
     level: float
-    routes: list[OsmWay] = field(default_factory=list)
-    areas: list[OsmWay] = field(default_factory=list)
-    passages: list[OsmWay] = field(default_factory=list)
+    routes: list[osm.OsmWay] = field(default_factory=list)
+    areas: list[osm.OsmWay] = field(default_factory=list)
+    passages: list[osm.OsmWay] = field(default_factory=list)
     alone: set[int] = field(default_factory=set)
     """Nodes of the graph that are part of no way."""
     elevation_m: float | None = None
 
-    def describe(self, tags: Tags) -> None:
+    def describe(self, tags: osm.Tags) -> None:
         """Take the name of the level from an element, and its height from an area of osmAG."""
         self.name = tags.get("level:ref") or self.name
         height = number_of(tags.get("height"))
@@ -69,37 +58,22 @@ class OsmFloor:
             self.elevation_m = height
 
 
-def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) -> BuildingGraph:
+def read_osm(
+    text: str, where: str, name: str, *, anchor: osm.Anchor | None = None
+) -> BuildingGraph:
     """Read a building.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-    anchor
-        Where its frame is to lie on the Earth; None for the node named root of an area graph, or
-        else the least latitude and longitude.
-
-    Returns
-    -------
-    BuildingGraph
-        A floor for each level, from the lowest to the highest. Where a level has ways with
-        `highway`, its nodes and edges are those; else nodes stand for areas, doors and passages,
-        joined as `add_area_graph` does it.
-
-    Raises
-    ------
-    MapError
-        When it is no XML of OpenStreetMap, or has no level with a node.
+    `where`: what messages begin with; `name`: name of a building that has none; `anchor`: where its
+    frame is to lie on the Earth; None for the node named root of an area graph, or else the least
+    latitude and longitude. Returns a floor for each level, from the lowest to the highest. Where a
+    level has ways with `highway`, its nodes and edges are those; else nodes stand for areas, doors
+    and passages, joined as `add_area_graph` does it. Raises `MapError` when it is no XML of
+    OpenStreetMap, or has no level with a node.
     """
-    data = read_osm_xml(text, where)
+    data = osm.read_osm_xml(text, where)
     if not data.places:
         raise MapError(f"{where}: no node has a latitude and a longitude")
-    points = points_of(data, anchor or anchor_of(data))
+    points = osm.points_of(data, anchor or osm.anchor_of(data))
     floors = _sorted_floors(data, where)
     graphs = [
         _floor(floor, data, points, f"{where}, level {shown(floor.name)}") for floor in floors
@@ -115,17 +89,17 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
     found = {floor.level: floor.name for floor, _ in kept}
     links = _Links(data, points, found, where)
     return BuildingGraph(
-        name=title_of(data, name),
+        name=osm.title_of(data, name),
         floors=tuple(graph for _, graph in kept if graph is not None),
         links=tuple(links.found(floors)),
     )
 
 
-def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
+def _sorted_floors(data: osm.OsmData, where: str) -> list[OsmFloor]:
     """Return the levels, each with its ways; ways without a level lie on 0."""
     floors: dict[float, OsmFloor] = {}
     for way in data.ways:
-        part, levels = part_of(way), levels_of(way.tags) or [0.0]
+        part, levels = osm.part_of(way), osm.levels_of(way.tags) or [0.0]
         if part == "" or (part == "routes" and len(levels) > 1):
             continue
         for level in levels:
@@ -134,7 +108,7 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
         if len(levels) == 1:
             floors[levels[0]].describe(way.tags)
     for node, tags in data.tags.items():
-        for level in levels_of(tags)[:1] if ALONE in tags else ():
+        for level in osm.levels_of(tags)[:1] if ALONE in tags else ():
             floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
             floor.alone.add(node)
             floor.describe(tags)
@@ -149,7 +123,7 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
 
 
 def _floor(
-    floor: OsmFloor, data: OsmData, points: dict[int, Point | None], where: str
+    floor: OsmFloor, data: osm.OsmData, points: dict[int, Point | None], where: str
 ) -> FloorGraph | None:
     """Return the graph of a level, None without a node."""
     gathered = Gathered(where)
@@ -172,14 +146,14 @@ def _floor(
     )
 
 
-def _leaves(element: OsmWay, own: set[int], elsewhere: frozenset[int]) -> bool:
+def _leaves(element: osm.OsmWay, own: set[int], elsewhere: frozenset[int]) -> bool:
     """Return whether a passage leads to an area of another level."""
     sides = [number_of(element.tags.get(key)) for key in ("osmAG:from", "osmAG:to")]
     return any(side in elsewhere and side not in own for side in sides)
 
 
 def _add_routes(
-    gathered: Gathered, floor: OsmFloor, data: OsmData, points: dict[int, Point | None]
+    gathered: Gathered, floor: OsmFloor, data: osm.OsmData, points: dict[int, Point | None]
 ) -> None:
     """Add the nodes of ways, and an edge between each two that follow each other."""
     used = floor.alone.union(*(way.refs for way in floor.routes))
@@ -203,13 +177,13 @@ def _add_routes(
                 gathered.add_edge(pair[::-1], back)
 
 
-def _is_room(element: OsmWay) -> bool:
+def _is_room(element: osm.OsmWay) -> bool:
     kind = element.tags.get("osmAG:areaType", "room")
     return kind in {"room", "corridor"} and "hybridnav:link" not in element.tags
 
 
 def _areas(
-    rooms: list[OsmWay], names: dict[int, str], points: dict[int, Point | None]
+    rooms: list[osm.OsmWay], names: dict[int, str], points: dict[int, Point | None]
 ) -> list[FloorArea]:
     found = []
     for way in rooms:
@@ -222,13 +196,13 @@ def _areas(
 
 
 def _doors(
-    floor: OsmFloor, names: dict[int, str], data: OsmData, points: dict[int, Point | None]
+    floor: OsmFloor, names: dict[int, str], data: osm.OsmData, points: dict[int, Point | None]
 ) -> list[DoorLine]:
     """Return the passages between two areas of a level."""
     by_name = {name: way for way, name in names.items()}
     found = []
     for way in floor.passages:
-        sides = [_area_id(way.tags.get(key), names, by_name) for key in ("osmAG:from", "osmAG:to")]
+        sides = [_area(way.tags.get(key), names, by_name) for key in ("osmAG:from", "osmAG:to")]
         rooms = [names[side] for side in sides if side is not None]
         ends = [point for node in way.refs[:2] if (point := points.get(node)) is not None]
         if len(rooms) < 2 or len(ends) < 2 or sides[0] == sides[1]:  # noqa: PLR2004 - both
@@ -239,19 +213,15 @@ def _doors(
     return found
 
 
-def _area_id(value: str | None, names: dict[int, str], by_name: dict[str, int]) -> int | None:
-    """Return the area that a passage names, by its id or by its name."""
-    number = number_of(value)
-    if number in names:
-        return int(number)
-    return by_name.get(value or "")
-
-
 class _Links:
     """What joins levels: ways and nodes with several levels, and areas of one name."""
 
     def __init__(
-        self, data: OsmData, points: dict[int, Point | None], names: dict[float, str], where: str
+        self,
+        data: osm.OsmData,
+        points: dict[int, Point | None],
+        names: dict[float, str],
+        where: str,
     ) -> None:
         self._data, self._points, self._names, self._where = data, points, names, where
         self._taken: set[str] = set()
@@ -278,17 +248,17 @@ class _Links:
             kind = self._kind(way.tags)
             stops = []
             for node in way.refs:
-                levels, point = levels_of(self._data.tags.get(node, {})), self._points.get(node)
+                levels, point = osm.levels_of(self._data.tags.get(node, {})), self._points.get(node)
                 if len(levels) == 1 and point is not None:
                     stops.append((levels[0], point))
-            if kind is not None and len(levels_of(way.tags)) > 1:
+            if kind is not None and len(osm.levels_of(way.tags)) > 1:
                 links.append(self._link(way.tags.get("name", ""), kind, stops, way.tags))
         return links
 
     def _from_nodes(self) -> list[Link | None]:
         links = []
         for node, tags in self._data.tags.items():
-            kind, levels, point = self._kind(tags), levels_of(tags), self._points.get(node)
+            kind, levels, point = self._kind(tags), osm.levels_of(tags), self._points.get(node)
             if kind is not None and len(levels) > 1 and point is not None:
                 stops = [(level, point) for level in levels]
                 links.append(self._link(tags.get("name", ""), kind, stops, tags))
@@ -311,9 +281,7 @@ class _Links:
         if len(ends) < 2:  # noqa: PLR2004
             return None
         numbered = (f"{name or kind} {number}" for number in itertools.count(1))
-        tried = itertools.chain([name] if name else [], numbered)
-        own = next(each for each in tried if each not in self._taken)
-        self._taken.add(own)
+        own = free_name(itertools.chain([name] if name else [], numbered), self._taken)
         check_link_count(len(self._taken), self._where)
         given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
         known = {key: value for key, value in given.items() if value > 0}
@@ -330,9 +298,9 @@ _MOST_PAIRS = 100_000
 
 def add_area_graph(
     gathered: Gathered,
-    areas: Sequence[OsmWay],
-    passages: Sequence[OsmWay],
-    tags: Mapping[int, Tags],
+    areas: Sequence[osm.OsmWay],
+    passages: Sequence[osm.OsmWay],
+    tags: Mapping[int, osm.Tags],
     points: Mapping[int, Point | None],
 ) -> None:
     """Add a node in each area, one in each passage or door, and edges between them.
@@ -342,18 +310,9 @@ def add_area_graph(
     it names, by their ids or names; a door, a node with `door`, to those whose outline it is part
     of.
 
-    Parameters
-    ----------
-    gathered
-        What they are added to; ids are `way ID` and `node ID`.
-    areas
-        Closed ways.
-    passages
-        Ways of two nodes.
-    tags
-        Tags of nodes.
-    points
-        Points of nodes in metres; None for none.
+    `gathered`: what they are added to; ids are `way ID` and `node ID`; `areas`: closed ways;
+    `passages`: ways of two nodes; `tags`: tags of nodes; `points`: points of nodes in metres; None
+    for none.
     """
     shapes = {way.id: shape for way in areas if (shape := _shape(way, points)) is not None}
     inside: dict[int, list[tuple[str, Point]]] = {area: [] for area in shapes}
@@ -394,7 +353,7 @@ def _join(
                 gathered.add_link((one, other), {}, directed=False)
 
 
-def _shape(ring: OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry | None:
+def _shape(ring: osm.OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry | None:
     """Return the area inside a way; None for what contains others, and without points."""
     corners = [point for node in ring.refs[:-1] if (point := points.get(node)) is not None]
     is_whole = len(corners) == len(ring.refs) - 1
@@ -413,9 +372,9 @@ def _middle(found: list[Point | None]) -> Point | None:
 
 def _add_doors(
     gathered: Gathered,
-    areas: Sequence[OsmWay],
+    areas: Sequence[osm.OsmWay],
     inside: dict[int, list[tuple[str, Point]]],
-    tags: Mapping[int, Tags],
+    tags: Mapping[int, osm.Tags],
     points: Mapping[int, Point | None],
 ) -> None:
     """Add the nodes with `door` on outlines of areas."""
@@ -431,10 +390,9 @@ def _add_doors(
             inside[way.id].append((f"node {node}", point))
 
 
-def _area(
-    value: str | None, shapes: Mapping[int, BaseGeometry], by_name: Mapping[str, int]
-) -> int | None:
+def _area(value: str | None, known: Mapping[int, object], by_name: Mapping[str, int]) -> int | None:
+    """Return the area that a passage names, by its id or by its name."""
     number = number_of(value)
-    if number in shapes:
+    if number in known:
         return int(number)
     return by_name.get(value) if value else None

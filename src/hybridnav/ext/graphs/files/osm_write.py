@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, PathLike
     from hybridnav.ext.fleet import FloorGraph, Link
 
-
 _DECIMALS = 11
 """Decimals of degrees: a micrometre. OpenStreetMap itself keeps 7, a centimetre."""
 _HIGHWAYS = {"lift": "elevator", "stairs": "steps", "ramp": "footway"}
@@ -332,13 +331,7 @@ _CABIN_M = 2.0
 
 
 class Shapes:
-    """The outlines of a floor's areas, counter-clockwise, with the ends of doors as corners.
-
-    Parameters
-    ----------
-    floor
-        The floor.
-    """
+    """The outlines of a floor's areas, counter-clockwise, with the ends of doors as corners."""
 
     def __init__(self, floor: FloorGraph) -> None:
         self._names = [area.name for area in floor.areas]

@@ -113,7 +113,6 @@ _ENCODINGS = ("UTF-8", "UTF8", "US-ASCII", "ASCII")
 """Those that an XML declaration may state: files are read as UTF-8."""
 _HEAD = 4096
 """Characters in which the first element begins."""
-_DEEPEST = 20
 _MOST_LEVELS = 100
 """Levels that one `level` may list."""
 _RANGE = re.compile(r"(-?\d{1,4})-(-?\d{1,4})")
@@ -167,75 +166,78 @@ def is_osm(text: str) -> bool:
 def read_osm_xml(text: str, where: str) -> OsmData:
     """Read nodes and ways; relations and all else are passed over.
 
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    MapError
-        When it is no XML of OpenStreetMap, or declares a document type: entities could make it
-        endless.
+    `where`: what messages begin with. Raises `MapError` when it is no XML of OpenStreetMap, or
+    declares a document type: entities could make it endless.
     """
     if len(text) > MOST_BYTES:
         raise MapError(f"{where}: XML of OpenStreetMap of more than {MOST_BYTES} bytes is not read")
     reader = _Reader(where)
-    parser = expat.ParserCreate("utf-8")
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
-    parser.StartDoctypeDeclHandler = reader.refuse
-    parse_xml(parser, text, where)
+    reader.parse(text, expat.ParserCreate("utf-8"))
     return reader.data
 
 
-def parse_xml(parser: expat.XMLParserType, text: str, where: str) -> None:
-    """Parse a text that was read as UTF-8, by a parser for UTF-8.
+class XmlReader:
+    """What expat calls of a text that was read as UTF-8."""
 
-    Raises
-    ------
-    MapError
-        When it is no XML, or declares another encoding.
-    """
-
-    def check(_version: str, encoding: str | None, _standalone: int) -> None:
-        if encoding is not None and encoding.upper() not in _ENCODINGS:
-            raise MapError(
-                f"{where}: declares the encoding {shown(encoding)!r:.40}, expected UTF-8: save the "
-                "file in that encoding"
-            )
-
-    parser.XmlDeclHandler = check
-    try:
-        parser.Parse(text.encode(), True)
-    except expat.ExpatError as failure:
-        at = f"line {failure.lineno}, column {failure.offset + 1}"
-        raise MapError(f"{where}, {at}: no XML: {expat.ErrorString(failure.code)}") from None
-    except UnicodeEncodeError:
-        raise MapError(f"{where}: not UTF-8 text") from None
-
-
-class _Reader:
-    """What expat calls."""
+    deepest, kind = 20, "XML"
 
     def __init__(self, where: str) -> None:
-        self.data = OsmData()
-        self._where = where
-        self._depth = 0
-        self._node: int | None = None
-        self._way: OsmWay | None = None
-
-    def refuse(self, *_: Any) -> None:
-        """Refuse a document type."""
-        raise MapError(f"{self._where}: XML with a document type (DOCTYPE) is not read")
+        self._where, self._depth = where, 0
 
     def start(self, tag: str, given: dict[str, str]) -> None:
         """Begin an element."""
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise MapError(f"{self._where}: XML nested more than {_DEEPEST} deep")
+
+    def end(self, tag: str) -> None:
+        """End an element."""
+
+    def parse(self, text: str, parser: expat.XMLParserType) -> None:
+        """Parse a text.
+
+        Raises `MapError` when it is no XML, declares another encoding or a document type, by which
+        it could be endless, or is nested too deep.
+        """
+        where = self._where
+
+        def begin(tag: str, given: dict[str, str]) -> None:
+            self._depth += 1
+            if self._depth > self.deepest:
+                raise MapError(f"{where}: XML nested more than {self.deepest} deep")
+            self.start(tag, given)
+
+        def end(tag: str) -> None:
+            self._depth -= 1
+            self.end(tag)
+
+        def refuse(*_: Any) -> None:
+            raise MapError(f"{where}: {self.kind} with a document type (DOCTYPE) is not read")
+
+        def check(_version: str, encoding: str | None, _standalone: int) -> None:
+            if encoding is not None and encoding.upper() not in _ENCODINGS:
+                raise MapError(
+                    f"{where}: declares the encoding {shown(encoding)!r:.40}, expected UTF-8: save "
+                    "the file in that encoding"
+                )
+
+        parser.StartElementHandler, parser.EndElementHandler = begin, end
+        parser.StartDoctypeDeclHandler, parser.XmlDeclHandler = refuse, check
+        try:
+            parser.Parse(text.encode(), True)
+        except expat.ExpatError as failure:
+            at = f"line {failure.lineno}, column {failure.offset + 1}"
+            raise MapError(f"{where}, {at}: no XML: {expat.ErrorString(failure.code)}") from None
+        except UnicodeEncodeError:
+            raise MapError(f"{where}: not UTF-8 text") from None
+
+
+class _Reader(XmlReader):
+    def __init__(self, where: str) -> None:
+        super().__init__(where)
+        self.data = OsmData()
+        self._node: int | None = None
+        self._way: OsmWay | None = None
+
+    def start(self, tag: str, given: dict[str, str]) -> None:
+        """Begin an element."""
         if self._depth == 1 and tag != "osm":
             raise MapError(f"{self._where}: expected XML of OpenStreetMap (osm), got {tag!r:.40}")
         if given.get("action") == "delete" or given.get("visible") == "false":
@@ -266,7 +268,6 @@ class _Reader:
 
     def end(self, tag: str) -> None:
         """End an element."""
-        self._depth -= 1
         if tag == "node":
             self._node = None
         elif tag == "way":

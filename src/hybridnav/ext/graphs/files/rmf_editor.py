@@ -17,18 +17,7 @@ import shapely
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import DoorLine
-from hybridnav.ext.graphs.files.rmf_read import (
-    MOST_FLOORS,
-    Name,
-    Point,
-    RmfFloor,
-    RmfLift,
-    building_of,
-    lane_ends,
-    list_of,
-    mapping_of,
-    options_of,
-)
+from hybridnav.ext.graphs.files import rmf_read as rmf
 from hybridnav.ext.graphs.gather import number_of, pair_of, shown
 
 if TYPE_CHECKING:
@@ -64,47 +53,33 @@ def read_drawn(
 ) -> BuildingGraph:
     """Read a building map.
 
-    Parameters
-    ----------
-    data
-        The file as parsed.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-    graph_index
-        Which of the graphs to read, from 0 to 9; None for the first that has lanes.
-
-    Returns
-    -------
-    BuildingGraph
-        A floor for each level on which the graph has lanes, from the lowest to the highest, in
-        metres, with y up, in the frame of the reference level.
-
-    Raises
-    ------
-    MapError
-        When it is not of this form, its coordinates are degrees, the scale of a level is not known,
-        or no lane belongs to the graph.
+    `data`: the file as parsed; `where`: what messages begin with; `name`: name of a building that
+    has none; `graph_index`: which of the graphs to read, from 0 to 9; None for the first that has
+    lanes. Returns a floor for each level on which the graph has lanes, from the lowest to the
+    highest, in metres, with y up, in the frame of the reference level. Raises `MapError` when it is
+    not of this form, its coordinates are degrees, the scale of a level is not known, or no lane
+    belongs to the graph.
     """
-    levels = mapping_of(data["levels"], where, "levels", MOST_FLOORS)
+    levels = rmf.mapping_of(data["levels"], where, "levels", rmf.MOST_FLOORS)
     contents = {
-        level: mapping_of(content, f"{where}, level {shown(level)}", "the level")
+        level: rmf.mapping_of(content, f"{where}, level {shown(level)}", "the level")
         for level, content in levels.items()
     }
     index = _graph_index(contents, where, graph_index)
     drawings = drawings_of(data, contents, where)
     reference = str(data.get("reference_level_name", next(iter(contents), "")))
     lifts = {
-        lift: _Cabin(mapping_of(facts, at, "the lift"), reference, drawings, at)
-        for lift, facts in mapping_of(data.get("lifts"), where, "lifts", MOST_FLOORS).items()
+        lift: _Cabin(rmf.mapping_of(facts, at, "the lift"), reference, drawings, at)
+        for lift, facts in rmf.mapping_of(
+            data.get("lifts"), where, "lifts", rmf.MOST_FLOORS
+        ).items()
         for at in [f"{where}, lift {shown(lift)}"]
     }
-    found = {lift: RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
-    taken: set[Name] = set()
+    found = {lift: rmf.RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
+    taken: set[rmf.Name] = set()
     floors = []
     for level, content in contents.items():
-        floor = RmfFloor(level, where, _elevation(content))
+        floor = rmf.RmfFloor(level, where, _elevation(content))
         if any(_index_of(lane) == index for lane in _lanes(content)):
             _fill(floor, content, drawing_of(drawings, level, where), index, taken)
         for lift, cabin in lifts.items():
@@ -115,7 +90,7 @@ def read_drawn(
         floors.append(floor)
     floors.sort(key=lambda floor: floor.elevation_m or 0.0)
     title = str(data.get("building_name") or data.get("name") or name)
-    return building_of(floors, found, title, where)
+    return rmf.building_of(floors, found, title, where)
 
 
 def _graph_index(contents: dict[str, Any], where: str, wanted: int | None) -> int:
@@ -152,16 +127,16 @@ def _elevation(content: dict[str, Any]) -> float:
 
 
 def _fill(
-    floor: RmfFloor, content: dict[str, Any], drawing: Drawing, index: int, taken: set[Name]
+    floor: rmf.RmfFloor, content: dict[str, Any], drawing: Drawing, index: int, taken: set[rmf.Name]
 ) -> None:
     """Add the vertices that lanes of a graph use, in the order of their first use, the lanes and
     the doors."""
     at = f"{floor.where}, level {shown(floor.name)}"
-    vertices = list_of(content.get("vertices"), at, "vertices")
-    lanes = list_of(content.get("lanes"), at, "lanes")
+    vertices = rmf.list_of(content.get("vertices"), at, "vertices")
+    lanes = rmf.list_of(content.get("lanes"), at, "lanes")
     chosen = []
     for number, lane in enumerate(lanes):
-        ends = lane_ends(lane, f"{at}, lane {number}")
+        ends = rmf.lane_ends(lane, f"{at}, lane {number}")
         if _index_of(lane) == index:
             chosen.append((ends, _parameters(lane, 2, f"{at}, lane {number}")))
     numbers: dict[int, int] = {}
@@ -170,7 +145,7 @@ def _fill(
             continue
         numbers[end] = len(numbers)
         _add_vertex(floor, vertices[end], drawing, taken, f"{at}, vertex {end}")
-    for number, entry in enumerate(list_of(content.get("doors"), at, "doors")):
+    for number, entry in enumerate(rmf.list_of(content.get("doors"), at, "doors")):
         floor.doors.append(_door(entry, vertices, drawing, f"{at}, door {number}"))
     ends_of = [[numbers.get(end, -1 - end) for end in ends] for ends, _ in chosen]
     passed = _doors_passed([[_point_at(floor, end) for end in ends] for ends in ends_of], floor)
@@ -179,14 +154,14 @@ def _fill(
         _add_lanes(floor, (tail, head), known | ({"door_name": door} if door else {}), facts)
 
 
-def _point_at(floor: RmfFloor, number: int) -> Point | None:
+def _point_at(floor: rmf.RmfFloor, number: int) -> rmf.Point | None:
     return floor.points[number] if 0 <= number < len(floor.points) else None
 
 
 def _add_vertex(
-    floor: RmfFloor, entry: Any, drawing: Drawing, taken: set[Name], where: str
+    floor: rmf.RmfFloor, entry: Any, drawing: Drawing, taken: set[rmf.Name], where: str
 ) -> None:
-    values = list_of(entry, where, "[x, y, z, name, ...]")
+    values = rmf.list_of(entry, where, "[x, y, z, name, ...]")
     raw = pair_of(values)
     name = values[3] if len(values) > 3 else None  # noqa: PLR2004
     facts = _parameters(values, _OPTIONS, where)
@@ -195,11 +170,11 @@ def _add_vertex(
 
 
 def _parameters(entry: list[Any], at: int, where: str) -> dict[str, Any]:
-    return {key: _value(value) for key, value in options_of(entry, at, where).items()}
+    return {key: _value(value) for key, value in rmf.options_of(entry, at, where).items()}
 
 
 def _add_lanes(
-    floor: RmfFloor, vertices: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
+    floor: rmf.RmfFloor, vertices: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
 ) -> None:
     """Add a lane, and the one back if it leads in both directions."""
     tail, head = vertices
@@ -213,7 +188,7 @@ def _add_lanes(
 
 def _door(entry: Any, vertices: list[Any], drawing: Drawing, where: str) -> DoorLine:
     ends = []
-    for number in lane_ends(entry, where):
+    for number in rmf.lane_ends(entry, where):
         raw = pair_of(vertices[number]) if 0 <= number < len(vertices) else None
         if raw is None:
             raise MapError(f"{where}: vertex {number} is not there, or has no point")
@@ -238,10 +213,10 @@ class _Cabin:
         self.dims_m = width, depth
         self._at, self._yaw = drawing.point(raw), yaw
         self._levels = {
-            str(key) for key in mapping_of(facts.get("level_doors"), where, "level_doors")
+            str(key) for key in rmf.mapping_of(facts.get("level_doors"), where, "level_doors")
         }
 
-    def holds(self, level: str, point: Point | None) -> bool:
+    def holds(self, level: str, point: rmf.Point | None) -> bool:
         """Return whether a point lies inside, on a level where the lift has doors."""
         if point is None or level not in self._levels:
             return False
@@ -251,7 +226,7 @@ class _Cabin:
         return across <= self.dims_m[0] / 2 + _GAP_M and along <= self.dims_m[1] / 2 + _GAP_M
 
 
-def _doors_passed(lanes: list[list[Point | None]], floor: RmfFloor) -> list[str]:
+def _doors_passed(lanes: list[list[rmf.Point | None]], floor: rmf.RmfFloor) -> list[str]:
     """Return the last door of the file that each lane crosses, empty for none."""
     passed = [""] * len(lanes)
     whole = [[end for end in ends if end is not None] for ends in lanes]
@@ -287,12 +262,12 @@ class Drawing:
     shift: complex = 0.0 + 0.0j
     y_up: bool = True
 
-    def point(self, raw: Point) -> Point:
+    def point(self, raw: rmf.Point) -> rmf.Point:
         """Return the point of coordinates of the drawing, `(x, y)` in metres."""
         at = self.turn * self.flat(raw) + self.shift
         return at.real, at.imag
 
-    def flat(self, raw: Point) -> complex:
+    def flat(self, raw: rmf.Point) -> complex:
         """Return coordinates with y up."""
         return complex(raw[0], raw[1] if self.y_up else -raw[1])
 
@@ -308,19 +283,8 @@ def drawings_of(
     scale and an origin of their own. Metres (`cartesian_meters`) are taken as they are: the editor
     does not apply `offset_x` and `offset_y` to them.
 
-    Parameters
-    ----------
-    data
-        The file.
-    contents
-        Its levels.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    MapError
-        When coordinates are degrees, or the reference level is not there.
+    `where`: what messages begin with. Raises `MapError` when coordinates are degrees, or the
+    reference level is not there.
     """
     system = data.get("coordinate_system", _PIXELS)
     if system == _METRES:
@@ -356,10 +320,7 @@ def drawings_of(
 def drawing_of(drawings: dict[str, Drawing], level: str, where: str) -> Drawing:
     """Return how a level is drawn.
 
-    Raises
-    ------
-    MapError
-        When its scale is not known.
+    Raises `MapError` when its scale is not known.
     """
     found = drawings.get(level)
     if found is None:
@@ -372,13 +333,13 @@ def drawing_of(drawings: dict[str, Drawing], level: str, where: str) -> Drawing:
 
 def _scale(content: dict[str, Any], where: str) -> float | None:
     """Return metres per pixel, the mean over measurements; None without any."""
-    vertices = list_of(content.get("vertices"), where, "vertices")
+    vertices = rmf.list_of(content.get("vertices"), where, "vertices")
     scales = []
-    for number, entry in enumerate(list_of(content.get("measurements"), where, "measurements")):
+    for number, entry in enumerate(rmf.list_of(content.get("measurements"), where, "measurements")):
         at = f"{where}, measurement {number}"
         ends = [
             pair_of(vertices[end]) if 0 <= end < len(vertices) else None
-            for end in lane_ends(entry, at)
+            for end in rmf.lane_ends(entry, at)
         ]
         options = entry[2] if len(entry) > 2 and isinstance(entry[2], dict) else {}  # noqa: PLR2004
         given = options.get("distance")
@@ -394,7 +355,7 @@ def _scale(content: dict[str, Any], where: str) -> float | None:
 def _fiducials(content: dict[str, Any], where: str) -> dict[str, complex]:
     """Return fiducials by name, with y up."""
     found = {}
-    for number, entry in enumerate(list_of(content.get("fiducials"), where, "fiducials")):
+    for number, entry in enumerate(rmf.list_of(content.get("fiducials"), where, "fiducials")):
         point = pair_of(entry)
         if point is None or len(entry) < 3:  # noqa: PLR2004
             raise MapError(f"{where}, fiducial {number}: expected [x, y, name], got {entry!r:.60}")

@@ -13,7 +13,6 @@ from hybridnav.ext.graphs.gather import Gathered, pair_of, shown
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-
 MOST_FLOORS, MOST_LINKS = 1000, 1000
 """Most levels of a file, and most links between them."""
 
@@ -44,16 +43,8 @@ class RmfFloor:
         """Add the next vertex, by its name, or by its number if it has none or one that is taken,
         which Open-RMF refuses.
 
-        Parameters
-        ----------
-        name
-            Its name; empty for none.
-        point
-            `(x, y)` in metres; None if there is none.
-        facts
-            All else.
-        taken
-            Names of all floors so far.
+        `name`: its name; empty for none; `point`: `(x, y)` in metres; None if there is none;
+        `facts`: all else; `taken`: names of all floors so far.
         """
         is_new = bool(name) and name not in taken
         if name and not is_new:
@@ -97,21 +88,9 @@ def building_of(
     """Return what was read, without floors that have no vertices, and without lifts that stop at
     fewer than two of the rest.
 
-    Parameters
-    ----------
-    floors
-        Floors, from the lowest to the highest where that is known.
-    lifts
-        Lifts by name.
-    name
-        Name of the building.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    MapError
-        When no floor has a vertex.
+    `floors`: floors, from the lowest to the highest where that is known; `lifts`: lifts by name;
+    `name`: name of the building; `where`: what messages begin with. Raises `MapError` when no floor
+    has a vertex.
     """
     kept = [floor for floor in floors if not floor.is_empty]
     if not kept:
@@ -144,10 +123,7 @@ def id_fact(text: str) -> dict[str, int]:
 def mapping_of(value: Any, where: str, what: str, most: int | None = None) -> dict[str, Any]:
     """Return a mapping with keys as texts; an empty one for none.
 
-    Raises
-    ------
-    MapError
-        When it is no mapping, or has more than `most` members.
+    Raises `MapError` when it is no mapping, or has more than `most` members.
     """
     if value is None:
         return {}
@@ -161,10 +137,7 @@ def mapping_of(value: Any, where: str, what: str, most: int | None = None) -> di
 def list_of(value: Any, where: str, what: str) -> list[Any]:
     """Return a list; an empty one for none.
 
-    Raises
-    ------
-    MapError
-        When it is no list.
+    Raises `MapError` when it is no list.
     """
     if value is None:
         return []
@@ -176,10 +149,7 @@ def list_of(value: Any, where: str, what: str) -> list[Any]:
 def lane_ends(entry: Any, where: str) -> tuple[int, int]:
     """Return the numbers of two vertices with which an entry begins.
 
-    Raises
-    ------
-    MapError
-        When it does not.
+    Raises `MapError` when it does not.
     """
     if isinstance(entry, list) and len(entry) >= 2:  # noqa: PLR2004
         tail, head = entry[:2]
@@ -196,10 +166,7 @@ def options_of(entry: list[Any], at: int, where: str) -> dict[str, Any]:
 def points_of(value: Any, where: str) -> tuple[Point, Point]:
     """Return the two ends of a door.
 
-    Raises
-    ------
-    MapError
-        When these are not two points.
+    Raises `MapError` when these are not two points.
     """
     ends = [pair_of(end) for end in value] if isinstance(value, list) else []
     if len(ends) != 2 or None in ends:  # noqa: PLR2004
@@ -219,26 +186,10 @@ def is_rmf(data: Any) -> bool:
 def read_rmf(data: dict[str, Any], where: str, name: str) -> BuildingGraph:
     """Read a navigation graph, by the rules of `parse_graph` (open-rmf/rmf_ros2).
 
-    Parameters
-    ----------
-    data
-        The file as parsed.
-    where
-        What messages begin with.
-    name
-        Name of a building that has none.
-
-    Returns
-    -------
-    BuildingGraph
-        One floor for each level with vertices, in the order of the file, all in one frame. Vertices
-        have their names as ids, or their numbers. A lift ends at its first vertex of each level;
-        the file states no times.
-
-    Raises
-    ------
-    MapError
-        When it is not of this form.
+    `data`: the file as parsed; `where`: what messages begin with; `name`: name of a building that
+    has none. Returns one floor for each level with vertices, in the order of the file, all in one
+    frame. Vertices have their names as ids, or their numbers. A lift ends at its first vertex of
+    each level; the file states no times. Raises `MapError` when it is not of this form.
     """
     floors: list[RmfFloor] = []
     taken: set[Name] = set()

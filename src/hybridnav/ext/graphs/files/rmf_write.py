@@ -12,7 +12,7 @@ from hybridnav._base.files import NewFile
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import BuildingGraph, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
-from hybridnav.ext.graphs.gather import number_of
+from hybridnav.ext.graphs.gather import free_name, number_of
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:
@@ -259,9 +259,7 @@ def _unique_names(floors: Iterable[FloorGraph]) -> dict[tuple[str, int], str]:
             found[key] = name
             continue
         numbered = (f"{key[0]} {name} ({number})" for number in itertools.count(2))
-        tried = itertools.chain([f"{key[0]} {name}"], numbered)
-        found[key] = next(each for each in tried if each not in taken)
-        taken.add(found[key])
+        found[key] = free_name(itertools.chain([f"{key[0]} {name}"], numbered), taken)
     return found
 
 

@@ -107,17 +107,8 @@ def doubtful_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     neighbour, in the order of rows, among the cells that the robot can reach. A cell beside several
     sets counts for one of them.
 
-    Parameters
-    ----------
-    grid
-        What the robot knows.
-    cell
-        (row, col) of the robot, a free cell.
-
-    Returns
-    -------
-    LongArray
-        int64 (n, 2), (row, col).
+    `grid`: what the robot knows; `cell`: (row, col) of the robot, a free cell. Returns int64 (n,
+    2), (row, col).
     """
     doubtful = (grid.measured == CellClass.OCCUPIED) & (grid.probability < DOUBTFUL_BELOW)
     if not doubtful.any():
@@ -144,17 +135,8 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     Each gap through which they are entered has one spot: the cell in reach nearest to it. A set
     behind two doors has two, for from one door nothing is seen of the other.
 
-    Parameters
-    ----------
-    grid
-        What the robot knows.
-    cell
-        (row, col) of the robot, a free cell.
-
-    Returns
-    -------
-    LongArray
-        int64 (n, 2), (row, col).
+    `grid`: what the robot knows; `cell`: (row, col) of the robot, a free cell. Returns int64 (n,
+    2), (row, col).
     """
     if grid.robot_radius_m < grid.resolution_m:
         return np.zeros((0, 2), np.int64)
@@ -222,8 +204,6 @@ def widest_point(plan: OccupancyGrid) -> tuple[float, float]:
 
 def cells_in_reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray:
     """Return the cells of a walled plan that a robot can reach, bool (rows, cols)."""
-    from scipy import ndimage  # noqa: PLC0415 - half a second
-
     try:
         point = np.asarray(start, dtype=np.float64)
     except (TypeError, ValueError):
@@ -237,6 +217,4 @@ def cells_in_reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray
             f"the start ({point[0]:g}, {point[1]:g}) is not in a free cell of the plan: choose a "
             f"point on the map that is more than {plan.robot_radius_m:g} m from walls"
         )
-    labels, _ = ndimage.label(plan.classes == CellClass.FREE)
-    reached: BoolArray = labels == labels[row, col]
-    return reached
+    return _connected(plan, (row, col))

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.live.mapping.mapper import Area
     from hybridnav.maps import OccupancyGrid
 
-
 _SCAN_EVERY_M = 0.5
 _NEAR_M = 0.5
 """Metres that a robot may stand beside the free cells it takes itself to be in."""

@@ -13,16 +13,7 @@ from hybridnav._base.files import printable
 from hybridnav._base.messages import number_of, stamp_ns_of, value_of
 from hybridnav._base.trig import atan2, cos
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.live.files.bag_files import (
-    GRID,
-    LASER,
-    ODOMETRY,
-    PATH,
-    TRANSFORMS,
-    Bag,
-    check_rosbags,
-)
-from hybridnav.ext.live.files.bag_poses import NoPoseError, Transforms, frame_of
+from hybridnav.ext.live.files import bag_files
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
 from hybridnav.maps import OccupancyGrid
@@ -33,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import FloatArray, PathLike
-
 
 _MOST_TILT_RAD = 0.1
 """Angle between the vertical and the axis of a laser up to which its scans count as level."""
@@ -85,10 +75,10 @@ def load_bag_map(
     checked_thresholds(free_threshold, occupied_threshold)
     if robot_radius_m is not None:
         checked_radius(robot_radius_m)
-    bag = Bag(path)
-    if topic is None and "/map" in bag.topics_of({GRID}):
+    bag = bag_files.Bag(path)
+    if topic is None and "/map" in bag.topics_of({bag_files.GRID}):
         topic = "/map"
-    topic = bag.topic_of(GRID, topic)
+    topic = bag.topic_of(bag_files.GRID, topic)
     message = bag.last(topic)
     try:
         return OccupancyGrid.from_message(
@@ -144,8 +134,8 @@ class BagLog(ScanLog):
     def __init__(
         self, path: PathLike, *, topic: str | None = None, frame: str | None = None
     ) -> None:
-        self._bag = Bag(path)
-        self._topic = self._bag.topic_of(LASER, topic)
+        self._bag = bag_files.Bag(path)
+        self._topic = self._bag.topic_of(bag_files.LASER, topic)
         self._count = self._bag.topics[self._topic][1]
         self._frame = frame
         super().__init__(path, self._bag.size_bytes)
@@ -167,17 +157,19 @@ class BagLog(ScanLog):
                 break
             message = found[1]
             try:
-                fixed = fixed or _fixed_frame(transforms, frame_of(message, "header.frame_id"))
+                fixed = fixed or _fixed_frame(
+                    transforms, bag_files.frame_of(message, "header.frame_id")
+                )
                 yield _scan_of(message, transforms, fixed)
-            except (NoPoseError, InvalidValueError) as fault:
-                named = isinstance(fault, NoPoseError)
+            except (bag_files.NoPoseError, InvalidValueError) as fault:
+                named = isinstance(fault, bag_files.NoPoseError)
                 yield str(fault) if named else "pose, angle, time or range out of range"
 
-    def _transforms(self) -> Transforms:
+    def _transforms(self) -> bag_files.Transforms:
         """Return the transforms of the bag; what is damaged in it ends them."""
-        of_odometry = self._bag.topics_of({ODOMETRY})
-        of_frames = self._bag.topics_of(TRANSFORMS)
-        found, odometry = Transforms(), Transforms()
+        of_odometry = self._bag.topics_of({bag_files.ODOMETRY})
+        of_frames = self._bag.topics_of(bag_files.TRANSFORMS)
+        found, odometry = bag_files.Transforms(), bag_files.Transforms()
         try:
             for topic, message in self._bag.messages([*of_odometry, *of_frames]):
                 if topic in of_odometry:
@@ -190,23 +182,23 @@ class BagLog(ScanLog):
         return found
 
 
-def _fixed_frame(transforms: Transforms, frame: str) -> str:
+def _fixed_frame(transforms: bag_files.Transforms, frame: str) -> str:
     """Return the frame in which a robot moves, of those above the frame of its laser."""
     above = transforms.ancestors(frame)
     named = next((name for name in _FIXED if name in above), None)
     if named is None and not transforms.has_motion(above):
-        raise NoPoseError(f"no transforms of a robot that moves above {frame:.40}")
+        raise bag_files.NoPoseError(f"no transforms of a robot that moves above {frame:.40}")
     return named or above[-1]
 
 
-def _scan_of(message: Any, transforms: Transforms, fixed: str) -> LaserScan:
+def _scan_of(message: Any, transforms: bag_files.Transforms, fixed: str) -> LaserScan:
     what = "scan"
     stamp_ns = stamp_ns_of(message, what)
-    frame = frame_of(message, "header.frame_id")
+    frame = bag_files.frame_of(message, "header.frame_id")
     rotation, place = transforms.pose(frame, fixed, stamp_ns)
     upright = cos(_MOST_TILT_RAD)
     if abs(rotation[2, 2]) < upright:
-        raise NoPoseError("laser tilted")
+        raise bag_files.NoPoseError("laser tilted")
     side = math.copysign(1.0, rotation[2, 2])  # a laser upside down counts clockwise
     far_m = float(value_of(message, "range_max", what))
     return LaserScan(
@@ -292,7 +284,7 @@ def save_bag(  # noqa: PLR0913 - the last five have defaults
     messages = list(_messages(plans, grid, frame, stamp_ns))
     if not messages:
         raise InvalidValueError(f"{where}: nothing to write, expected a plan with a path, or a map")
-    check_rosbags(where)
+    bag_files.check_rosbags(where)
     try:
         if target.exists():
             raise MapError(f"{where}: the name is taken, expected a new one: bags are not replaced")
@@ -307,12 +299,12 @@ def _messages(
     """Yield topic, type, time in nanoseconds, and content of each message."""
     if grid is not None:
         content = checked_type("grid", grid, OccupancyGrid).to_message(frame, stamp_ns=stamp_ns)
-        yield "/map", GRID, stamp_ns, content
+        yield "/map", bag_files.GRID, stamp_ns, content
     for plan in plans:
         for result in plan.results if isinstance(plan, Tour) else (plan,):
             path = checked_type("plans", result, PlanResult).path
             if path is not None:
-                yield "/plan", PATH, stamp_ns, path.to_message(frame, stamp_ns=stamp_ns)
+                yield "/plan", bag_files.PATH, stamp_ns, path.to_message(frame, stamp_ns=stamp_ns)
                 stamp_ns += _SECOND_NS
 
 
@@ -344,26 +336,19 @@ def _kept(topic: str, *, is_1: bool) -> dict[str, Any]:
         return {}
     if is_1:
         return {"latching": 1}
-    from rosbags.interfaces import (  # noqa: PLC0415 - an extra
-        Qos,
-        QosDurability,
-        QosHistory,
-        QosLiveliness,
-        QosReliability,
-        QosTime,
-    )
+    from rosbags import interfaces as ros  # noqa: PLC0415 - an extra
 
-    unset = QosTime(0, 0)
+    unset = ros.QosTime(0, 0)
     return {
         "offered_qos_profiles": [
-            Qos(
-                QosHistory.KEEP_LAST,
+            ros.Qos(
+                ros.QosHistory.KEEP_LAST,
                 1,
-                QosReliability.RELIABLE,
-                QosDurability.TRANSIENT_LOCAL,
+                ros.QosReliability.RELIABLE,
+                ros.QosDurability.TRANSIENT_LOCAL,
                 unset,
                 unset,
-                QosLiveliness.SYSTEM_DEFAULT,
+                ros.QosLiveliness.SYSTEM_DEFAULT,
                 unset,
                 avoid_ros_namespace_conventions=False,
             )

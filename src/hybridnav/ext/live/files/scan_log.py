@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, PathLike
 
-
 _LONGEST_PAUSE_S = 600.0
 
 
@@ -33,13 +32,6 @@ class ScanLog(ABC):
 
     Scans that do not follow from those before (see `ScanSequence`) are left out and counted, as are
     those that the format calls damaged.
-
-    Parameters
-    ----------
-    path
-        The log.
-    size_bytes
-        Its size.
     """
 
     expected: str
@@ -111,10 +103,7 @@ class ScanLog(ABC):
     def leave_out(self, fault: str) -> None:
         """Count the scan that was yielded last among those that were left out.
 
-        Parameters
-        ----------
-        fault
-            Why, in a few words.
+        `fault`: why, in a few words.
         """
         self.n_scans -= 1
         self.skipped[fault] += 1
@@ -318,14 +307,7 @@ class _LineReader:
 def _readings(words: list[bytes], begin: int, *, after: int) -> tuple[FloatArray, int]:
     """Return the numbers of a list whose length stands before them, and the index behind them.
 
-    Parameters
-    ----------
-    words
-        The line.
-    begin
-        Index of the length.
-    after
-        Number of words that follow the list, at least.
+    `begin`: index of the length; `after`: number of words that follow the list, at least.
     """
     count = int(words[begin])
     if not 0 <= count <= _MOST_BEAMS:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.ext.live.kernels.near import beside_of, step_to
+from hybridnav.ext.live.kernels.near import beside_of, step_to, with_rows
 
 
 @guarded
@@ -194,10 +194,7 @@ def take_out(place, low, table, removed, first):
         if is_other and area[i] > 0:
             rename(place, low, box[i], number, first + n_parts + n_cut)
             n_cut += 1
-        if n_parts + n_cut > parts.size:
-            longer = np.empty(2 * (n_parts + n_cut), np.int64)
-            longer[:n_parts] = parts[:n_parts]
-            parts = longer
+        parts = with_rows(parts, n_parts, n_cut)
         parts[n_parts : n_parts + n_cut] = number
         n_parts += n_cut
         if alters or n_cut > 0 or place[survivor[i, 0] - low[0], survivor[i, 1] - low[1]] != number:

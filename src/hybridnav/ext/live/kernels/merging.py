@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav.ext.live.kernels.cells import join_each_other, join_nearest
-from hybridnav.ext.live.kernels.near import beside_of, is_within, look_again, step_to
+from hybridnav.ext.live.kernels.near import beside_of, is_within, look_again, step_to, with_rows
 
 _NO, _YES, _BEYOND = 0, 1, 2
 _FEW_CELLS = 256
@@ -41,7 +41,7 @@ def merge_pairs(window, low, table, pairs, limit, first):
     """
     numbers, area, box = table[0], table[1], table[3]
     place = window[0]
-    stack, size = with_space(pairs, len(pairs), 64), len(pairs)
+    stack, size = with_rows(pairs, len(pairs), 64), len(pairs)
     beyond, n_beyond = np.empty((8, 2), np.int64), 0
     while size > 0:
         size -= 1
@@ -60,14 +60,14 @@ def merge_pairs(window, low, table, pairs, limit, first):
                 one = other = numbers[stays]
                 i = stays
             if one != other:
-                beyond = with_space(beyond, n_beyond, 1)
+                beyond = with_rows(beyond, n_beyond, 1)
                 beyond[n_beyond, 0], beyond[n_beyond, 1] = one, other
                 n_beyond += 1
                 continue
         if is_inside(box[i], low, place.shape, 1):
             stack, size = add_pairs(window, low, (one, box[i]), stack, size)
         else:
-            beyond = with_space(beyond, n_beyond, 1)
+            beyond = with_rows(beyond, n_beyond, 1)
             beyond[n_beyond, 0] = beyond[n_beyond, 1] = one
             n_beyond += 1
     return beyond[:n_beyond].copy()
@@ -118,7 +118,7 @@ def absorbing(window, low, table, lost, limit):
             around[k] = box[j, k] - low[k & 1]
         # A pair of one place stands for all its pairs: `merge_pairs` looks at the few cells.
         if (around[2] - around[0]) * (around[3] - around[1]) < _FEW_CELLS:
-            pairs = with_space(pairs, count, 1)
+            pairs = with_rows(pairs, count, 1)
             pairs[count, 0] = pairs[count, 1] = number
             count += 1
             continue
@@ -141,7 +141,7 @@ def absorbing(window, low, table, lost, limit):
                 continue
             is_near = far_row * far_row + far_col * far_col < limit
             if is_near or is_within(place, number, around, (row, col), limit):
-                pairs = with_space(pairs, count, 1)
+                pairs = with_rows(pairs, count, 1)
                 pairs[count, 0], pairs[count, 1] = number, numbers[i]
                 count += 1
     return pairs[:count].copy()
@@ -168,16 +168,6 @@ def are_beside(window, low, table, rows):
                 if beside >= 0 and flat[beside] == other:
                     return of_class[row, col] == classes[beside]
     return False
-
-
-@njit(cache=True, nogil=True)
-def with_space(pairs, count, more):
-    """Return pairs with space for more than some, the same array where it has it."""
-    if count + more <= len(pairs):
-        return pairs
-    longer = np.empty((2 * (count + more), 2), np.int64)
-    longer[:count] = pairs[:count]
-    return longer
 
 
 @njit(cache=True, nogil=True)
@@ -280,7 +270,7 @@ def add_pairs(window, low, of_place, pairs, count):
                         known = True
                         break
                 if not known:
-                    pairs = with_space(pairs, count, 1)
+                    pairs = with_rows(pairs, count, 1)
                     pairs[count, 0], pairs[count, 1] = number, other
                     count += 1
     return pairs, count
@@ -307,7 +297,7 @@ def pairs_at(window, cells):
             for k in range(count - 1, max(count - 9, -1), -1):
                 known |= pairs[k, 0] == one and pairs[k, 1] == other
             if not known:
-                pairs = with_space(pairs, count, 1)
+                pairs = with_rows(pairs, count, 1)
                 pairs[count, 0], pairs[count, 1] = one, other
                 count += 1
     return pairs[:count].copy()

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav.ext.live.kernels.near import with_rows
 
 
 @njit(cache=True, nogil=True)
@@ -95,16 +96,6 @@ def differs_in(some, others, nothing):
     for j in range(some.size):  # one instruction for many cells
         differs |= some[j] ^ others[j]
     return differs != nothing
-
-
-@njit(cache=True, nogil=True)
-def with_rows(rows, count, more):
-    """Return rows with space for more than some, the same array where it has it."""
-    if count + more <= len(rows):
-        return rows
-    longer = np.empty((2 * (count + more), rows.shape[1]), np.int64)
-    longer[:count] = rows[:count]
-    return longer
 
 
 @guarded

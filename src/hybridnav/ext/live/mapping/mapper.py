@@ -10,10 +10,10 @@ import numpy as np
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import add_hits, add_passes, beam_ends, probabilities
-from hybridnav.ext.live.mapping.scans import LaserScan, checked_array, checked_count, checked_number
+from hybridnav.ext.live.mapping.scans import LaserScan, checked_array, checked_number
 from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, log_odds_of
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
-from hybridnav.maps.checks import checked_type
+from hybridnav.maps.checks import checked_type, checked_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -103,7 +103,7 @@ class Mapper:
                 "follows changes, 0 counts all scans alike"
             )
         self._limit = -log_odds_of(max(least, _NO_LIMIT))
-        self._max_cells = checked_count("max_cells", max_cells, MAX_CELLS)
+        self._max_cells = checked_whole("max_cells", max_cells, 1, MAX_CELLS)
         far_m = self._laser.max_range_m + self._laser.depth_m
         if far_m / self.resolution_m > MOST_RANGE_CELLS:
             raise InvalidValueError(

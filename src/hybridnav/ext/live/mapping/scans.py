@@ -81,28 +81,10 @@ MOST_READINGS = 1_000_000
 """Readings of a scan."""
 
 
-def checked_count(name: str, value: Any, most: int) -> int:
-    """Return a whole number from 1 to the most.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is none.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 < value <= most:
-        raise InvalidValueError(
-            f"{name} is {value!r:.80}, expected a whole number from 1 to {most}: give another one"
-        )
-    return int(value)
-
-
 def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return a finite pose, no farther than a grid may be.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is none.
+    Raises `InvalidValueError` when it is none.
     """
     try:
         x_m, y_m, heading_rad = (float(value) for value in pose)
@@ -119,10 +101,7 @@ def checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]
 def checked_number(name: str, value: Any) -> float:
     """Return a number, NaN and infinite ones too.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is none.
+    Raises `InvalidValueError` when it is none.
     """
     try:
         return float(value)
@@ -135,10 +114,7 @@ def checked_number(name: str, value: Any) -> float:
 def checked_array(name: str, values: Any) -> FloatArray:
     """Return a copy of numbers as a read-only array.
 
-    Raises
-    ------
-    InvalidValueError
-        When they are no numbers.
+    Raises `InvalidValueError` when they are no numbers.
     """
     try:
         array = np.array(values, dtype=np.float64)
@@ -153,10 +129,7 @@ def checked_array(name: str, values: Any) -> FloatArray:
 def checked_ranges(ranges_m: FloatArray) -> FloatArray:
     """Return a read-only copy of the readings of a scan.
 
-    Raises
-    ------
-    InvalidValueError
-        When they are not numbers in one row.
+    Raises `InvalidValueError` when they are not numbers in one row.
     """
     ranges = checked_array("ranges", ranges_m)
     if ranges.ndim != 1 or not 0 < ranges.size <= MOST_READINGS:

@@ -11,13 +11,12 @@ import numpy as np
 from hybridnav._base.trig import log, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import ray_lengths
-from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_count, checked_number
+from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_number
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.maps.checks import checked_type
+from hybridnav.maps.checks import checked_type, checked_whole
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
-
 
 MOST_RANGE_CELLS = 2**14
 """Cells of a beam that are walked exactly in int64."""
@@ -124,23 +123,6 @@ class LaserModel:
 # Simulated sensors: the scans that a robot would take in a map.
 
 
-def _check(max_range_m: float, noise_m: float) -> None:
-    far = checked_number("max_range_m", max_range_m)
-    if not (math.isfinite(far) and far > 0):
-        raise InvalidValueError(
-            f"max_range_m is {max_range_m}, expected a finite number > 0: give metres"
-        )
-    _check_lengths(noise_m=noise_m)
-
-
-def _check_world(grid: OccupancyGrid, max_range_m: float) -> None:
-    if max_range_m / checked_type("grid", grid, OccupancyGrid).resolution_m > MOST_RANGE_CELLS:
-        raise InvalidValueError(
-            f"a range of {max_range_m:g} m is more than {MOST_RANGE_CELLS} cells of "
-            f"{grid.resolution_m:g} m: simulate a shorter one"
-        )
-
-
 def _ranges(
     grid: OccupancyGrid, place: tuple[float, float], angles_rad: FloatArray, max_range_m: float
 ) -> FloatArray:
@@ -220,8 +202,13 @@ class SimulatedLaser:
     noise_m: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self.max_range_m, self.noise_m)
-        checked_count("n_beams", self.n_beams, MOST_READINGS)
+        far_m = self.max_range_m
+        if not 0 < checked_number("max_range_m", far_m) < math.inf:
+            raise InvalidValueError(
+                f"max_range_m is {far_m}, expected a finite number > 0: give metres"
+            )
+        _check_lengths(noise_m=self.noise_m)
+        checked_whole("n_beams", self.n_beams, 1, MOST_READINGS)
         for name in ("start_rad", "step_rad"):
             checked_number(name, getattr(self, name))
 
@@ -256,16 +243,15 @@ class SimulatedLaser:
         InvalidValueError
             When the pose is not finite, or the range more than 2^14 cells.
         """
-        _check_world(grid, self.max_range_m)
-        shape = LaserScan(
-            np.full(self.n_beams, math.inf), pose, self.start_rad, self.step_rad
-        )  # checks the pose
+        far_m = self.max_range_m
+        if far_m / checked_type("grid", grid, OccupancyGrid).resolution_m > MOST_RANGE_CELLS:
+            raise InvalidValueError(
+                f"a range of {far_m:g} m is more than {MOST_RANGE_CELLS} cells of "
+                f"{grid.resolution_m:g} m: simulate a shorter one"
+            )
+        angles = self.start_rad, self.step_rad
+        shape = LaserScan(np.full(self.n_beams, math.inf), pose, *angles)  # checks the pose
         x_m, y_m, heading_rad = shape.pose
-        angles = (
-            heading_rad + self.start_rad + np.arange(self.n_beams, dtype=np.float64) * self.step_rad
-        )
-        ranges = _ranges(grid, (x_m, y_m), angles, self.max_range_m)
-        ranges = _noisy(ranges, self.noise_m, seed)
-        return LaserScan(
-            ranges, shape.pose, self.start_rad, self.step_rad, self.max_range_m, time_s
-        )
+        turns = heading_rad + self.start_rad + np.arange(float(self.n_beams)) * self.step_rad
+        ranges = _noisy(_ranges(grid, (x_m, y_m), turns, far_m), self.noise_m, seed)
+        return LaserScan(ranges, shape.pose, *angles, far_m, time_s)
