@@ -24,8 +24,8 @@ _UNKNOWN = -(1 << 40)
 _MOST_ARCS = 1 << 16
 """Most arcs from a corner, whose positions have 16 bits, see `contract`."""
 _CORE = 512
-"""Least number of arcs of a corner that joins most of those left, which are not rated again. The
-last 500 corners of 64 million cells took a quarter of the work; of 256 million, it was given up."""
+"""Least number of arcs of a corner that joins most of those left, which is not rated again. The
+last 500 corners of a map of 64 million cells took a quarter of the work."""
 HEAD_SHIFT = 12
 """Bits of the two classes of an arc, see `pack`."""
 
