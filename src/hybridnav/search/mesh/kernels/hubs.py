@@ -100,8 +100,24 @@ def _see_each_other(polygon_at, cells, endpoints):
 
 @njit(cache=True, nogil=True)
 def view_of_square(mesh, labels, x, y, sights, views_at, costs):
-    """Write the corners that see something of a point's quarter of a square: whether they see all,
-    their views, and distances in units; return how many, or -1 without room."""
+    """List the corners that see something of a point's quarter of a square.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    labels
+        The arrays of `HubLabels`.
+    x, y
+        The point.
+    sights, views_at, costs
+        Written by corner: 1 if it sees all of the quarter, else 0; its view; its distance in units.
+
+    Returns
+    -------
+    int
+        How many there are, or -1 without room.
+    """
     cx, cy = mesh[0], mesh[1]
     entries, layout, begin, views = labels[:4]
     row, col = line_before(y, layout[0] / 2), line_before(x, layout[0] / 2)
