@@ -37,6 +37,8 @@ EXERCISE = (
 """Tests that run every command, all presets, the page, and what pages and notebooks promise."""
 PACKAGES = ("hypothesis", "pytest", "nbclient", "nbformat", "ipykernel", "rosbags", "playwright")
 """What they need beside the extras of the page and the agent."""
+TIMED = ("shortest", "paper", "robot", "ompl")
+"""Presets whose first plan is timed."""
 ROUNDS = 3
 """Times that what was compiled is packed: the first wheel has nothing, the second should do."""
 TAG = f"manylinux_2_28_{platform.machine()}"
@@ -179,7 +181,7 @@ def seconds(environment: Environment, *words: str) -> float:
 def judge(environment: Environment, tree: Path, folder: Path) -> bool:
     """Print whether an installed wheel answers as compiled code does, in a home of no use."""
     packages = environment.packages
-    for words in (("--help",), PLAN, (*PLAN, "--preset", "paper")):
+    for words in (("--help",), *((*PLAN, "--preset", preset) for preset in TIMED)):
         print(f"  {seconds(environment, *words):.2f} s of a processor: {' '.join(words)}")
     for part in ("tests", "benchmarks", "maps"):
         shutil.copytree(tree / part, folder / part)
