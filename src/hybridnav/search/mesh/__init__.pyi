@@ -4,14 +4,14 @@ from .build import (
     CornerHierarchy as CornerHierarchy,
     build_mesh as build_mesh,
 )
-from .cut import (
-    DetourSearch as DetourSearch,
-    MeshPaths as MeshPaths,
-    renew_mesh as renew_mesh,
-    shortest_paths as shortest_paths,
-)
+from .cut import DetourSearch as DetourSearch, renew_mesh as renew_mesh
 from .hubs import HubLabels as HubLabels
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
-from .trace import SearchTrace as SearchTrace, trace_search as trace_search
+from .trace import (
+    MeshPaths as MeshPaths,
+    SearchTrace as SearchTrace,
+    shortest_paths as shortest_paths,
+    trace_search as trace_search,
+)
 
 __all__: list[str]

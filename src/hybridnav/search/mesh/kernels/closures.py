@@ -311,7 +311,7 @@ def corners_round(mesh, closure, closed, left, place):
             listed[n_listed, 0], listed[n_listed, 1] = polygon, k
             n_listed += 1
     # Sorted, so that a view finds those of its polygon by halving.
-    order = np.argsort(listed[:n_listed, 0])
+    order = np.argsort(listed[:n_listed, 0], kind="mergesort")
     polygons, members = np.empty(n_listed, np.int32), np.empty(n_listed, np.int32)
     for k in range(n_listed):
         polygons[k], members[k] = listed[order[k], 0], listed[order[k], 1]

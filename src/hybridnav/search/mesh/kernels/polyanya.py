@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.exact import turn_of
+from hybridnav._base.kernels.exact import GRAIN, turn_of
 from hybridnav.search.mesh.kernels.intervals import (
     ENDS,
     PARENT,
@@ -418,3 +418,22 @@ def landmarks_of(points, graph, source, table):
             nearest[corner] = min(nearest[corner], distances[corner])
             if far < nearest[corner] < np.inf:
                 far, landmark = nearest[corner], corner
+
+
+@njit(cache=True, nogil=True)
+def path_through(mesh, endpoints, nodes):
+    """Return the path through some corners, see `path_to`."""
+    sx, sy, tx, ty = endpoints
+    n = len(nodes) + 1
+    path = np.empty((n + 1, 2))
+    path[n, 0], path[n, 1] = ty, tx
+    for k in range(len(nodes) - 1, -1, -1):
+        n = put_corner(path, n, mesh[0][nodes[k]], mesh[1][nodes[k]])
+    n = put_corner(path, n, sx, sy)
+    return path[n:].copy()
+
+
+@njit(cache=True, nogil=True)
+def into_cell(low, at):
+    """Round a coordinate to the grain of exact tests, and move it into a cell."""
+    return min(max(np.rint(at * GRAIN) / GRAIN, float(low)), low + 1.0)

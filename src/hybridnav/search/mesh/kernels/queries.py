@@ -8,7 +8,6 @@ from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
-from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
@@ -36,8 +35,9 @@ from hybridnav.search.mesh.kernels.polyanya import (
     UPPER,
     WORK_FULL,
     advance,
+    into_cell,
+    path_through,
     path_to,
-    put_corner,
     seed,
 )
 from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, distance
@@ -157,16 +157,10 @@ def answer(mesh, graph, place, ends, work, effort):
         Status and path of `query`, the length and the lower bound, and what was expanded.
     """
     (row, col, to_row, to_col), (x, y, to_x, to_y) = ends
-    points = _into(col, x), _into(row, y), _into(to_col, to_x), _into(to_row, to_y)
+    points = into_cell(col, x), into_cell(row, y), into_cell(to_col, to_x), into_cell(to_row, to_y)
     arrays, (counts, bounds) = work
     status, path = _answer(mesh, graph, place, ends[0], points, arrays, effort)
     return status, path, bounds[UPPER], bounds[LOWER], counts[EXPANDED]
-
-
-@njit(cache=True, nogil=True)
-def _into(low, at):
-    """Round a coordinate to the grain of exact tests, and move it into a cell."""
-    return min(max(np.rint(at * GRAIN) / GRAIN, float(low)), low + 1.0)
 
 
 # Kernel of many queries on a mesh, one after the other.
@@ -308,7 +302,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         if status == WORK_FULL:
             return WORK_FULL, path
         if status == DONE:
-            return DONE, path if bounds[UPPER] == np.inf else _path_through(
+            return DONE, path if bounds[UPPER] == np.inf else path_through(
                 mesh, endpoints, touched[:0]
             )
         counts[SIZE] = _seed(mesh, endpoints, room[2][n:n_all], 0, work)
@@ -321,7 +315,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     if counts[LAST] >= 0:
         first, _, middles, _, (patches, _) = hierarchy
         nodes = corners_between((first, middles, *patches), counts[LAST], records)
-        path = _path_through(mesh, endpoints, nodes)
+        path = path_through(mesh, endpoints, nodes)
         is_proved = bounds[LOWER] >= bounds[UPPER]
         bounds[UPPER] = 0.0
         for k in range(len(path) - 1):
@@ -454,16 +448,3 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         bounds[UPPER] = best / UNITS
     bounds[LOWER] = max(bounds[LOWER], least / UNITS if least < best else bounds[UPPER])
     return status
-
-
-@njit(cache=True, nogil=True)
-def _path_through(mesh, endpoints, nodes):
-    """Return the path through some corners, see `path_to`."""
-    sx, sy, tx, ty = endpoints
-    n = len(nodes) + 1
-    path = np.empty((n + 1, 2))
-    path[n, 0], path[n, 1] = ty, tx
-    for k in range(len(nodes) - 1, -1, -1):
-        n = put_corner(path, n, mesh[0][nodes[k]], mesh[1][nodes[k]])
-    n = put_corner(path, n, sx, sy)
-    return path[n:].copy()
