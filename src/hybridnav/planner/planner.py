@@ -54,8 +54,8 @@ class HybridPlanner(Questions):
 
     Threads may share a planner; queries with OMPL run one after the other. The structures of a
     preset are built at the first query, or by `prepare`; with OMPL they are built at once, so that
-    no query's time includes them. Of millions of cells, a thread builds what only speed needs, and
-    of paths of equal length, one may come before and another after that.
+    no query's time includes them. On large maps a thread builds what only speed needs: the one of
+    several paths of equal length may be another after that.
 
     Parameters
     ----------
@@ -340,8 +340,7 @@ class HybridPlanner(Questions):
         Parameters
         ----------
         labels
-            Most MB of hub labels for `shortest`, and for the distances of `octile`; a change of the
-            map drops them. None for none.
+            Most MB of hub labels (`shortest`, distances of `octile`), until the map changes.
         progress
             Called after each step with the number of steps done and of all steps.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -137,24 +137,19 @@ class Planning:
         from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415
 
         check_names(self.topology, waypoints)
+        closed, costs = self.closed_for_all(self.closed(blocked)), self.costs.layer
         return points_of_waypoints(
-            self.topology,
-            self.preset.planner,
-            waypoints,
-            at=at,
-            closed=self.closed_for_all(self.closed(blocked)),
-            costs=self.costs.layer,
+            self.topology, self.preset.planner, waypoints, at=at, closed=closed, costs=costs
         )
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure; the last ones are kept."""
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
-        # Areas and doors are found again as they are; a mapping has to be read.
         known = self.closures
-        given = None if isinstance(blocked, Mapping) else known.get(blocked)
-        if given is not None:
-            return given
+        with suppress(TypeError):  # a mapping has to be read; areas and doors are found as given
+            if (given := known.get(blocked)) is not None:
+                return given
         # Loads shapely, which most queries do not need.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
@@ -166,7 +161,7 @@ class Planning:
             solid = closure.solid_on(self.grid) if is_solid else None
             found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
         known[closure.key] = found  # the last one now
-        if not isinstance(blocked, Mapping):
+        with suppress(TypeError):
             known[blocked] = found
         for old in list(known)[:-_KEPT]:
             known.pop(old, None)

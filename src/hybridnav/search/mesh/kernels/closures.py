@@ -279,6 +279,7 @@ def corners_round(mesh, closure, closed, left, place):
                 found[n_new, 0], found[n_new, 1] = col + (k & 1), row + (k >> 1)
                 found[n_new, 2] = 3 - k
                 n_new += 1
+    # The corners of the map, and behind them the new ones.
     xs, ys = np.empty(n + n_new), np.empty(n + n_new)
     every = np.empty(n + n_new, np.uint8)
     xs[:n], ys[:n], every[:n] = cx, cy, kinds

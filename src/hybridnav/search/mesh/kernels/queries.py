@@ -293,6 +293,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         bounds[UPPER], bounds[LOWER] = upper, 0.0
         patches, around = hierarchy[4]
         rooms = starts, goals, room
+        # The corners that both ends see, round closed cells if there are any.
         if len(patches[0]):
             status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
         else:
@@ -308,10 +309,12 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         counts[SIZE] = _seed(mesh, endpoints, room[2][n:n_all], 0, work)
         counts[MARKED] = _seed(mesh, endpoints, room[2][:n], 1, work)
         counts[BEGUN] = 1
+    # Both sides climb until no queued corner can be part of a shorter path.
     if limit >= 0:
         status = _advance(mesh, hierarchy, endpoints, work, factor, limit)
         if status != DONE:
             return status, path
+    # The path, and its length from its points, which the sums of a search only come near.
     if counts[LAST] >= 0:
         first, _, middles, _, (patches, _) = hierarchy
         nodes = corners_between((first, middles, *patches), counts[LAST], records)
@@ -324,7 +327,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
             bounds[LOWER] = bounds[UPPER]
     for corner in touched[: counts[TOUCHED]]:
         records[corner, 0] = records[corner, 1] = FAR
-    counts[BEGUN] = 0
+    counts[BEGUN] = 0  # the next query begins anew
     return DONE, path
 
 
@@ -394,20 +397,17 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         x, y, cost = cx[node], cy[node], records[node, direction]
         from_x, from_y, to_x, to_y = (tx, ty, sx, sy) if direction else (sx, sy, tx, ty)
 
-        # An entry that its corner's record no longer matches is out of date: a better one waits or
-        # was expanded.
+        # An entry unlike its corner's record is out of date: a better one waits or was expanded.
         if least == cost + cost_of(x, y, to_x, to_y):
             counts[EXPANDED] += 1
 
-            # A corner reached from both ends completes a path; with `FAR` from the other end it is
-            # none.
+            # A corner reached from both ends completes a path; `FAR` from one of them is none.
             if cost + records[node, 1 - direction] < best:
                 best = cost + records[node, 1 - direction]
                 counts[LAST] = node
 
             # Leave out arcs that bend away from the blocked cell. An arc of arrival states its
-            # class here; the first segment comes from an end, and an end on the corner rules
-            # nothing out.
+            # class here; an end on the corner rules nothing out.
             by, may_follow = records[node, 2 + direction], np.int64(-1)
             if by != NO_ARC:
                 last = by & 0xFFFFFFFF

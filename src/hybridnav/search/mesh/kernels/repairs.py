@@ -59,6 +59,7 @@ def footing_of(mesh, hierarchy):
     tails = np.empty(len(arcs), np.int32)
     boxes = np.empty((n, 4), np.float32)
     groups = np.empty(((n + _GROUP - 1) // _GROUP, 4), np.float32)
+    # A box of nothing, which the first edge replaces.
     for box in (boxes, groups):
         box[:, :2], box[:, 2:] = np.inf, -np.inf
     for node in range(n):
@@ -76,7 +77,7 @@ def footing_of(mesh, hierarchy):
     # The arcs into each corner, by the corners that they come from.
     below = begin[1:].copy()
     for node in range(n):
-        begin[node + 1] += begin[node]
+        begin[node + 1] += begin[node]  # where those of the next corner begin
     into, at = np.empty(len(arcs), np.int32), begin.copy()
     for arc in range(len(arcs)):
         head = arcs[arc, 1] >> HEAD_SHIFT
@@ -243,7 +244,14 @@ def _spoil_all(mesh, hierarchy, footing, around, patches):
 def _mend(mesh, hierarchy, footing, around, edges, patches, node, row_of):
     """Find the least costs of the stale arcs of a corner, by corners below.
 
-    `row_of` is int32 (n,), 0, and so it is left.
+    Parameters
+    ----------
+    mesh, hierarchy, footing, around, edges
+        See `repair`.
+    patches, node
+        Room for the results of `repair`, and the corner.
+    row_of
+        int32 (n,), 0, and so it is left.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, middles, follow = hierarchy
