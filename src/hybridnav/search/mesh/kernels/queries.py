@@ -287,7 +287,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     starts, goals, room, records, touched, heaps, counts, bounds = work
     upper, factor, limit = effort
     path = np.empty((0, 2))
-    if not counts[BEGUN]:
+    if not counts[BEGUN]:  # a query that was paused goes on
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
@@ -323,7 +323,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         bounds[UPPER] = 0.0
         for k in range(len(path) - 1):
             bounds[UPPER] += distance(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
-        if is_proved:
+        if is_proved:  # no other path is shorter
             bounds[LOWER] = bounds[UPPER]
     for corner in touched[: counts[TOUCHED]]:
         records[corner, 0] = records[corner, 1] = FAR
