@@ -148,7 +148,8 @@ class Planning:
             return blocked
         known = self.closures
         with suppress(TypeError):  # a mapping has to be read; areas and doors are found as given
-            if (given := known.get(blocked)) is not None:
+            if (given := known.pop(blocked, None)) is not None:
+                known[blocked] = given  # the last one now
                 return given
         # Loads shapely, which most queries do not need.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
@@ -160,7 +161,7 @@ class Planning:
             is_solid = self.ompl is not None and self.ompl.body is not None
             solid = closure.solid_on(self.grid) if is_solid else None
             found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
-        known[closure.key] = found  # the last one now
+        known[closure.key] = found
         with suppress(TypeError):
             known[blocked] = found
         for old in list(known)[:-_KEPT]:

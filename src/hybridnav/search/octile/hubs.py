@@ -21,19 +21,7 @@ if TYPE_CHECKING:
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class JumpHubs:
-    """Labels of corner cells, and the corner cells that each square of the map is joined to.
-
-    Examples
-    --------
-    >>> from hybridnav.search.octile import JumpSearch, build_jump_graph
-    >>> free = np.ones((4, 6), dtype=bool)
-    >>> free[0:3, 2:4] = False
-    >>> search = JumpSearch(build_jump_graph(free))
-    >>> search.label(free, 1.0), len(search.labels.entries)
-    (True, 3)
-    >>> round(search.length((0, 0), (0, 5)), 3)
-    9.0
-    """
+    """Labels of corner cells, and the corner cells that each square of the map is joined to."""
 
     entries: LongArray
     """int64 (m,), the rank of the hub, and below it the cost from the corner cell."""
