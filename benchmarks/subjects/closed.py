@@ -34,13 +34,13 @@ from benchmarks.common import (
     print_head,
     print_row,
     read,
+    timed,
 )
 from hybridnav.planner.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable
 
     import hybridnav as hn
 
@@ -68,30 +68,22 @@ def on_path(path: hn.Path, rng: np.random.Generator) -> shapely.Polygon:
     return area
 
 
-def of_processor(call: Callable[[], hn.PlanResult], runs: int = 1) -> tuple[hn.PlanResult, float]:
-    """Return an answer, and the least seconds of the processor, which other programs change
-    little."""
-    least = np.inf
-    for _ in range(runs):
-        began = time.thread_time()
-        found = call()
-        least = min(least, time.thread_time() - began)
-    return found, least
-
-
 def ask(planner: hn.HybridPlanner, endpoints: Any, closed: Any, times: Times) -> None:
     """Measure one pair with something closed."""
-    opened, open_s = of_processor(lambda: planner.plan(*endpoints), 3)
+    opened, open_s = timed(lambda: planner.plan(*endpoints), 3, time.thread_time)
     planner.closed(closed)
     forget(planner)
-    result, first_s = of_processor(lambda: planner.plan(*endpoints, blocked=closed))
+
+    def again(runs: int = 1) -> tuple[hn.PlanResult, float]:
+        return timed(lambda: planner.plan(*endpoints, blocked=closed), runs, time.thread_time)
+
+    result, first_s = again()
     if "blocked" in result.status or not opened.solved:
         return
     for _ in range(2):  # the least of three, each the first
         forget(planner)
-        _, again_s = of_processor(lambda: planner.plan(*endpoints, blocked=closed))
-        first_s = min(first_s, again_s)
-    _, later_s = of_processor(lambda: planner.plan(*endpoints, blocked=closed), 3)
+        first_s = min(first_s, again()[1])
+    _, later_s = again(3)
     assert opened.path is not None  # noqa: S101
     if result.path is None or not np.array_equal(result.path.points, opened.path.points):
         times["first"].append((first_s / open_s, result.solved))
