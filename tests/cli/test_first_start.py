@@ -167,3 +167,15 @@ def test_a_plan_on_the_small_map_compiles_what_one_in_a_building_needs(
         env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
     )
     assert "compiled" not in done.stderr
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile", "paper", "robot", "ompl"])
+def test_compiled_kernels_of_a_plan_load_no_linear_algebra(preset: str) -> None:
+    told = _COMMAND.replace(
+        "main()",
+        "import atexit\natexit.register(lambda: print('scipy.linalg' in sys.modules))\nmain()",
+    )
+    command = [sys.executable, "-c", told, *PLAN, "--preset", preset]
+    for _ in range(2):  # the first may compile, which loads it
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert done.stdout.endswith("False\n")

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import total
 from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 FINE = 2.0**12
@@ -200,7 +201,7 @@ def polish(free, factors, line):
             else:
                 reach[i] *= 0.5
                 is_still[i] = reach[i] < _LAST_REACH
-        if is_still[1 : n - 1].all():
+        if total(is_still[1 : n - 1]) == n - 2:
             break
     # Points that have met are one.
     size = 1

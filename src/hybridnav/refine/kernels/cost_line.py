@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import total
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.maps.costs.integral import legal_cost
 from hybridnav.refine.kernels.chain import FINE, costs_of, polish, slopes_of, solve
@@ -81,7 +82,7 @@ def line_of_cells(cells, endpoints, corner_cutting):
 @njit(cache=True, nogil=True)
 def cost_of(factors, line):
     """Return the cost of a line, in cells."""
-    return costs_of(factors, line).sum()
+    return total(costs_of(factors, line))
 
 
 @njit(cache=True, nogil=True)
@@ -256,7 +257,7 @@ def _settled(free, factors, chain, stride, steps):
                 farthest[i] *= 0.5
             last[i] = step[i]
         chain[:] = moved
-        if np.abs(step).max() < _STILL:
+        if total(np.abs(step) < _STILL) == step.size:
             break
     cost = slopes_of(factors, chain, stride, next_aside, next_slope, next_bend, next_link)
     return best if cost > least else chain

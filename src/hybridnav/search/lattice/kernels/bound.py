@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow, pop, push, total
 
 UNITS = 2.0**20
 """Units of a cell in costs, which are rounded down."""
@@ -368,7 +368,7 @@ def raise_potential(corners, factors, potential, ends, iterations, enough):
                 break
             n_steep = 0
             for cell in range(n):
-                if steepness[cell] > _SLACK or np.any(force[cell] != 0.0):
+                if steepness[cell] > _SLACK or total(force[cell].ravel() != 0.0) > 0:
                     steep[n_steep] = cell
                     n_steep += 1
         cells = steep[:n_steep]

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow, pop, push, total
 from hybridnav.maps.costs.integral import legal_cost
 
 NO_PART = 255
@@ -378,7 +378,8 @@ def choose_landmarks(edges_of, to, cells, cols, order, n):
     part = _largest_part(edges_of, to, order)
     n = min(n, part.size)
     row, col = cells[part] // cols + 0.0, cells[part] % cols + 0.0
-    from_row, from_col = row.mean(), col.mean()
+    nodes = max(part.size, 1)
+    from_row, from_col = total(row) / nodes, total(col) / nodes
     nearest = np.full(part.size, np.inf)
     chosen = np.empty(n, np.int64)
     for k in range(n):
