@@ -36,7 +36,7 @@ EXERCISE = (
 )
 """Tests that run every command, all presets, the page, and what pages and notebooks promise."""
 PACKAGES = ("hypothesis", "pytest", "nbclient", "nbformat", "ipykernel", "rosbags", "playwright")
-"""What they need beside the extras of the page and the agent."""
+"""What they need beside extras."""
 TIMED = ("shortest", "paper", "robot", "ompl")
 """Presets whose first plan is timed."""
 ROUNDS = 3
@@ -226,7 +226,7 @@ def make(python: str, folder: Path, kernels: Kernels, out: Path) -> bool:
     tree, listed = folder / "tree", folder / "kernels.pickle"
     run("git", "clone", "--quiet", ROOT, tree)
     environment = Environment(python, folder / "environment")
-    environment.install("hatchling", "wheel", *PACKAGES, f"{tree}[agent,view]")
+    environment.install("hatchling", "wheel", *PACKAGES, f"{tree}[agent,cluster,study,view]")
     for _ in range(ROUNDS):
         listed.write_bytes(pickle.dumps(kernels))
         made = build(environment, tree, listed)
