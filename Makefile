@@ -71,7 +71,7 @@ setup: $(READY)
 # The kernels of the route are compiled by its first plan, those of all presets by `setup`.
 $(INSTALLED): requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'a clone needs Python 3.11 or newer')"
-	@echo "setting up $(VENV): about a minute the first time"
+	@echo "setting up $(VENV): half a minute the first time"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(INSTALL) --constraint requirements.lock hatchling editables
 	$(INSTALL) --constraint requirements.lock --no-build-isolation --editable .
