@@ -421,7 +421,7 @@ class Older:
             kept = sum(one.status == "carried" for one in each.values())
             counts.append(f"{kept} of {len(each)} {what}")
         x, y = to.transform.translation_m
-        turn = math.degrees(to.transform.rotation_rad)
+        turn = round(math.degrees(to.transform.rotation_rad), 2) + 0.0  # no "-0.00"
         moved = f"turned by {turn:.2f} degrees, moved by ({x:.2f}, {y:.2f}) m"
         whose = printable(self.grid.name)
         lines = [f"names      of {whose}: {' and '.join(counts)} carried; {moved}"]
