@@ -37,18 +37,11 @@ class Spread(NamedTuple):
 class Motion:
     """Motion of a robot between the points of a path, one row a step.
 
-    Parameters
-    ----------
-    points
-        float64 (n, 2), n >= 1, metres.
-    headings_rad
-        float64 (n,), None for a robot that faces its direction of travel.
-    curved
-        Whether the robot drives an arc of a circle from each pose to the next, tangent to both
-        headings; else a straight line, on which it turns evenly.
-    start_rad, goal_rad
-        Heading from which it turns on the spot at the first point, and to which at the last one;
-        None for no turn.
+    `points`: float64 (n, 2), n >= 1, metres; `headings_rad`: float64 (n,), None for a robot that
+    faces its direction of travel; `curved`: whether the robot drives an arc of a circle from each
+    pose to the next, tangent to both headings; else a straight line, on which it turns evenly;
+    `start_rad`, `goal_rad`: heading from which it turns on the spot at the first point, and to
+    which at the last one; None for no turn.
     """
 
     points: FloatArray
@@ -171,10 +164,8 @@ class Motion:
 
         No pose occurs twice in a row; two poses at one point are a turn on the spot.
 
-        Raises
-        ------
-        InvalidValueError
-            When the spacing is not positive, or there would be more than ten million poses.
+        Raises `InvalidValueError` when the spacing is not positive, or there would be more than ten
+        million poses.
         """
         left = np.append((self._chords > 0) | (np.abs(self._turns) > BEND), True)
         if not left.all():  # turns by less than a bend are none

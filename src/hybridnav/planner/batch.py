@@ -92,18 +92,9 @@ def plan_many(
 ) -> PlanBatch:
     """Return the answers to pairs of points, in arrays.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    at_once
-        Planner for many queries at once; None leaves all to `alone`.
-    endpoints
-        Starts and goals, float64 (n, 2) each, or poses (n, 3).
-    closed
-        Closed cells; None for none.
-    alone
-        Plans one of the remaining queries, between two of the `endpoints`.
+    `at_once`: planner for many queries at once; None leaves all to `alone`; `endpoints`: starts and
+    goals, float64 (n, 2) each, or poses (n, 3); `closed`: closed cells; None for none; `alone`:
+    plans one of the remaining queries, between two of the `endpoints`.
     """
     starts, goals = endpoints
     n = len(starts)

@@ -221,16 +221,9 @@ names of the attributes of a `Blocked`."""
 def as_blocked(value: Closable) -> Blocked:
     """Convert any accepted form of closures to a `Blocked`.
 
-    Parameters
-    ----------
-    value
-        A `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
-        attributes.
-
-    Raises
-    ------
-    InvalidValueError
-        When the value is of another kind, has other names, or invalid content.
+    `value`: a `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
+    attributes. Raises `InvalidValueError` when the value is of another kind, has other names, or
+    invalid content.
     """
     if isinstance(value, Blocked):
         return value

@@ -39,12 +39,8 @@ def proof_of(
 ) -> dict[str, Any]:
     """Return the proof of a result; see `PlanResult.proof`.
 
-    Parameters
-    ----------
-    result
-        The result of a query.
-    grid, costs, closed
-        The map and the costs that it was planned by, and the closed cells of the query.
+    `grid`, `costs`, `closed`: the map and the costs that it was planned by, and the closed cells of
+    the query.
     """
     if grid.corner_cutting:
         raise PlanError(

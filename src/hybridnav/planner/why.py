@@ -343,14 +343,8 @@ def explain(
 ) -> Explanation:
     """Explain a query of a planner; see `HybridPlanner.explain`.
 
-    Parameters
-    ----------
-    now
-        How the planner plans.
-    ends
-        Start and goal, `(x, y)` or `(x, y, yaw)` each, metres, map frame.
-    blocked, radius_m
-        As in `HybridPlanner.explain`.
+    `now`: how the planner plans; `ends`: start and goal, `(x, y)` or `(x, y, yaw)` each, metres,
+    map frame; `blocked`, `radius_m`: see `HybridPlanner.explain`.
     """
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):

@@ -29,14 +29,8 @@ if TYPE_CHECKING:
 def open_cells(grid: OccupancyGrid, *closed: LongArray | None, allow_unexplored: bool) -> BoolArray:
     """Return which cells may be entered, bool (rows, cols), in an array of its own.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    closed
-        int64 (n,), flat cells that may not be entered; None for none.
-    allow_unexplored
-        Whether unexplored cells may be entered.
+    `closed`: int64 (n,), flat cells that may not be entered; None for none; `allow_unexplored`:
+    whether unexplored cells may be entered.
     """
     free = grid.enterable(allow_unexplored=allow_unexplored)
     for cells in closed:

@@ -20,14 +20,8 @@ if TYPE_CHECKING:
 class RoomFields:
     """The fields of the room level.
 
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    closed
-        int64 (m,), flat cells that may not be entered; None for none.
-    units
-        int64 (rows, cols), the factor of each cell in units; None for lengths.
+    `closed`: int64 (m,), flat cells that may not be entered; None for none; `units`: int64 (rows,
+    cols), the factor of each cell in units; None for lengths.
     """
 
     def __init__(

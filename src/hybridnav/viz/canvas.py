@@ -40,17 +40,8 @@ _MOST_IN = 500
 def new_figure(width_in: float, height: float) -> Figure:
     """Return a new figure.
 
-    Parameters
-    ----------
-    width_in
-        Width in inches.
-    height
-        Height in widths.
-
-    Raises
-    ------
-    InvalidValueError
-        When the width is not positive, or above 500 inches.
+    `width_in`: width in inches; `height`: height in widths. Raises `InvalidValueError` when the
+    width is not positive, or above 500 inches.
     """
     if not 0 < width_in <= _MOST_IN:
         raise InvalidValueError(

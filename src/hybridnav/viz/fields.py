@@ -74,13 +74,10 @@ class Field:
     def graph(self, lines: LongArray | None = None) -> Any:
         """Return the moves between the cells of copies of the field, dearer at the rim.
 
-        Parameters
-        ----------
-        lines
-            int64 (2, rows, cols), a set of bits for the side between each cell and its neighbour
-            north, and that between it and its neighbour east. Walks are distinguished by the set of
-            sides that they cross an odd number of times: each set has a copy of the field, and a
-            walk across a side continues in another copy. By default there is one copy.
+        `lines`: int64 (2, rows, cols), a set of bits for the side between each cell and its
+        neighbour north, and that between it and its neighbour east. Walks are distinguished by the
+        set of sides that they cross an odd number of times: each set has a copy of the field, and a
+        walk across a side continues in another copy. By default there is one copy.
         """
         if lines is None:
             lines = np.zeros((2, *self.mask.shape), dtype=np.int64)
@@ -145,19 +142,9 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
     """Return a walk smoothed like a rubber band that is fixed at its endpoints and pushed off the
     rim.
 
-    Parameters
-    ----------
-    walk
-        float64 (n, 2), cells.
-    distance
-        Distance of each cell to the cells that the band avoids.
-    clearance
-        Distance that the band keeps where there is room.
-
-    Returns
-    -------
-    FloatArray
-        float64 (n, 2), a smooth curve; it may slip over obstacles of a cell or two.
+    `walk`: float64 (n, 2), cells; `distance`: distance of each cell to the cells that the band
+    avoids; `clearance`: distance that the band keeps where there is room. Returns float64 (n, 2), a
+    smooth curve; it may slip over obstacles of a cell or two.
     """
     slope = [np.gradient(distance, axis=axis) for axis in (0, 1)]
     potential = np.stack([distance, *slope], axis=-1)
@@ -286,16 +273,9 @@ class Loops:
     def curve(self, loop: int) -> FloatArray:
         """Return a closed curve from the surviving cell round the holes that a loop encloses.
 
-        Parameters
-        ----------
-        loop
-            A self-loop of the place.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1]. A
-            petal that only points at the holes if they are too small or lie among too many others.
+        `loop`: a self-loop of the place. Returns float64 (n, 2), (row, col) in grid units, where
+        cell (0, 0) spans [0, 1] x [0, 1]. A petal that only points at the holes if they are too
+        small or lie among too many others.
         """
         field = self.field
         if self.enclosed[loop].sum() < (_TINY * field.clearance) ** 2:

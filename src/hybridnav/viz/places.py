@@ -139,17 +139,9 @@ def colour_vertices(arcs: IntArray, n_vertices: int) -> LongArray:
     neighbours (Matula and Beck's smallest-last order, in layers for numpy: networkx takes minutes
     on the base of a map with two million cells). Equal input has equal colours.
 
-    Parameters
-    ----------
-    arcs
-        int (n_arcs, 2), the vertices that each arc joins; self-loops and parallel arcs allowed.
-    n_vertices
-        Vertices of the graph.
-
-    Returns
-    -------
-    LongArray
-        (n_vertices,), colours from 0 to 5, all six used about equally often.
+    `arcs`: int (n_arcs, 2), the vertices that each arc joins; self-loops and parallel arcs allowed;
+    `n_vertices`: vertices of the graph. Result: (n_vertices,), colours from 0 to 5, all six used
+    about equally often.
     """
     low, high = arcs.min(axis=1).astype(np.int64), arcs.max(axis=1)
     pairs = np.sort((low * n_vertices + high)[low != high])

@@ -88,10 +88,7 @@ class Graph:
     def curves(self, clearance_m: float) -> dict[int, FloatArray]:
         """Return a curve for each arc and self-loop drawn, `(x, y)` in metres.
 
-        Parameters
-        ----------
-        clearance_m
-            Distance that curves keep from obstacles, where there is room.
+        `clearance_m`: distance that curves keep from obstacles, where there is room.
         """
         level, cell_m = self.level, self.level.grid.resolution_m
         least = self.least_area_m2 / cell_m**2
@@ -311,10 +308,7 @@ class Arc:
         The curve is straight if both fields have room for it, else it is the smoothed shortest walk
         across the boundary, so that arcs on two sides of an obstacle run on two sides of it.
 
-        Returns
-        -------
-        FloatArray
-            float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+        Returns float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
         """
         line = self._straight()
         if self._has_room(line) and self._crosses(line):

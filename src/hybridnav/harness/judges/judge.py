@@ -185,15 +185,7 @@ def segment_faults(
 def free_classes(*, allow_unexplored: bool) -> BoolArray:
     """Return whether a cell of each `CellClass` is free.
 
-    Parameters
-    ----------
-    allow_unexplored
-        Whether unexplored cells count as free.
-
-    Returns
-    -------
-    BoolArray
-        bool (3,), indexed by class.
+    `allow_unexplored`: whether unexplored cells count as free. Returns bool (3,), indexed by class.
     """
     free_of = np.zeros(len(CellClass), dtype=np.bool_)
     free_of[CellClass.FREE] = True

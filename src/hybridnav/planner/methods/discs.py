@@ -46,16 +46,9 @@ class Discs:
     is free for the circumscribed disc if that meets none anywhere: its path is valid with every
     heading. Both keep the rules of the map for the base.
 
-    Parameters
-    ----------
-    grid
-        The map, without corner cutting, inflated by no more than the inscribed radius.
-    footprint
-        The robot.
-    allow_unexplored
-        Whether unexplored cells may be entered.
-    costs
-        Costs of the cells; None for lengths.
+    `grid`: the map, without corner cutting, inflated by no more than the inscribed radius;
+    `allow_unexplored`: whether unexplored cells may be entered; `costs`: costs of the cells; None
+    for lengths.
     """
 
     def __init__(

@@ -50,18 +50,9 @@ _KEPT = 8
 class OverMesh(Method):
     """Shortest any-angle paths; the mesh is built when the first query needs it.
 
-    Parameters
-    ----------
-    known
-        The map, without corner cutting, and the search of its mesh, if it is built already.
-    settings
-        Whether unexplored cells may be entered, the accepted distance from the optimum, and the
-        time of a query.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map allows corner cutting.
+    `known`: the map, without corner cutting, and the search of its mesh, if it is built already;
+    `settings`: whether unexplored cells may be entered, the accepted distance from the optimum, and
+    the time of a query. Raises `InvalidValueError` when the map allows corner cutting.
     """
 
     metric: Metric = "any-angle"

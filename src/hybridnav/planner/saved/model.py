@@ -363,10 +363,7 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
 def model_of(filed: Sequence[FiledPart], where: str, max_cells: int) -> Model:
     """Return the model of the parts of a file.
 
-    Raises
-    ------
-    ModelError
-        When they are not those of one map.
+    Raises `ModelError` when they are not those of one map.
     """
     for part in filed:
         if part.kind in GONE:

@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 class MeshLabels:
     """Labels of points in a hierarchy of corners: shortest paths at any angle.
 
-    Parameters
-    ----------
-    search
-        A search that is prepared.
-    graph
-        Its graph.
+    `search`: a search that is prepared.
     """
 
     most = BLOCK
@@ -77,12 +72,7 @@ class ViewLabels(MeshLabels):
     """The same on a graph of corners that is not contracted, as those of raw scans are: a start
     holds all corners, a goal those that it sees.
 
-    Parameters
-    ----------
-    search
-        A search that is prepared.
-    edges
-        The edges between corners.
+    `search`: a search that is prepared; `edges`: the edges between corners.
     """
 
     most = 16
@@ -118,12 +108,7 @@ class ViewLabels(MeshLabels):
 class HubTables(MeshLabels):
     """The same by hub labels, where there is no hierarchy.
 
-    Parameters
-    ----------
-    search
-        A search with labels.
-    labels
-        Its labels.
+    `search`: a search with labels.
     """
 
     def __init__(self, search: MeshSearch, labels: HubLabels) -> None:

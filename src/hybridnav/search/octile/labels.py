@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 class JumpLabels:
     """Labels of cells in a contracted jump-point graph: shortest octile paths.
 
-    Parameters
-    ----------
-    search
-        A search on a contracted graph.
+    `search`: a search on a contracted graph.
     """
 
     most = BLOCK

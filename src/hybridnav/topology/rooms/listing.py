@@ -39,16 +39,11 @@ class Listing:
         """Find what is listed.
 
         A room is left out if it is narrower than 1 m in the mean and the robot cannot enter it:
-        such rooms are rays of a laser through glass. One with a name of its own is always listed.
-        A space without a name has to be wide enough and enterable, so that pockets between
-        outlines make no doors.
+        such rooms are rays of a laser through glass. One with a name of its own is always listed. A
+        space without a name has to be wide enough and enterable, so that pockets between outlines
+        make no doors.
 
-        Parameters
-        ----------
-        labels
-            The rooms.
-        level
-            The room level of a pyramid that was built with them.
+        `level`: the room level of a pyramid that was built with them.
         """
         from scipy import ndimage  # noqa: PLC0415 - most imports of the package need no rooms
 
@@ -89,14 +84,8 @@ def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
 def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
     """Return the spaces that free cells join with one in which a robot is, at the robot's radius.
 
-    Parameters
-    ----------
-    space_of
-        int32 (n_vertices,), the space of each vertex.
-    level
-        The room level.
-    begins
-        bool (n_spaces,), spaces in which a robot may begin: wide ones, and the largest.
+    `space_of`: int32 (n_vertices,), the space of each vertex; `begins`: bool (n_spaces,), spaces in
+    which a robot may begin: wide ones, and the largest.
     """
     is_free = level.classes == CellClass.FREE
     parts = free_components(level)[is_free]
@@ -160,14 +149,8 @@ def kinds_of(
     Holes of a room are filled first, for furniture makes nothing narrow. The breadth is that of the
     widest tenth of a room, since alcoves and crossings widen a corridor at a few points.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), the room of each cell, -1 for none.
-    is_free
-        bool (rows, cols), free cells as measured.
-    resolution_m
-        Side of a cell in metres.
+    `label_of`: int32 (rows, cols), the room of each cell, -1 for none; `is_free`: bool (rows,
+    cols), free cells as measured; `resolution_m`: side of a cell in metres.
     """
     from scipy import ndimage  # noqa: PLC0415 - most imports of the package need no rooms
 

@@ -101,12 +101,8 @@ class Forest:
 class JudgedSegments:
     """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
-    ground
-        What counts as free and as wall.
+    `label_of`: int32 (rows, cols), a segment for each free cell, -1 elsewhere; `ground`: what
+    counts as free and as wall.
     """
 
     def __init__(self, label_of: IntArray, ground: Ground) -> None:
@@ -244,25 +240,16 @@ class Rule(Protocol):
     def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
         """Return the rating of each pair, float64 (n_pairs,), above 0 where it may merge.
 
-        Parameters
-        ----------
-        segments
-            The segments as they are now.
-        grown
-            int64 (n,), segments that have grown since the last call.
+        `segments`: the segments as they are now; `grown`: int64 (n,), segments that have grown
+        since the last call.
         """
 
 
 class Likely:
     """The rule that two segments merge where a judge finds it likely that both are one room.
 
-    Parameters
-    ----------
-    judge
-        Returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
-        (n, len(EVIDENCE)).
-    least
-        Probability from which on a pair may merge, in (0, 1].
+    `judge`: returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
+    (n, len(EVIDENCE)); `least`: probability from which on a pair may merge, in (0, 1].
     """
 
     def __init__(self, judge: Judge, least: float) -> None:
@@ -288,10 +275,7 @@ class Likely:
 class Small:
     """The rule that a small segment merges with the neighbour of the longest open border.
 
-    Parameters
-    ----------
-    least_cells
-        Free cells from which on a segment is not small. Those without a neighbour stay.
+    `least_cells`: free cells from which on a segment is not small. Those without a neighbour stay.
     """
 
     def __init__(self, least_cells: float) -> None:
@@ -315,12 +299,8 @@ class Small:
 class Growth:
     """The resistance of boundaries between segments by rules, one after the other; see `Resists`.
 
-    Parameters
-    ----------
-    segments
-        The segments; they merge as the fields do.
-    rules
-        When no arc may be contracted by one of them, the next one decides.
+    `segments`: the segments; they merge as the fields do; `rules`: when no arc may be contracted by
+    one of them, the next one decides.
     """
 
     def __init__(self, segments: JudgedSegments, rules: Sequence[Rule]) -> None:
@@ -344,12 +324,8 @@ class GrowingSegments:
     order of one contraction at a time, and boundaries of a merged segment are rated anew before the
     next level.
 
-    Parameters
-    ----------
-    segments, rules
-        As of `Growth`.
-    segment_of
-        int64 (n_vertices,), the segment of each vertex of the level to start from, -1 for none.
+    `segments`, `rules`: see `Growth`; `segment_of`: int64 (n_vertices,), the segment of each vertex
+    of the level to start from, -1 for none.
     """
 
     def __init__(

@@ -394,14 +394,9 @@ def refine(
 ) -> Candidate:
     """Return a candidate after steps towards the nearest walls, the nearer the heavier.
 
-    Parameters
-    ----------
-    start, points, field
-        The candidate, walls of the old map, and distances to those of the new one.
-    reaches_m
-        Distances beyond which a wall has no partner, one after the other.
-    turns
-        Whether to turn, too.
+    `start`, `points`, `field`: the candidate, walls of the old map, and distances to those of the
+    new one; `reaches_m`: distances beyond which a wall has no partner, one after the other;
+    `turns`: whether to turn, too.
     """
     angle, shift = start.angle_rad, start.shift_m
     for reach in reaches_m:
