@@ -279,8 +279,7 @@ class _Kernel(_Renewed):
         options = {**self.targetoptions, "no_cpython_wrapper": True, "cache": is_kept}
         kernel: Any = numba.jit(**options)(twin)
         kernel.__class__ = _Inner
-        inner: _Inner = kernel
-        return inner
+        return kernel
 
     @property
     def _numba_type_(self) -> Any:

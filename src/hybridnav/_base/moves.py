@@ -75,8 +75,7 @@ def length_in_cells(cost: ArrayLike) -> FloatArray:
     total = np.asarray(cost, dtype=np.int64)
     diagonal = total % STRAIGHT * _INVERSE % STRAIGHT
     straight = (total - diagonal * DIAGONAL) // STRAIGHT
-    length: FloatArray = straight + diagonal * math.sqrt(2.0)
-    return length
+    return straight + diagonal * math.sqrt(2.0)
 
 
 def length_of_cost(cost: int) -> float:

@@ -52,13 +52,11 @@ class Motion:
 
     @property
     def _steps(self) -> FloatArray:
-        steps: FloatArray = np.diff(self.points, axis=0)
-        return steps
+        return np.diff(self.points, axis=0)
 
     @property
     def _chords(self) -> FloatArray:
-        chords: FloatArray = np.hypot(*self._steps.T)
-        return chords
+        return np.hypot(*self._steps.T)
 
     @property
     def _travel(self) -> FloatArray:
@@ -274,8 +272,7 @@ def _differ(one_rad: float, other_rad: float) -> bool:
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:
     """Return angles wrapped to [-pi, pi)."""
-    turned: FloatArray = (angles_rad + np.pi) % (2 * np.pi) - np.pi
-    return turned
+    return (angles_rad + np.pi) % (2 * np.pi) - np.pi
 
 
 def _part(along_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
@@ -292,5 +289,4 @@ def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     last[last < 0] = int(np.flatnonzero(known)[0])
-    filled: FloatArray = values[last]
-    return filled
+    return values[last]

@@ -77,8 +77,7 @@ class Marked:
                 node = node.value[key]
             else:
                 node = next(value for name, value in node.value if name.value == key)
-        found: Node = node
-        return found
+        return node
 
     def line(self, *keys: str | int) -> int:
         """Return the line of a value, from 1."""

@@ -355,10 +355,7 @@ def _break_even(price: float, gain: float) -> float:
 
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return quotients, NaN for a zero divisor."""
-    quotients: FloatArray = np.divide(
-        first, second, out=np.full(len(first), math.nan), where=second > 0
-    )
-    return quotients
+    return np.divide(first, second, out=np.full(len(first), math.nan), where=second > 0)
 
 
 def rows_of_map(study: Study, name: str) -> list[Row]:

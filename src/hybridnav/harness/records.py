@@ -251,5 +251,4 @@ def decode_path(start: tuple[int, int], text: str) -> LongArray:
     if end != len(text):
         raise InvalidValueError(f"no path: {text[end : end + 20]!r:.80} at character {end}")
     steps = [np.repeat(step, times, axis=0) for step, times in runs]
-    cells: LongArray = np.cumsum(np.concatenate([np.array([start]), *steps]), axis=0)
-    return cells
+    return np.cumsum(np.concatenate([np.array([start]), *steps]), axis=0)

@@ -224,8 +224,7 @@ def _stratified(
     turn[order] = np.arange(len(allowed)) - starts[stratum[order]]
     best = draws[allowed[np.lexsort((stratum, turn))]]
     first = np.sort(unique_rows(best).first)[:count]
-    chosen: LongArray = best[first]
-    return chosen
+    return best[first]
 
 
 def _across(labels: IntArray, largest: int, count: int, rng: np.random.Generator) -> list[Pair]:

@@ -73,8 +73,7 @@ def _within_distance(occupied: BoolArray, most: int) -> BoolArray:
         offset = np.arange(size, dtype=np.int64)
         offset = offset[:, None] if axis == 0 else offset[None, :]
         squared += (nearest[axis] - offset) ** 2
-    within: BoolArray = squared <= most
-    return within
+    return squared <= most
 
 
 def clearance_cells(occupied: BoolArray) -> FloatArray:
@@ -90,8 +89,7 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
         return np.full(occupied.shape, np.inf)
     from scipy import ndimage  # noqa: PLC0415 - on demand, as above
 
-    distances: FloatArray = ndimage.distance_transform_edt(~occupied)
-    return distances
+    return ndimage.distance_transform_edt(~occupied)
 
 
 def closing(cells: BoolArray, radius_cells: float) -> BoolArray:

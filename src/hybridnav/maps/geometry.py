@@ -49,5 +49,4 @@ def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
     # One memory layout, so that the kernel is compiled once.
     cells = np.ascontiguousarray(free).view()
     cells.flags.writeable = False
-    found: LongArray = passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))
-    return found
+    return passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))

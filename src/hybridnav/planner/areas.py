@@ -172,10 +172,7 @@ def _near_throughout(
     inside = shapely.covers(part, shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0]))
     reach = radius_cells - np.hypot(*(high - low).T) / 2
     middles = shapely.points((low + high)[:, ::-1] / 2)
-    found: BoolArray = inside | (
-        (reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0))
-    )
-    return found
+    return inside | ((reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0)))
 
 
 def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:

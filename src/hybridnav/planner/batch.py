@@ -79,8 +79,7 @@ class PlanBatch:
 
     def path(self, query: int) -> FloatArray:
         """Return the points of one path, float64 (k, 2); none where there is no path."""
-        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
-        return points
+        return self.points[self.path_start[query] : self.path_start[query + 1]]
 
 
 def plan_many(

@@ -156,8 +156,7 @@ class Blocked:
             found += self._on_boundaries(topology)
         single = np.concatenate(found)
         if not (self.polygons or self.keepout):  # rooms have many cells, and need no runs
-            cells_alone: LongArray = np.unique(single)
-            return cells_alone
+            return np.unique(single)
         runs = [np.stack([single, single + 1], axis=1)]
         for given, radius_m in ((self.polygons, grid.robot_radius_m), (self.keepout, 0.0)):
             areas = cast("Sequence[BaseGeometry]", given)

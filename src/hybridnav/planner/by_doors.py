@@ -307,8 +307,7 @@ class DoorTours:
         tails, heads = self._graph.endpoints[is_outside].T
         count = self._rooms.level.n_vertices
         joined = coo_array((np.ones(len(tails), dtype=np.int8), (tails, heads)), (count, count))
-        parts: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
-        return parts
+        return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
 def admissible(

@@ -238,8 +238,7 @@ def _where_it_fits(grid: OccupancyGrid, cells: LongArray, radius_m: float) -> Lo
     row, col = max(rows.min() - reach, 0), max(cols.min() - reach, 0)
     window = grid.measured[row : rows.max() + reach + 1, col : cols.max() + reach + 1]
     distance = _to_sides(window == CellClass.OCCUPIED)[rows - row, cols - col]
-    fitting: LongArray = cells[distance >= radius_cells]
-    return fitting
+    return cells[distance >= radius_cells]
 
 
 def _to_sides(occupied: BoolArray) -> FloatArray:
@@ -252,8 +251,7 @@ def _to_sides(occupied: BoolArray) -> FloatArray:
     within = np.zeros((2 * rows + 1, 2 * cols + 1), dtype=np.bool_)
     for up, right in itertools.product(range(3), repeat=2):
         within[up : up + 2 * rows : 2, right : right + 2 * cols : 2] |= occupied
-    distance: FloatArray = clearance_cells(within)[1::2, 1::2] / 2
-    return distance
+    return clearance_cells(within)[1::2, 1::2] / 2
 
 
 def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:

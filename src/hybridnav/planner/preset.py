@@ -84,8 +84,7 @@ class Preset(Section):
         plain = self.description.isprintable()
         tree = self.model_dump(exclude={"name"})
         tree["planner"] = {"method": self.planner.method, **tree["planner"]}  # the method first
-        text: str = yaml.safe_dump(tree, sort_keys=False, allow_unicode=plain)
-        return text
+        return yaml.safe_dump(tree, sort_keys=False, allow_unicode=plain)
 
 
 def planner_settings(method: str = "paper", **settings: Any) -> PlannerSettings:

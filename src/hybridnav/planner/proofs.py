@@ -199,8 +199,7 @@ def _line(problem: _Problem) -> dict[str, Any]:
 
 def _distinct(line: FloatArray) -> FloatArray:
     """Return a line without points that repeat the one before."""
-    distinct: FloatArray = line[np.append([True], (np.diff(line, axis=0) != 0).any(axis=1))]
-    return distinct
+    return line[np.append([True], (np.diff(line, axis=0) != 0).any(axis=1))]
 
 
 def _walk(cells: LongArray) -> list[Any]:

@@ -204,8 +204,7 @@ class Case:
             index = int(np.searchsorted(topology.arc_ids, arc))
             arc = LevelArc(topology.pyramid.place_level, index)
         pairs = topology.pyramid[arc.level].boundary(arc.index)
-        moves: LongArray = pairs @ np.array([self.grid.shape[1], 1])
-        return moves
+        return pairs @ np.array([self.grid.shape[1], 1])
 
     @cached_property
     def _shut(self) -> BoolArray:

@@ -324,10 +324,7 @@ class Decimation:
     def field_of(self) -> IntArray:
         """Return the current vertex of each flat cell, int32 (n_cells,), -1 for none."""
         record = self.record
-        labels: IntArray = _field_kernels.label_fields(
-            record.vertex_end, record.vertex_parent, MAX_LEVELS
-        )[0]
-        return labels
+        return _field_kernels.label_fields(record.vertex_end, record.vertex_parent, MAX_LEVELS)[0]
 
     def _merge_vertices(self, scratch: Scratch) -> None:
         record = self.record

@@ -41,8 +41,7 @@ def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
 
     The centre of cell (0, 0) is (0.5, 0.5).
     """
-    middles: FloatArray = cell_pairs(base_edges, cols).mean(axis=1) + 0.5
-    return middles
+    return cell_pairs(base_edges, cols).mean(axis=1) + 0.5
 
 
 def middle_sides(sides: FloatArray, boundary: LongArray, count: int) -> LongArray:
@@ -58,14 +57,12 @@ def middle_sides(sides: FloatArray, boundary: LongArray, count: int) -> LongArra
     mean = np.stack(sums, axis=1) / sizes[:, None]
     squared = ((sides - mean[boundary]) ** 2).sum(axis=1)
     order = np.lexsort((squared, boundary))
-    found: LongArray = order[np.cumsum(sizes) - sizes]
-    return found
+    return order[np.cumsum(sizes) - sizes]
 
 
 def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
     """Return the middle of the side that `middle_sides` returns, float64 (count, 2)."""
-    middles: FloatArray = sides[middle_sides(sides, boundary, count)]
-    return middles
+    return sides[middle_sides(sides, boundary, count)]
 
 
 def line_of_loop(

@@ -239,8 +239,7 @@ class Expansion:
         """Return the rating of arcs, int32 (n, 2), between different fields."""
         at = np.searchsorted(self._keys, self._keys_of(endpoints))
         area = self._areas[endpoints].astype(np.float64)
-        ratings: FloatArray = self._lengths[at] ** 2 / (area[:, 0] * area[:, 1])
-        return ratings
+        return self._lengths[at] ** 2 / (area[:, 0] * area[:, 1])
 
     def _joined(self, endpoints: IntArray, lengths: LongArray) -> tuple[LongArray, LongArray]:
         """Return the pairs of fields that have boundaries, and the length of all of each pair."""
@@ -252,8 +251,7 @@ class Expansion:
     def _keys_of(self, endpoints: IntArray) -> LongArray:
         """Return one number for each pair of vertices, in either order."""
         low, high = np.sort(endpoints.astype(np.int64), axis=1).T
-        keys: LongArray = low * len(self._areas) + high
-        return keys
+        return low * len(self._areas) + high
 
 
 _FIRST_KIND = 3

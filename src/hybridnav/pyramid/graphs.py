@@ -57,8 +57,7 @@ class CombinatorialMap:
     @property
     def phi(self) -> IntArray:
         """int32 (2 n_edges,), next dart round the face, which lies on the right of its darts."""
-        phi: IntArray = self.sigma[np.arange(len(self.sigma)) ^ 1]
-        return phi
+        return self.sigma[np.arange(len(self.sigma)) ^ 1]
 
     def faces(self) -> LongArray:
         """Label the faces: for each dart the number of its orbit under phi, dense from 0."""

@@ -86,8 +86,7 @@ class Parts(NamedTuple):
         """Return the part of each of some cells, (n, 2), int32: -1 for those that are not free."""
         row, col = cells.T
         fine = np.where(self.classes[row, col] == 1, self.fine_of_square[row // 2, col // 2], -1)
-        labels: IntArray = np.append(self.part_of, np.int32(-1))[fine]
-        return labels
+        return np.append(self.part_of, np.int32(-1))[fine]
 
 
 # Shares of the merge distance, so that a map in other units has the same parts. At 4 m: passages

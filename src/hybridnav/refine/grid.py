@@ -168,10 +168,7 @@ class Sight:
         BoolArray
             bool (n,); true for two equal endpoints.
         """
-        found: BoolArray = clear_segments(
-            self._marks, np.ascontiguousarray(tails), np.ascontiguousarray(heads)
-        )
-        return found
+        return clear_segments(self._marks, np.ascontiguousarray(tails), np.ascontiguousarray(heads))
 
     def apart(
         self, taken: FloatArray, candidates: FloatArray, spacing_cells: float, most: int
@@ -195,8 +192,7 @@ class Sight:
             bool (n,), the chosen candidates.
         """
         both = np.concatenate([taken, candidates])
-        found: BoolArray = apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
-        return found
+        return apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
 
     def reaches(self, corners: FloatArray, steps: FloatArray, farthest: float) -> FloatArray:
         """Return about how far rays from lattice corners run through free cells.
@@ -215,8 +211,7 @@ class Sight:
         FloatArray
             float64 (n,), in cells, up to a step of half a cell.
         """
-        found: FloatArray = reaches(self._marks, corners, steps, farthest)
-        return found
+        return reaches(self._marks, corners, steps, farthest)
 
     def shared(
         self, starts: FloatArray, goals: FloatArray, limits: FloatArray, positions: FloatArray
@@ -237,8 +232,7 @@ class Sight:
         BoolArray
             bool (n,).
         """
-        found: BoolArray = shared(self._marks, starts, goals, limits, positions)
-        return found
+        return shared(self._marks, starts, goals, limits, positions)
 
 
 class Refiner(Protocol):

@@ -140,8 +140,7 @@ class GridLabels:
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells."""
-        flat: LongArray = ends[0] @ np.array([self._grid[2], 1])
-        return flat
+        return ends[0] @ np.array([self._grid[2], 1])
 
     def labels(self, ends: LongArray) -> Labels:
         """Return labels without entries."""

@@ -67,8 +67,7 @@ class ClosedCells:
         if not len(self.flat):
             return np.zeros(len(flat), dtype=np.bool_)
         at = np.minimum(np.searchsorted(self.flat, flat), len(self.flat) - 1)
-        found: BoolArray = self.flat[at] == flat
-        return found
+        return self.flat[at] == flat
 
     def __or__(self, other: ClosedCells) -> ClosedCells:
         """Return the cells that either closes."""

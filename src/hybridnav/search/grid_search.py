@@ -325,7 +325,6 @@ def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> L
     is_target[targets] = True
     source = np.array([cell[0] * cols + cell[1]])
     start_cost = np.zeros(1, dtype=np.int64)
-    costs: LongArray = _waypoint_kernels.spread(
-        moves.ravel(), None, cols, source, start_cost, is_target, True
-    )[0]
-    return costs
+    return _waypoint_kernels.spread(moves.ravel(), None, cols, source, start_cost, is_target, True)[
+        0
+    ]

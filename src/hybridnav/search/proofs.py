@@ -165,8 +165,7 @@ def _chain_round(area: BoolArray, goal: tuple[int, int]) -> LongArray:
     chain = np.concatenate([chain, chain[:1]])
     is_new = np.ones(len(chain), np.bool_)
     is_new[1:] = (chain[1:] != chain[:-1]).any(axis=1)
-    found: LongArray = chain[is_new]
-    return found
+    return chain[is_new]
 
 
 def strings_near(free: BoolArray, ends: FloatArray, bound_cells: float) -> list[Any]:

@@ -244,8 +244,7 @@ def _value_at(values: LongArray, index: LongArray) -> LongArray:
 def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:
     ones = np.ones(len(arcs), dtype=np.int8)
     graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
-    label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
-    return label
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:

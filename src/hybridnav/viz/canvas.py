@@ -210,8 +210,7 @@ def _averaged(image: ByteArray, block: int) -> ByteArray:
     rows, cols, _ = image.shape
     padded = np.pad(image, ((0, -rows % block), (0, -cols % block), (0, 0)), mode="edge")
     blocks = padded.reshape(padded.shape[0] // block, block, -1, block, 3)
-    averaged: ByteArray = blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
-    return averaged
+    return blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
 
 
 # Files of figures: equal bytes for equal pictures.

@@ -44,8 +44,7 @@ class Field:
     @cached_property
     def corner(self) -> LongArray:
         """(row, col) of the window's first cell in the grid."""
-        corner: LongArray = self.level.receptive_field(self.vertex).min(axis=0) - 1
-        return corner
+        return self.level.receptive_field(self.vertex).min(axis=0) - 1
 
     @cached_property
     def cells(self) -> LongArray:
@@ -105,8 +104,7 @@ class Field:
     @property
     def start(self) -> LongArray:
         """The number of the surviving cell, as an array of one."""
-        start: LongArray = self.number[tuple((self.level.cells[[self.vertex]] - self.corner).T)]
-        return start
+        return self.number[tuple((self.level.cells[[self.vertex]] - self.corner).T)]
 
     @cached_property
     def walks(self) -> WalkTree:
@@ -128,14 +126,12 @@ class WalkTree:
         walk = [at]
         while (at := int(self.before[at])) >= 0:
             walk.append(at)
-        cells: FloatArray = self.cells[np.array(walk[::-1]) % len(self.cells)].astype(np.float64)
-        return cells
+        return self.cells[np.array(walk[::-1]) % len(self.cells)].astype(np.float64)
 
 
 def distance_to_rim(mask: BoolArray) -> FloatArray:
     """Return the distance of each cell of a mask to the nearest cell outside it, in cells."""
-    distance: FloatArray = np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
-    return distance
+    return np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
 
 
 def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatArray:
@@ -171,8 +167,7 @@ def _between(values: FloatArray, points: FloatArray) -> FloatArray:
     up, right = (points - low).T[..., None]
     lower = values[row, col] * (1 - right) + values[row, col + 1] * right
     upper = values[row + 1, col] * (1 - right) + values[row + 1, col + 1] * right
-    between: FloatArray = lower * (1 - up) + upper * up
-    return between
+    return lower * (1 - up) + upper * up
 
 
 def _evenly(line: FloatArray, spacing: float) -> FloatArray:
@@ -335,5 +330,4 @@ class Loops:
         t = np.linspace(0, 1, _PETAL_POINTS)[:, None]
         # Inner control points that lie 4/3 out make a cubic curve pass through the tip at 1/2.
         out, back = 4 * t * (1 - t) ** 2, 4 * t**2 * (1 - t)
-        petal: FloatArray = at + out * (tip + across) + back * (tip - across)
-        return petal
+        return at + out * (tip + across) + back * (tip - across)

@@ -294,8 +294,7 @@ def _wider(cells: BoolArray, steps: int) -> BoolArray:
 
     if not steps:
         return cells
-    wider: BoolArray = ndimage.binary_dilation(cells, iterations=steps)
-    return wider
+    return ndimage.binary_dilation(cells, iterations=steps)
 
 
 def _scale_of(grid: OccupancyGrid, layer: CostLayer) -> Normalize:

@@ -38,15 +38,13 @@ class Places:
     @cached_property
     def free(self) -> BoolArray:
         """Places of free cells."""
-        free: BoolArray = self.level.classes == CellClass.FREE
-        return free
+        return self.level.classes == CellClass.FREE
 
     @cached_property
     def large(self) -> BoolArray:
         """Mask of the places that are no specks; of all places if all are specks."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        large: BoolArray = areas >= min(TINY_M2, areas.max(initial=0.0))
-        return large
+        return areas >= min(TINY_M2, areas.max(initial=0.0))
 
     def colours(self, strong: BoolArray | None = None, *, unexplored: bool = True) -> ByteArray:
         """Return RGB per place and one row more, for cells without a place; `strong` are not pale,

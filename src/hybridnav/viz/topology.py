@@ -57,14 +57,12 @@ class Graph:
     def seen(self) -> BoolArray:
         """Mask of the drawn vertices, always including the largest."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        seen: BoolArray = areas >= min(self.least_area_m2, areas.max(initial=0.0))
-        return seen
+        return areas >= min(self.least_area_m2, areas.max(initial=0.0))
 
     @cached_property
     def plain(self) -> BoolArray:
         """Arcs drawn between two vertices."""
-        plain: BoolArray = self.seen[self.level.arcs].all(axis=1) & ~self.level.is_self_loop
-        return plain
+        return self.seen[self.level.arcs].all(axis=1) & ~self.level.is_self_loop
 
     @cached_property
     def parallel(self) -> BoolArray:

@@ -133,11 +133,10 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
         meet = (apart**2).sum(axis=0) > 1
         axis[here] |= meet & (hand >= 0)
         axis[there] |= meet & (hand <= 0)
-    thin: BoolArray = np.asarray(
+    return np.asarray(
         morphology.skeletonize(axis & free),  # type: ignore[no-untyped-call]
         dtype=np.bool_,
     )
-    return thin
 
 
 def basis_pairs(cells: LongArray, basis: IntArray) -> tuple[LongArray, FloatArray]:
@@ -232,5 +231,4 @@ def centres_of(region_of: IntArray, n_regions: int) -> FloatArray:
     rows, cols = np.nonzero(region_of >= 0)
     label = region_of[rows, cols]
     sums = [np.bincount(label, weights=w, minlength=n_regions) for w in (rows, cols)]
-    centres: FloatArray = np.stack(sums, axis=1) / np.bincount(label, minlength=n_regions)[:, None]
-    return centres
+    return np.stack(sums, axis=1) / np.bincount(label, minlength=n_regions)[:, None]

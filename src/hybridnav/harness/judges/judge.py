@@ -205,8 +205,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
     positions = np.clip(frame.positions_of(xy), -_OUTERMOST, _OUTERMOST)
-    rounded: FloatArray = np.rint(positions / _QUANTUM) * _QUANTUM
-    return rounded
+    return np.rint(positions / _QUANTUM) * _QUANTUM
 
 
 def _wrong_endpoints(path: LongArray, start: Cell, goal: Cell) -> list[str]:

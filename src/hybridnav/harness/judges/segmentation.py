@@ -142,5 +142,4 @@ def mcc_per_zone(cells: FloatArray) -> float:
 def _best_iou(cells: FloatArray, is_room: BoolArray) -> FloatArray:
     """Return the greatest intersection over union of each row with any column that is a room."""
     union = cells.sum(axis=1)[:, None] + cells.sum(axis=0) - cells
-    best: FloatArray = np.where(is_room, cells / union, 0.0).max(axis=1)
-    return best
+    return np.where(is_room, cells / union, 0.0).max(axis=1)

@@ -34,8 +34,7 @@ MOST_FACTOR = 1000.0
 def rounded(factors: AnyArray) -> NDArray[np.float32]:
     """Return factors, rounded down to units; float32 holds these exactly."""
     units = np.floor(np.asarray(factors, dtype=np.float64) * (1 << UNIT_BITS))
-    rounded: NDArray[np.float32] = (units / (1 << UNIT_BITS)).astype(np.float32)
-    return rounded
+    return (units / (1 << UNIT_BITS)).astype(np.float32)
 
 
 def checked_factors(given: ArrayLike) -> NDArray[np.float32]:

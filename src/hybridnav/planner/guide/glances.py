@@ -313,8 +313,7 @@ class DoorsInSight:
 
     @cached_property
     def _is_hidden(self) -> BoolArray:
-        hidden: BoolArray = self._rooms.grid.measured != CellClass.FREE
-        return hidden
+        return self._rooms.grid.measured != CellClass.FREE
 
 
 def is_named(room: str | None) -> bool:

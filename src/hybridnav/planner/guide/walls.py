@@ -52,8 +52,7 @@ class RoomWalls:
     def _side(self, row: LongArray, col: LongArray, course: LongArray) -> LongArray:
         """Return the indices of the sides of cells of the room that look along steps."""
         flat = (row - self._first[0]) * self._inside.shape[1] + col - self._first[1]
-        found: LongArray = np.searchsorted(self._sides, 4 * flat + course)
-        return found
+        return np.searchsorted(self._sides, 4 * flat + course)
 
     def _length_along(self, sides: list[int], step: int) -> FloatArray:
         """Return how far it is to each side for a person, who walks straight past what is small,
@@ -62,8 +61,7 @@ class RoomWalls:
         row, col = np.divmod(cells, self._inside.shape[1])
         lengths = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(row), np.diff(col)))])
         ends = np.append(np.arange(0, len(sides), step), len(sides))
-        along: FloatArray = np.interp(np.arange(len(sides) + 1), ends, lengths)
-        return along
+        return np.interp(np.arange(len(sides) + 1), ends, lengths)
 
     def _follow(self, following: list[int], step: int) -> None:
         exit_of = self._exit_of

@@ -103,8 +103,7 @@ class Discs:
 
     @property
     def _obstacles(self) -> BoolArray:
-        occupied: BoolArray = self._grid.measured == CellClass.OCCUPIED
-        return occupied
+        return self._grid.measured == CellClass.OCCUPIED
 
     def _near(self, obstacles: BoolArray) -> BoolArray:
         """Return the cells with a point that is nearer to an obstacle than the large radius."""

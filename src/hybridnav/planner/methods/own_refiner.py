@@ -121,8 +121,7 @@ class CheckedRefiner:
     def _moves(self) -> ByteArray:
         """uint8 (rows, cols), masks of the legal moves."""
         enterable = np.ascontiguousarray(self._enterable)
-        moves: ByteArray = legal_moves(enterable, self._grid.corner_cutting)
-        return moves
+        return legal_moves(enterable, self._grid.corner_cutting)
 
     def _wrong(self, what: str) -> PresetError:
         return refused(

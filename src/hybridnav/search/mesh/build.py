@@ -197,10 +197,7 @@ def merge_triangles(
     *sides, squared = sides_of_triangles(corners, triangles, neighbours)
     common = np.flatnonzero(squared)
     order = common[np.argsort(-squared[common], kind="stable")]
-    polygons: tuple[IntArray, IntArray, IntArray, IntArray] = merge_across(
-        corners, triangles.ravel(), tuple(sides), order
-    )
-    return polygons
+    return merge_across(corners, triangles.ravel(), tuple(sides), order)
 
 
 # --- the graph of its corners ---------------------------------------------------------------------

@@ -51,8 +51,7 @@ class MeshLabels:
     def labels(self, ends: Placed) -> Labels:
         """Return the labels of ends."""
         work = climbing_room(self.n_corners)
-        found: Labels = labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
-        return found
+        return labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
 
     goal_labels = labels
 
@@ -101,8 +100,7 @@ class ViewLabels(MeshLabels):
 
     def goal_labels(self, ends: Placed) -> Labels:
         """Return the corners that each goal sees."""
-        found: Labels = views_of_points(self._mesh, ends, _view_room())
-        return found
+        return views_of_points(self._mesh, ends, _view_room())
 
 
 class HubTables(MeshLabels):
@@ -125,10 +123,9 @@ class HubTables(MeshLabels):
         """Return the labels of ends."""
         seen = np.empty(ROOM, np.int8), np.empty(ROOM, np.int32), np.empty(ROOM, np.int64)
         room = *seen, np.full(self.n_corners, hubs.FAR)
-        found: Labels = hub_labels_of_points(
+        return hub_labels_of_points(
             self._mesh, self._labels, self._place[1], (ends[3], ends[0]), room
         )
-        return found
 
     goal_labels = labels
 

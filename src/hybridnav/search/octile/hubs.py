@@ -36,8 +36,7 @@ class JumpHubs:
     @cached_property
     def ranges(self) -> LongArray:
         """See `ranges_of_legs`."""
-        found: LongArray = kernels.ranges_of_legs(legs_that_follow())
-        return found
+        return kernels.ranges_of_legs(legs_that_follow())
 
     @property
     def arrays(self) -> tuple[AnyArray, ...]:

@@ -185,8 +185,7 @@ def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tupl
 
 def _wrapped(angle_rad: FloatArray) -> FloatArray:
     """Return angles of crosses, from -pi/4 to pi/4."""
-    wrapped: FloatArray = (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
-    return wrapped
+    return (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
 
 
 def _apart(angle_rad: FloatArray, other_rad: float) -> FloatArray:
@@ -229,5 +228,4 @@ def closed_by_disc(free: BoolArray, occupied: BoolArray, reach: float) -> BoolAr
 
 
 def _rim(free: BoolArray) -> BoolArray:
-    rim: BoolArray = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
-    return rim
+    return ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free

@@ -190,8 +190,7 @@ def _widths(
     endpoints = np.full(len(extents), np.inf)
     np.minimum.at(endpoints, boundary_of[middle], clearance[middle])
     inner = _extents(edges[middle], cols, boundary_of[middle])
-    widths: FloatArray = np.minimum(extents, inner + 2 * np.maximum(endpoints - 0.5, 0.0))
-    return widths
+    return np.minimum(extents, inner + 2 * np.maximum(endpoints - 0.5, 0.0))
 
 
 def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
@@ -224,8 +223,7 @@ def farthest_ends(edges: LongArray, cols: int) -> FloatArray:
     along = corners[:, :1] * cosines + corners[:, 1:] * sines
     pairs = corners[np.stack([along.argmin(axis=0), along.argmax(axis=0)], axis=1)]
     lengths = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T)
-    found: FloatArray = pairs[int(lengths.argmax())]
-    return found
+    return pairs[int(lengths.argmax())]
 
 
 def _corners(edges: LongArray, cols: int) -> LongArray:
@@ -251,8 +249,7 @@ def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> Lon
     )
     one, other = boundary_of[thin[near]].T
     joined = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    row_of: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
-    return row_of
+    return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
 def _jambs(
@@ -268,10 +265,7 @@ def _jambs(
     found = unique_rows(np.column_stack([of, corners]))
     ends = found.first[found.n_times == 1]
     has_jamb = ~blocks[tuple(corners[ends].T)] | is_near[ends // 2]
-    jambs: LongArray = np.bincount(
-        of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1
-    )
-    return jambs
+    return np.bincount(of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1)
 
 
 def measured_clearance_m(grid: OccupancyGrid) -> FloatArray:

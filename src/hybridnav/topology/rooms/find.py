@@ -186,8 +186,7 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
     inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
     around &= inside >= _LEAST_INSIDE * areas
-    found: BoolArray = around[part_of]
-    return found
+    return around[part_of]
 
 
 def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
@@ -203,8 +202,7 @@ def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
     order = found[large][np.argsort(first[large], kind="stable")]
     new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
     new[order] = np.arange(len(order))
-    renumbered: IntArray = new[label_of]
-    return renumbered
+    return new[label_of]
 
 
 LEFT_OUT = -2
@@ -260,8 +258,7 @@ class _Lasting:
         one, other = had[self._segments.state.endpoints[pairs].T]
         both = (one >= 0) & (other >= 0)
         odds = np.where(both, np.where(one == other, _ODDS, 1 / _ODDS), 1.0)
-        lasting: FloatArray = probability * odds / (probability * odds + 1 - probability)
-        return lasting
+        return probability * odds / (probability * odds + 1 - probability)
 
 
 def renewed_rooms(

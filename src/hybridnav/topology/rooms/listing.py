@@ -77,8 +77,7 @@ def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
     inside = space_of >= 0
     depths = clearance_cells(is_rim)[inside] + 0.5
     total = np.bincount(space_of[inside], weights=depths, minlength=len(areas))
-    widths: FloatArray = 4 * total / np.maximum(areas, 1)
-    return widths
+    return 4 * total / np.maximum(areas, 1)
 
 
 def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
@@ -91,8 +90,7 @@ def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray
     parts = free_components(level)[is_free]
     spaces = space_of[is_free]
     joined = np.bincount(parts, weights=begins[spaces], minlength=1) > 0
-    found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
-    return found
+    return np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
 
 
 def free_components(level: Level) -> IntArray:
@@ -104,8 +102,7 @@ def free_components(level: Level) -> IntArray:
     arcs = level.arcs[(level.classes == CellClass.FREE)[level.arcs].all(axis=1)]
     shape = (level.n_vertices, level.n_vertices)
     graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
-    found: IntArray = connected_components(graph, directed=False)[1]
-    return found
+    return connected_components(graph, directed=False)[1]
 
 
 # Kinds of rooms by their shapes: corridors and halls.

@@ -92,10 +92,9 @@ class Forest:
 
     def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
         """Return the probability that two segments belong to one room, float64 (n,)."""
-        found: FloatArray = _evidence_kernels.probabilities(
+        return _evidence_kernels.probabilities(
             evidence, self.features, self.thresholds, self.leaves, self.base
         )
-        return found
 
 
 class JudgedSegments:
@@ -118,8 +117,7 @@ class JudgedSegments:
     @property
     def label_of(self) -> IntArray:
         """int32 (rows, cols), the segments as they are now; numbers have gaps."""
-        labels: IntArray = np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
-        return labels
+        return np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
 
     def evidence(self, pairs: LongArray) -> FloatArray:
         """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
@@ -268,8 +266,7 @@ class Likely:
         pairs = pairs[state.open_sides[pairs] > 0]
         if len(pairs):
             self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
-        ratings: FloatArray = np.where(self._likely >= self._least, self._likely, 0.0)
-        return ratings
+        return np.where(self._likely >= self._least, self._likely, 0.0)
 
 
 class Small:

@@ -320,8 +320,7 @@ def _rotations(old: FloatArray, new: FloatArray, side_m: float) -> list[float]:
 
 def _blurred(array: AnyArray, axis: int, mode: Literal["constant", "wrap"]) -> AnyArray:
     """Return an array blurred over a pixel or so, by binomial weights along one axis."""
-    found: AnyArray = ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
-    return found
+    return ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
 
 
 def _spectrum(points: FloatArray, side_m: float) -> FloatArray:
@@ -333,8 +332,7 @@ def _spectrum(points: FloatArray, side_m: float) -> FloatArray:
         steps = np.diff(np.bincount((along / side_m).astype(np.int64)).astype(np.float64))
         sharp[at] = (steps * steps).sum()
     spread = float(sharp.std())
-    standard: FloatArray = (sharp - sharp.mean()) / (spread or 1.0)
-    return standard
+    return (sharp - sharp.mean()) / (spread or 1.0)
 
 
 def _candidates(one: Surface, other: Surface) -> list[Candidate]:

@@ -84,8 +84,7 @@ def _rim(region_of: IntArray) -> BoolArray:
     """Return the cells of rooms with another room, or none, above or to the right of them."""
     padded = np.pad(region_of, ((0, 1), (0, 1)), constant_values=-1)
     inner = padded[:-1, :-1]
-    rim: BoolArray = (inner != padded[1:, :-1]) | (inner != padded[:-1, 1:])
-    return rim
+    return (inner != padded[1:, :-1]) | (inner != padded[:-1, 1:])
 
 
 def _simplified(lines: BaseGeometry, tolerance: float) -> BaseGeometry:
@@ -139,8 +138,7 @@ def _kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:
     part_of, _ = ndimage.label(is_free & (label_of == NO_ROOM))
     is_many = np.bincount(part_of.ravel()) * grid.cell_area_m2 >= _LEAST_NAMELESS_M2
     is_many[0] = False
-    kept: BoolArray = (is_free & (label_of != NO_ROOM)) | is_many[part_of]
-    return kept
+    return (is_free & (label_of != NO_ROOM)) | is_many[part_of]
 
 
 def _without_islands(label_of: IntArray, is_kept: BoolArray, grid: OccupancyGrid) -> IntArray:
@@ -300,8 +298,7 @@ def _joined(count: int, begin: LongArray, end: LongArray) -> LongArray:
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
     edges = coo_array((np.ones(len(begin), dtype=np.int8), (begin, end)), (count, count))
-    group: LongArray = connected_components(edges, directed=False)[1].astype(np.int64)
-    return group
+    return connected_components(edges, directed=False)[1].astype(np.int64)
 
 
 def _from_corner(chain: LineString) -> LineString:

@@ -86,8 +86,7 @@ def apart(grid: OccupancyGrid) -> BoolArray:
     part_of, _ = ndimage.label(grid.measured == CellClass.FREE)
     small = np.bincount(part_of.ravel()) * grid.resolution_m**2 < _LEAST_NAMELESS_M2
     small[0] = False
-    found: BoolArray = small[part_of]
-    return found
+    return small[part_of]
 
 
 def by_rule(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
