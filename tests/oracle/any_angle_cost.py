@@ -23,15 +23,9 @@ Position = tuple[float, float]
 class SidePoints:
     """Cheapest paths over points on the sides of cells.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), which cells may be entered.
-    factors
-        (rows, cols), what a cell's side costs inside it. Along the side between two cells the
-        larger factor counts, that of a blocked cell too.
-    per_side
-        Number of points inside each side.
+    `free`: bool (rows, cols), which cells may be entered; `factors`: (rows, cols), what a cell's
+    side costs inside it. Along the side between two cells the larger factor counts, that of a
+    blocked cell too. `per_side`: number of points inside each side.
     """
 
     def __init__(self, free: Any, factors: Any, per_side: int = 7) -> None:

@@ -12,14 +12,8 @@ from hybridnav.maps import CellClass, OccupancyGrid
 class ShapelyRobot:
     """A robot and a map as shapely geometries: the outline, occupied ground, ground for the base.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    corners_m
-        Corners of the outline, robot frame; None for a disc on an inflated grid.
-    inside
-        Cells that the base may stand on, None for all.
+    `corners_m`: corners of the outline, robot frame; None for a disc on an inflated grid; `inside`:
+    cells that the base may stand on, None for all.
     """
 
     def __init__(self, grid: OccupancyGrid, corners_m: Any, inside: Any = None) -> None:
@@ -31,12 +25,8 @@ class ShapelyRobot:
     def is_hit(self, poses: Any, *, grown_m: float) -> bool:
         """Whether the robot, grown or shrunk by a little, fails in any of some poses.
 
-        Parameters
-        ----------
-        poses
-            `(x, y, yaw)`, (n, 3).
-        grown_m
-            Below 0 only what goes deeper than that counts, above 0 what comes as near as that too.
+        `poses`: `(x, y, yaw)`, (n, 3); `grown_m`: below 0 only what goes deeper than that counts,
+        above 0 what comes as near as that too.
         """
         bases = shapely.points(poses[:, :2])
         ground = self.stand.buffer(max(-grown_m, 0), join_style="mitre")
@@ -77,11 +67,8 @@ def _ground(grid: OccupancyGrid, cells: Any) -> Any:
 def drive_phases(start: Any, goal: Any, n: int, *, backwards: bool = False) -> list[list[Any]]:
     """What a robot does that turns on the spot, drives straight, and turns again.
 
-    Returns
-    -------
-    list
-        The phases in order; of each the ways to do it, as poses (n, 3). A turn goes either way
-        round.
+    Returns the phases in order; of each the ways to do it, as poses (n, 3). A turn goes either way
+    round.
     """
     way = np.subtract(goal, start)[:2]
     if not way.any():

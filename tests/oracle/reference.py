@@ -42,12 +42,8 @@ class ReferenceLevel:
 class PlaneMap:
     """One level that is contracted and simplified in place.
 
-    Parameters
-    ----------
-    classes
-        `CellClass` of each cell.
-    rules
-        Which of the four redundancy rules hold; less than all of them only to show their need.
+    `classes`: `CellClass` of each cell; `rules`: which of the four redundancy rules hold; less than
+    all of them only to show their need.
     """
 
     def __init__(self, classes: AnyArray, *, rules: Collection[int] = ALL_RULES) -> None:
@@ -154,18 +150,9 @@ class PlaneMap:
     ) -> list[Dart]:
         """Remove redundant edges until no rule finds one; return them, a dart each.
 
-        Parameters
-        ----------
-        only
-            Darts, both halves of each edge, among which the edges must be chosen: what another
-            implementation removed.
-        rng
-            Order of the faces; without it, by number.
-
-        Raises
-        ------
-        ValueError
-            When a rule asks for an edge that is not in `only`.
+        `only`: darts, both halves of each edge, among which the edges must be chosen: what another
+        implementation removed; `rng`: order of the faces; without it, by number. Raises
+        `ValueError` when a rule asks for an edge that is not in `only`.
         """
         walks = {self.face[walk[0]]: list(walk) for walk in self._walks()}
         todo = sorted(self.ordinary & walks.keys())
@@ -232,17 +219,10 @@ class PlaneMap:
     def step(self, contracted: Iterable[Dart], *, removed: Collection[Dart] | None = None) -> None:
         """Make the next level of this one.
 
-        Parameters
-        ----------
-        contracted
-            The contraction kernels: a dart per edge, from the surviving vertex to the other.
-        removed
-            The removal kernels, a dart per edge in any direction; without it, this class chooses.
-
-        Raises
-        ------
-        ValueError
-            When a kernel breaks a rule or leaves an edge that a rule removes.
+        `contracted`: the contraction kernels: a dart per edge, from the surviving vertex to the
+        other; `removed`: the removal kernels, a dart per edge in any direction; without it, this
+        class chooses. Raises `ValueError` when a kernel breaks a rule or leaves an edge that a rule
+        removes.
         """
         for dart in contracted:
             self.contract(dart)

@@ -60,15 +60,8 @@ class _OnDemand:
 def on_demand(name: str) -> Callable[[type[_T]], type[_T]]:
     """Let a field of a dataclass be given as a function, which is called when it is read first.
 
-    Parameters
-    ----------
-    name
-        The field; its values are never functions.
-
-    Returns
-    -------
-    Callable
-        The decorator, for a class that `dataclass` has made.
+    `name`: the field; its values are never functions. Returns the decorator, for a class that
+    `dataclass` has made.
     """
 
     def decorate(cls: type[_T]) -> type[_T]:
@@ -84,16 +77,8 @@ def copies_alike(cls: type[_T]) -> type[_T]:
     numpy drops these flags, and for numba a writeable array is another type: every kernel would be
     compiled again for a copy. Views of mappings stay views, and a copy has its own locks.
 
-    Parameters
-    ----------
-    cls
-        A class whose instances have a `__dict__`. Arrays count if they are attributes, or in
-        tuples, lists or mappings that are attributes.
-
-    Returns
-    -------
-    type
-        The class itself.
+    `cls`: a class whose instances have a `__dict__`. Arrays count if they are attributes, or in
+    tuples, lists or mappings that are attributes.
     """
     vars_of: Any = cls
     vars_of.__getstate__ = _state_of

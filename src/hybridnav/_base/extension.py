@@ -28,10 +28,7 @@ def extensions(group: str) -> dict[str, EntryPoint]:
 def extension(group: str, name: str) -> Any:
     """Load what is registered under a name in `hybridnav.GROUP`.
 
-    Raises
-    ------
-    InvalidValueError
-        When nothing is: this package was not installed whole.
+    Raises `InvalidValueError` when nothing is: this package was not installed whole.
     """
     found = extensions(group).get(name)
     if found is None:

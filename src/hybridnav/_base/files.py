@@ -35,17 +35,9 @@ _unfinished: set[Path] = set()
 def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
     """Write a file whole or not at all: the old content survives an interrupt and a full disc.
 
-    Parameters
-    ----------
-    path
-        The file; an existing one is replaced and keeps its mode, a link stays a link.
-    content
-        The whole content, at once or in parts.
-
-    Raises
-    ------
-    OSError
-        When the file cannot be written.
+    `path`: the file; an existing one is replaced and keeps its mode, a link stays a link;
+    `content`: the whole content, at once or in parts. Raises `OSError` when the file cannot be
+    written.
     """
     if _is_no_file(path):
         _write(path, content)
@@ -73,15 +65,8 @@ def _write(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
 def check_replaceable(path: Path) -> None:
     """Test whether `replace_file` could write a file, without any change.
 
-    Parameters
-    ----------
-    path
-        The file. A pipe is not tested: its reader would take the test for the content.
-
-    Raises
-    ------
-    OSError
-        When the file could not be written.
+    `path`: the file. A pipe is not tested: its reader would take the test for the content. Raises
+    `OSError` when the file could not be written.
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -122,32 +107,16 @@ def without_controls(text: str) -> str:
     """Return a text with its control characters written out, but line ends and tabs: texts of
     others may hold sequences that a terminal obeys.
 
-    Parameters
-    ----------
-    text
-        Any text.
-
-    Returns
-    -------
-    str
-        What a terminal shows as it is.
+    Returns what a terminal shows as it is.
     """
     return _CONTROLS.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def printable(path: str | os.PathLike[str]) -> str:
-    """Return the text of a path for a message, escaped if it would break the line, and cut if it
-    is longer, or has a longer name, than file systems and people use.
+    """Return the text of a path for a message, escaped if it would break the line, and cut if it is
+    longer, or has a longer name, than file systems and people use.
 
-    Parameters
-    ----------
-    path
-        Any path.
-
-    Returns
-    -------
-    str
-        One line.
+    Returns one line.
     """
     text = str(path)
     longest = max(map(len, text.split("/")))
@@ -168,21 +137,9 @@ class NewFile:
     def named(cls, path: PathLike, what: str, kind: str, endings: tuple[str, ...]) -> Self:
         """Return the file of a name.
 
-        Parameters
-        ----------
-        path
-            The name.
-        what
-            What the file is, before its name in messages.
-        kind
-            The same with its article and format, such as "a layout".
-        endings
-            How its name may end, such as ".json".
-
-        Raises
-        ------
-        MapError
-            When it ends otherwise.
+        `what`: what the file is, before its name in messages; `kind`: the same with its article and
+        format, such as "a layout"; `endings`: how its name may end, such as ".json". Raises
+        `MapError` when it ends otherwise.
         """
         file = Path(path)
         where = f"{what} {printable(file)}"
@@ -193,10 +150,7 @@ class NewFile:
     def write(self, content: bytes) -> None:
         """Write it.
 
-        Raises
-        ------
-        MapError
-            When it cannot be written.
+        Raises `MapError` when it cannot be written.
         """
         try:
             replace_file(self.path, content)

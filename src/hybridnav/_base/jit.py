@@ -60,15 +60,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     numba keeps compiled code beside the module or in the user's home. Where it can write to neither
     (a read-only installation, a user without a home) it refuses the function; here nothing is kept.
 
-    Parameters
-    ----------
-    options
-        Options of `numba.njit`.
-
-    Returns
-    -------
-    Callable
-        The decorator.
+    `options`: options of `numba.njit`.
     """
 
     def decorate(function: Any) -> Any:
@@ -287,8 +279,7 @@ class _Kernel(_Renewed):
         options = {**self.targetoptions, "no_cpython_wrapper": True, "cache": is_kept}
         kernel: Any = numba.jit(**options)(twin)
         kernel.__class__ = _Inner
-        inner: _Inner = kernel
-        return inner
+        return kernel
 
     @property
     def _numba_type_(self) -> Any:

@@ -32,19 +32,9 @@ Quaternion = tuple[float, float, float, float]
 def value_of(message: Any, path: str, what: str) -> Any:
     """Return a field of a message.
 
-    Parameters
-    ----------
-    message
-        A mapping, or an object with attributes; so are the messages in it.
-    path
-        Names joined by dots.
-    what
-        Name of the message in errors.
-
-    Raises
-    ------
-    InvalidValueError
-        When the message has no such field.
+    `message`: a mapping, or an object with attributes; so are the messages in it; `path`: names
+    joined by dots; `what`: name of the message in errors. Raises `InvalidValueError` when the
+    message has no such field.
     """
     value = message
     for name in path.split("."):
@@ -89,15 +79,9 @@ def count_of(message: Any, path: str, what: str) -> int:
 def quaternion_of(message: Any, path: str, what: str) -> Quaternion:
     """Return a field that is a quaternion, with the norm 1.
 
-    Parameters
-    ----------
-    message, path, what
-        As in `value_of`; the field has x, y, z and w.
-
-    Raises
-    ------
-    InvalidValueError
-        When a number is missing or not finite, or the squared norm is 0.01 or more away from 1.
+    `message`, `path`, `what`: as in `value_of`; the field has x, y, z and w. Raises
+    `InvalidValueError` when a number is missing or not finite, or the squared norm is 0.01 or more
+    away from 1.
     """
     x, y, z, w = (number_of(message, f"{path}.{name}", what) for name in "xyzw")
     norm = math.hypot(x, y, z, w)
@@ -244,15 +228,8 @@ def header_message(frame_id: str, stamp_ns: int) -> dict[str, Any]:
 def stamp_ns_of(message: Any, what: str) -> int:
     """Return the time of the header of a message, in nanoseconds; names as in ROS 2 or ROS 1.
 
-    Parameters
-    ----------
-    message, what
-        As in `value_of`.
-
-    Raises
-    ------
-    InvalidValueError
-        When it has no time, or one that does not fit.
+    `message`, `what`: see `value_of`. Raises `InvalidValueError` when it has no time, or one that
+    does not fit.
     """
     stamp = value_of(message, "header.stamp", what)
     names = ("sec", "nanosec") if _has(stamp, "sec") else ("secs", "nsecs")

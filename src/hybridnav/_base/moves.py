@@ -58,14 +58,8 @@ _INVERSE = DIAGONAL % STRAIGHT
 def moves_along(moves: ByteArray, cols: int, direction: int) -> tuple[LongArray, LongArray]:
     """Return the flat cells that the legal moves in one direction lead from, and to.
 
-    Parameters
-    ----------
-    moves
-        uint8 (rows * cols,), masks of the legal moves, as `legal_moves` returns them.
-    cols
-        Columns of the map.
-    direction
-        From 0 to 7.
+    `moves`: uint8 (rows * cols,), masks of the legal moves, as `legal_moves` returns them; `cols`:
+    columns of the map; `direction`: from 0 to 7.
     """
     tail = np.flatnonzero(moves >> direction & 1)
     row_step, col_step = STEPS[direction].tolist()
@@ -75,21 +69,13 @@ def moves_along(moves: ByteArray, cols: int, direction: int) -> tuple[LongArray,
 def length_in_cells(cost: ArrayLike) -> FloatArray:
     """Return the path lengths of integer costs, recounted as a + b sqrt 2 of their moves.
 
-    Parameters
-    ----------
-    cost
-        Sums of STRAIGHT and DIAGONAL, >= 0, any shape.
-
-    Returns
-    -------
-    FloatArray
-        Lengths in cells, same shape; exact below 80782 diagonal moves, and within 1e-5 beyond.
+    `cost`: sums of STRAIGHT and DIAGONAL, >= 0, any shape. Result: lengths in cells, same shape;
+    exact below 80782 diagonal moves, and within 1e-5 beyond.
     """
     total = np.asarray(cost, dtype=np.int64)
     diagonal = total % STRAIGHT * _INVERSE % STRAIGHT
     straight = (total - diagonal * DIAGONAL) // STRAIGHT
-    length: FloatArray = straight + diagonal * math.sqrt(2.0)
-    return length
+    return straight + diagonal * math.sqrt(2.0)
 
 
 def length_of_cost(cost: int) -> float:
@@ -101,10 +87,7 @@ def length_of_cost(cost: int) -> float:
 def path_length_in_cells(cells: LongArray) -> float:
     """Return the length of a path of 8-neighbour moves, counted as a + b sqrt 2.
 
-    Parameters
-    ----------
-    cells
-        `(row, col)` of the cells passed, shape `(n, 2)`, n >= 1.
+    `cells`: `(row, col)` of the cells passed, shape `(n, 2)`, n >= 1.
     """
     diagonal = int((np.abs(np.diff(cells, axis=0)).sum(axis=1) == 2).sum())  # noqa: PLR2004
     return (len(cells) - 1 - diagonal) + diagonal * math.sqrt(2.0)
@@ -113,10 +96,7 @@ def path_length_in_cells(cells: LongArray) -> float:
 def cost_of(cells: LongArray) -> int:
     """Return the integer cost of a path of 8-neighbour moves; see `STRAIGHT`.
 
-    Parameters
-    ----------
-    cells
-        `(row, col)` of the cells passed, shape `(n, 2)`, n >= 1.
+    `cells`: `(row, col)` of the cells passed, shape `(n, 2)`, n >= 1.
     """
     diagonal = int((np.abs(np.diff(cells, axis=0)).sum(axis=1) == 2).sum())  # noqa: PLR2004
     return (len(cells) - 1 - diagonal) * STRAIGHT + diagonal * DIAGONAL

@@ -37,18 +37,11 @@ class Spread(NamedTuple):
 class Motion:
     """Motion of a robot between the points of a path, one row a step.
 
-    Parameters
-    ----------
-    points
-        float64 (n, 2), n >= 1, metres.
-    headings_rad
-        float64 (n,), None for a robot that faces its direction of travel.
-    curved
-        Whether the robot drives an arc of a circle from each pose to the next, tangent to both
-        headings; else a straight line, on which it turns evenly.
-    start_rad, goal_rad
-        Heading from which it turns on the spot at the first point, and to which at the last one;
-        None for no turn.
+    `points`: float64 (n, 2), n >= 1, metres; `headings_rad`: float64 (n,), None for a robot that
+    faces its direction of travel; `curved`: whether the robot drives an arc of a circle from each
+    pose to the next, tangent to both headings; else a straight line, on which it turns evenly;
+    `start_rad`, `goal_rad`: heading from which it turns on the spot at the first point, and to
+    which at the last one; None for no turn.
     """
 
     points: FloatArray
@@ -59,13 +52,11 @@ class Motion:
 
     @property
     def _steps(self) -> FloatArray:
-        steps: FloatArray = np.diff(self.points, axis=0)
-        return steps
+        return np.diff(self.points, axis=0)
 
     @property
     def _chords(self) -> FloatArray:
-        chords: FloatArray = np.hypot(*self._steps.T)
-        return chords
+        return np.hypot(*self._steps.T)
 
     @property
     def _travel(self) -> FloatArray:
@@ -171,10 +162,8 @@ class Motion:
 
         No pose occurs twice in a row; two poses at one point are a turn on the spot.
 
-        Raises
-        ------
-        InvalidValueError
-            When the spacing is not positive, or there would be more than ten million poses.
+        Raises `InvalidValueError` when the spacing is not positive, or there would be more than ten
+        million poses.
         """
         left = np.append((self._chords > 0) | (np.abs(self._turns) > BEND), True)
         if not left.all():  # turns by less than a bend are none
@@ -283,8 +272,7 @@ def _differ(one_rad: float, other_rad: float) -> bool:
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:
     """Return angles wrapped to [-pi, pi)."""
-    turned: FloatArray = (angles_rad + np.pi) % (2 * np.pi) - np.pi
-    return turned
+    return (angles_rad + np.pi) % (2 * np.pi) - np.pi
 
 
 def _part(along_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
@@ -301,5 +289,4 @@ def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     last[last < 0] = int(np.flatnonzero(known)[0])
-    filled: FloatArray = values[last]
-    return filled
+    return values[last]

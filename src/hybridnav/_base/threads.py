@@ -42,12 +42,7 @@ def behind(begun: threading.Lock, work: Callable[[], object]) -> None:
 
     A process may end before it; if memory does not suffice, it stays undone.
 
-    Parameters
-    ----------
-    begun
-        A lock that is held from now on; a copy, which has a lock of its own, begins anew.
-    work
-        The work.
+    `begun`: a lock that is held from now on; a copy, which has a lock of its own, begins anew.
     """
 
     def alone() -> None:
@@ -64,19 +59,8 @@ def start_module(module: str, *arguments: str, **pipes: Any) -> subprocess.Popen
     An interrupt from the keyboard does not reach it, and it finds no modules in the working
     directory, whose files may have their names: Python 3.10 has no `-P`.
 
-    Parameters
-    ----------
-    module
-        Its name.
-    arguments
-        Its command line.
-    pipes
-        Options of `subprocess.Popen`.
-
-    Returns
-    -------
-    subprocess.Popen
-        The process. It does not warn where no compiled code can be kept: this one does.
+    `pipes`: options of `subprocess.Popen`. Returns the process. It does not warn where no compiled
+    code can be kept: this one does.
     """
     paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
     return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
@@ -94,10 +78,7 @@ class Pool(Generic[T]):
     A query that ends in an exception, as when the user interrupts it, does not return its arrays:
     they may be half written.
 
-    Parameters
-    ----------
-    make
-        Function that makes the arrays of one query.
+    `make`: function that makes the arrays of one query.
     """
 
     def __init__(self, make: Callable[[], T]) -> None:

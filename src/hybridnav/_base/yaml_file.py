@@ -50,29 +50,13 @@ def read_yaml(
 ) -> dict[str, Any]:
     """Read a YAML mapping from a file that may be damaged or hostile.
 
-    Parameters
-    ----------
-    path
-        The file: UTF-8, at most 1 MiB, one document, at most 10,000 values nested at most 32 deep;
-        anchors, aliases, tags and duplicate keys are refused.
-    what
-        What the file is to its reader, as messages begin with it: "map", "preset".
-    error
-        Class of the error for an unreadable file.
-    missing
-        What to raise when there is no such file; `error` by default.
-    limits
-        How large the file may be, where it is more than settings.
-
-    Returns
-    -------
-    dict of str to Any
-        The mapping, as PyYAML's safe loader understands it.
-
-    Raises
-    ------
-    HybridNavError
-        Of the type `error` or `missing`; one line that names the file and, where known, the line.
+    `path`: the file: UTF-8, at most 1 MiB, one document, at most 10,000 values nested at most 32
+    deep; anchors, aliases, tags and duplicate keys are refused; `what`: what the file is to its
+    reader, as messages begin with it: "map", "preset"; `error`: class of the error for an
+    unreadable file; `missing`: what to raise when there is no such file; `error` by default;
+    `limits`: how large the file may be, where it is more than settings. Returns the mapping, as
+    PyYAML's safe loader understands it. Raises `HybridNavError`: of the type `error` or `missing`;
+    one line that names the file and, where known, the line.
     """
     return read_marked(path, what=what, error=error, missing=missing, limits=limits).values
 
@@ -93,8 +77,7 @@ class Marked:
                 node = node.value[key]
             else:
                 node = next(value for name, value in node.value if name.value == key)
-        found: Node = node
-        return found
+        return node
 
     def line(self, *keys: str | int) -> int:
         """Return the line of a value, from 1."""
@@ -111,20 +94,8 @@ def read_marked(
 ) -> Marked:
     """Read a YAML mapping as `read_yaml` does, with the places of its values.
 
-    Parameters
-    ----------
-    path, what, error, missing, limits
-        As of `read_yaml`.
-
-    Returns
-    -------
-    Marked
-        The mapping.
-
-    Raises
-    ------
-    HybridNavError
-        Of the type `error` or `missing`, as by `read_yaml`.
+    `path`, `what`, `error`, `missing`, `limits`: see `read_yaml`. Raises `HybridNavError`: of the
+    type `error` or `missing`, as by `read_yaml`.
     """
     where = f"{what} {printable(path)}"
     text = read_text(
@@ -143,21 +114,8 @@ def read_marked(
 def parse_document(text: str, where: str, error: type[HybridNavError], limits: Limits) -> Any:
     """Return the value of a YAML document of any form, which may be damaged or hostile.
 
-    Parameters
-    ----------
-    text
-        The document.
-    where
-        What messages begin with.
-    error
-        Class of the error for an unreadable text.
-    limits
-        How much is read.
-
-    Raises
-    ------
-    HybridNavError
-        Of the type `error`, one line.
+    `where`: what messages begin with; `error`: class of the error for an unreadable text; `limits`:
+    how much is read. Raises `HybridNavError`: of the type `error`, one line.
     """
     return _constructed(text, where, error, limits)[0]
 
@@ -173,19 +131,9 @@ def read_text(  # noqa: PLR0913 - keywords, most of them passed on
 ) -> str:
     """Read a file of UTF-8 text.
 
-    Parameters
-    ----------
-    path, what, error, missing
-        As of `read_yaml`.
-    max_bytes
-        Most bytes that are read.
-    kind
-        Name of the format in messages.
-
-    Raises
-    ------
-    HybridNavError
-        Of the type `error` or `missing`, one line.
+    `path`, `what`, `error`, `missing`: see `read_yaml`; `max_bytes`: most bytes that are read;
+    `kind`: name of the format in messages. Raises `HybridNavError`: of the type `error` or
+    `missing`, one line.
     """
     where = f"{what} {printable(path)}"
     with open_file(path, what=what, error=error, missing=missing or error) as stream:
@@ -204,24 +152,11 @@ def open_file(
 ) -> BinaryIO:
     """Open a regular file for reading bytes.
 
-    Parameters
-    ----------
-    path
-        The file. Directories, and devices and pipes that could block or never end, are refused.
-    what
-        What the file is to its reader, as messages begin with it.
-    error, missing
-        What to raise when the file cannot be opened, and when it is not there.
-
-    Returns
-    -------
-    BinaryIO
-        The open file; the caller closes it.
-
-    Raises
-    ------
-    HybridNavError
-        Of the type `error` or `missing`; one line that names the file.
+    `path`: the file. Directories, and devices and pipes that could block or never end, are refused.
+    `what`: what the file is to its reader, as messages begin with it; `error`, `missing`: what to
+    raise when the file cannot be opened, and when it is not there. Returns the open file; the
+    caller closes it. Raises `HybridNavError`: of the type `error` or `missing`; one line that names
+    the file.
     """
     where = f"{what} {printable(path)}"
     try:
@@ -242,15 +177,7 @@ def open_file(
 def parse_value(text: str) -> Any:
     """Return the value of a text of YAML that the user typed; numbers as in files.
 
-    Parameters
-    ----------
-    text
-        One document.
-
-    Raises
-    ------
-    yaml.YAMLError, ValueError, RecursionError
-        When it is none.
+    `text`: one document. Raises `yaml.YAMLError, ValueError, RecursionError` when it is none.
     """
     loader = _PlainLoader(text)
     try:

@@ -124,15 +124,8 @@ def _options(version: VersionOption = False) -> None:
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code; everything but results is a line on stderr.
 
-    Parameters
-    ----------
-    arguments
-        What follows the program's name.
-
-    Returns
-    -------
-    int
-        0 solved, 1 not solved, 2 wrong usage, 3 unreadable input.
+    `arguments`: what follows the program's name. Result: 0 solved, 1 not solved, 2 wrong usage, 3
+    unreadable input.
     """
     command = typer.main.get_command(app)
     with warnings.catch_warnings(), notice_of_compiling():

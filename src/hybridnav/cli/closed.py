@@ -80,14 +80,8 @@ def change_closed(
 ) -> None:
     """Close and open things in the journal of a file; all are checked before one is closed.
 
-    Parameters
-    ----------
-    map_file
-        A map or a building.
-    close, open_again, why
-        As the options of `hybridnav closed`.
-    check
-        Refuses what is not there.
+    `map_file`: a map or a building; `close`, `open_again`, `why`: as the options of
+    `hybridnav closed`; `check`: refuses what is not there.
     """
     from hybridnav.planner import Journal, OutOfOrder  # noqa: PLC0415 - loads shapely
 

@@ -76,10 +76,7 @@ def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
 def progress_bar(text: str) -> Iterator[Progress]:
     """Draw a bar on stderr where that is a terminal.
 
-    Returns
-    -------
-    Iterator
-        What to call with the number of steps done and of all.
+    Returns what to call with the number of steps done and of all.
     """
     if not sys.stderr.isatty():
         yield no_progress

@@ -204,10 +204,7 @@ class Costs:
 def parsed_costs(specs: list[str] | None) -> Costs:
     """Return what the options `--costs` state.
 
-    Raises
-    ------
-    UsageError
-        When one of them has another form.
+    Raises `UsageError` when one of them has another form.
     """
     from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
 
@@ -246,10 +243,7 @@ _KINDS = frozenset({"door", "room", "keepout"})
 def out_of_order(map_file: Path) -> list[str]:
     """Return what the journal beside a map closes, as `--blocked` takes it.
 
-    Raises
-    ------
-    MapError
-        When the journal cannot be read, or is that of a building.
+    Raises `MapError` when the journal cannot be read, or is that of a building.
     """
     if not map_file.with_name(f"{map_file.stem}.closed.yaml").exists():
         return []
@@ -319,10 +313,8 @@ def profile_lines(stated: dict[str, str] | None) -> list[str]:
 def parsed_closing(texts: list[str] | None) -> Closing:
     """Read the values of the option.
 
-    Raises
-    ------
-    UsageError
-        When a door has no number, a room or a file no name, or a mask other settings.
+    Raises `UsageError` when a door has no number, a room or a file no name, or a mask other
+    settings.
     """
     doors, rooms, files, masks = [], [], [], []
     for text in texts or ():

@@ -49,16 +49,9 @@ class MapOptions:
     ) -> Preset:
         """Return the preset with the settings of the command line, which win over it.
 
-        Parameters
-        ----------
-        map_file
-            A map, or a model, which holds a preset.
-        preset
-            The preset where the command line names none.
-        overrides
-            Settings beside those of the command line, which win over them.
-        smooth
-            How to shorten the path; None as in the preset.
+        `map_file`: a map, or a model, which holds a preset; `preset`: the preset where the command
+        line names none; `overrides`: settings beside those of the command line, which win over
+        them; `smooth`: how to shorten the path; None as in the preset.
         """
         return read_settings(
             preset if self.preset is None else self.preset,
@@ -80,19 +73,11 @@ def with_map(
 ) -> Callable[[Any], Any]:
     """Give a command the options of `MapOptions`, which it takes as its argument `reading`.
 
-    Parameters
-    ----------
-    before
-        The parameter of the command before which the help lists them; they are last if it has none.
-    without
-        Options that the command has itself.
-    over_floors
-        Returns what runs the command if its map is a building: its parameters are the options that
-        mean something then. None for a command that takes no buildings.
-    reads
-        Options of `MapOptions` that mean something then.
-    alone
-        Options that mean something for buildings alone.
+    `before`: the parameter of the command before which the help lists them; they are last if it has
+    none; `without`: options that the command has itself; `over_floors`: returns what runs the
+    command if its map is a building: its parameters are the options that mean something then. None
+    for a command that takes no buildings. `reads`: options of `MapOptions` that mean something
+    then; `alone`: options that mean something for buildings alone.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:

@@ -67,14 +67,8 @@ def query_of(waypoints: Sequence[Waypoint]) -> str:
 def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict[str, Any]) -> str:
     """Return the lines that describe an answer to a person.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    waypoints
-        What was asked for.
-    figures
-        Those of a plan or, with `words`, of a tour, and of what was asked for beside it.
+    `waypoints`: what was asked for; `figures`: those of a plan or, with `words`, of a tour, and of
+    what was asked for beside it.
     """
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [

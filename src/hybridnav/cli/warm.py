@@ -78,15 +78,7 @@ def compiling_beside(preset: Preset) -> Iterator[Callable[[], None]]:
     Only where neither was compiled before, there is a folder to keep it in, and a processor is
     free; else nothing happens.
 
-    Parameters
-    ----------
-    preset
-        The preset that will plan.
-
-    Yields
-    ------
-    Callable
-        Waits until it is compiled.
+    `preset`: the preset that will plan. The result waits until it is compiled.
     """
     job = preset.planner.underlying.method
     if job not in SEARCHES or cores() == 1 or not _is_cold(job):

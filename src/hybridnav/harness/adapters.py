@@ -96,13 +96,8 @@ class HybridMethod:
 class FoundMethod:
     """A search method that a preset could name too, as a method of the harness.
 
-    Parameters
-    ----------
-    method
-        Answers a `Query` with a `Found`; its `prepare`, if it has one, is called here. Its `name`,
-        `n_nodes`, `n_edges`, `memory_bytes`, `version` and `settings` are shown if it has them.
-    grid
-        The map.
+    `method`: answers a `Query` with a `Found`; its `prepare`, if it has one, is called here. Its
+    `name`, `n_nodes`, `n_edges`, `memory_bytes`, `version` and `settings` are shown if it has them.
     """
 
     def __init__(self, method: search.Method, grid: OccupancyGrid) -> None:
@@ -221,10 +216,7 @@ _MOST_RADIUS_M = 1e3
 def checked_grid(given: Any) -> dict[str, Any]:
     """Return the settings of a grid of its own as a file of methods states them.
 
-    Raises
-    ------
-    InvalidValueError
-        When a key or a value is not known.
+    Raises `InvalidValueError` when a key or a value is not known.
     """
     if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
         raise InvalidValueError(
@@ -247,12 +239,7 @@ class OnOwnGrid:
     Its paths are judged on the grid of the run. Its plans, its bounds and its "no path" are about
     its own grid: they are not passed on, and a query without a path has no answer.
 
-    Parameters
-    ----------
-    method
-        The method, made for `grid`.
-    grid
-        Its grid, of the same cells as that of the run.
+    `method`: the method, made for `grid`; `grid`: its grid, of the same cells as that of the run.
     """
 
     region_of = None

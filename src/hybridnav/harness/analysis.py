@@ -335,10 +335,7 @@ def _metric_of(
 ) -> Yardstick:
     """Return the yardstick for the runs in a folder, which all have the same costs.
 
-    Raises
-    ------
-    InvalidValueError
-        When they have not, or there are no costs to refer to.
+    Raises `InvalidValueError` when they have not, or there are no costs to refer to.
     """
     costs = {str(record.get("costs", "")) for record in preparations.values()}
     if len(costs) > 1:

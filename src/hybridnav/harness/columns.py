@@ -154,17 +154,9 @@ def loss_columns(optimum: Optimum) -> tuple[str, ...]:
 def consistency_row(outcomes: Sequence[Outcome]) -> Row:
     """Return the contradictions of one method on some maps, by kind.
 
-    Parameters
-    ----------
-    outcomes
-        Outcomes of the method, one for each map.
-
-    Returns
-    -------
-    dict
-        By column: for each kind a text "WRONG of CHECKED", empty where nothing was checked, and
-        both numbers as "KIND wrong" and "KIND checked". A record with several contradictions of a
-        kind counts once.
+    `outcomes`: outcomes of the method, one for each map. Result: by column: for each kind a text
+    "WRONG of CHECKED", empty where nothing was checked, and both numbers as "KIND wrong" and "KIND
+    checked". A record with several contradictions of a kind counts once.
     """
     wrong: Counter[Kind] = Counter()
     checked: Counter[Kind] = Counter()
@@ -238,21 +230,11 @@ def figures(
 ) -> Row:
     """Return the figures of one method on some maps.
 
-    Parameters
-    ----------
-    outcomes
-        Outcomes of the method, one for each map.
-    references
-        Outcomes of the reference on the same maps, in the same order.
-    common
-        The pairs over which methods are compared: losses, times and expansions are theirs.
-
-    Returns
-    -------
-    dict
-        By column, see `MEANINGS`. Nodes, memory and preparation are means over the maps. Columns
-        about costs are those of runs with costs alone; losses over an optimum that no pair has are
-        left out.
+    `outcomes`: outcomes of the method, one for each map; `references`: outcomes of the reference on
+    the same maps, in the same order; `common`: the pairs over which methods are compared: losses,
+    times and expansions are theirs. Result: by column, see `MEANINGS`. Nodes, memory and
+    preparation are means over the maps. Columns about costs are those of runs with costs alone;
+    losses over an optimum that no pair has are left out.
     """
     pool = _Pool(outcomes, common)
     lengths = pool.of(attrgetter("lengths_m"))
@@ -373,10 +355,7 @@ def _break_even(price: float, gain: float) -> float:
 
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return quotients, NaN for a zero divisor."""
-    quotients: FloatArray = np.divide(
-        first, second, out=np.full(len(first), math.nan), where=second > 0
-    )
-    return quotients
+    return np.divide(first, second, out=np.full(len(first), math.nan), where=second > 0)
 
 
 def rows_of_map(study: Study, name: str) -> list[Row]:

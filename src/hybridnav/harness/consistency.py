@@ -83,8 +83,7 @@ class Consistency:
     def _keys(self, regions: IntArray) -> LongArray:
         """Return one number for each unordered pair of regions."""
         low, high = regions.min(axis=1), regions.max(axis=1)
-        keys: LongArray = low.astype(np.int64) * self._count + high
-        return keys
+        return low.astype(np.int64) * self._count + high
 
     def check_regions(self) -> list[tuple[str, tuple[Cell, Cell]]]:
         """Check that every region is connected, and that solvability agrees for every pair of free
@@ -236,8 +235,7 @@ class Consistency:
         keys = self._keys(pairs)
         at = np.minimum(np.searchsorted(self._links, keys), max(len(self._links) - 1, 0))
         found = self._links[at] == keys if len(self._links) else np.zeros(len(keys), np.bool_)
-        linked: BoolArray = found | (pairs[:, 0] == pairs[:, 1])
-        return linked
+        return found | (pairs[:, 0] == pairs[:, 1])
 
     def joined(self, start: Cell, goal: Cell) -> bool:
         """Return whether the metric layer joins two cells, by scipy's connected components."""

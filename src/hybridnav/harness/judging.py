@@ -50,20 +50,11 @@ class Judge:
     """Judge of the answers on one map. Code that the planners do not share judges paths and plans;
     only the best path inside a plan's regions is found by their grid search.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    prepared
-        The method.
-    reference
-        Whether the lengths of this method are the optimum: then they are checked against other
-        optima too, and any-angle lengths are recorded. With costs its costs are the optimum.
-    costs
-        Costs of the cells, by which paths are judged too; None for lengths.
-    sample
-        Pairs whose octile optimum scipy computes too, and whose any-angle optimum a search of the
-        visibility graph; None for all.
+    `reference`: whether the lengths of this method are the optimum: then they are checked against
+    other optima too, and any-angle lengths are recorded. With costs its costs are the optimum.
+    `costs`: costs of the cells, by which paths are judged too; None for lengths; `sample`: pairs
+    whose octile optimum scipy computes too, and whose any-angle optimum a search of the visibility
+    graph; None for all.
     """
 
     def __init__(
@@ -295,12 +286,7 @@ class CostJudge:
     factor is below 1, so that a proved bound on lengths is one on costs too: it is recorded for
     methods that state none on costs.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    layer
-        Costs of its cells.
+    `layer`: costs of its cells.
     """
 
     def __init__(self, grid: OccupancyGrid, layer: CostLayer) -> None:
@@ -318,12 +304,8 @@ class CostJudge:
         """Return the fields that the record of a legal path has with costs, and faults of its
         claims.
 
-        Parameters
-        ----------
-        answer
-            The answer, whose path has no fault.
-        length_m
-            The length of the path, counted anew.
+        `answer`: the answer, whose path has no fault; `length_m`: the length of the path, counted
+        anew.
         """
         line, claim = answer.any_angle, answer.by_costs
         if line is not None:

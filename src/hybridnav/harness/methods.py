@@ -126,12 +126,8 @@ def preset_spec(
 
     In a run with costs those take the place of the preset's own.
 
-    Raises
-    ------
-    InvalidValueError
-        When the preset plans in a metric in which the harness has nothing to compare with.
-    OmplError
-        When it needs OMPL, which is not installed.
+    Raises `InvalidValueError` when the preset plans in a metric in which the harness has nothing to
+    compare with. Raises `OmplError` when it needs OMPL, which is not installed.
     """
     preset = load_preset(source)
     _check_metric(preset, by_costs=by_costs)
@@ -176,10 +172,7 @@ def baseline_spec(
     Names are those of `BASELINES`, or as in the literature, such as "HPA*". An entry of a file of
     methods adds a name and settings.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is none of that name, or its class cannot be imported.
+    Raises `InvalidValueError` when there is none of that name, or its class cannot be imported.
     """
     if ":" not in name:
         name = baseline_name(name, BASELINES)
@@ -199,10 +192,8 @@ def named_spec(
 ) -> MethodSpec:
     """Return the method of an entry of a file of methods.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is no such baseline or class, or settings do not go with the source.
+    Raises `InvalidValueError` when there is no such baseline or class, or settings do not go with
+    the source.
     """
     if method.grid and by_costs:
         raise InvalidValueError(

@@ -79,10 +79,7 @@ class NamedMethod:
 def baseline_name(name: str, known: Iterable[str]) -> str:
     """Return the baseline of a name or an alias, such as "hpa-star" of "HPA*".
 
-    Raises
-    ------
-    InvalidValueError
-        When there is none; the message names those that look like it.
+    Raises `InvalidValueError` when there is none; the message names those that look like it.
     """
     plain = "-".join(name.lower().replace("*", "-star").split()).replace("--", "-")
     found = ALIASES.get(plain, plain)
@@ -104,10 +101,7 @@ def baseline_name(name: str, known: Iterable[str]) -> str:
 def class_of(path: str) -> Any:
     """Return the class of a path `module:class`.
 
-    Raises
-    ------
-    InvalidValueError
-        When it cannot be imported; the last line of the reason.
+    Raises `InvalidValueError` when it cannot be imported; the last line of the reason.
     """
     module, _, attribute = path.partition(":")
     try:

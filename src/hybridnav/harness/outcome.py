@@ -281,8 +281,7 @@ def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
     """Return lengths over the best ones, minus one. Values that are below zero by rounding alone
     become zero."""
     loss = lengths / best - 1
-    rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -ANY_ANGLE_SLACK), 0.0, loss)
-    return rounded
+    return np.where((loss <= SLACK) & (loss >= -ANY_ANGLE_SLACK), 0.0, loss)
 
 
 def _gaps(costs: FloatArray, bounds: FloatArray) -> FloatArray:

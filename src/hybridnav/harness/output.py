@@ -135,21 +135,9 @@ def report_of(
 ) -> ReportData:
     """Return the contents of the report.
 
-    Parameters
-    ----------
-    study
-        The study.
-    title
-        Title of the report.
-    overall, by_map
-        Rows of all maps together, and of each map.
-    first
-        Number of the first section, in a report that has sections of other studies before it.
-
-    Returns
-    -------
-    ReportData
-        With a section of all maps together only where there are several.
+    `overall`, `by_map`: rows of all maps together, and of each map; `first`: number of the first
+    section, in a report that has sections of other studies before it. It has a section of all
+    maps together only where there are several.
     """
     drawn: dict[CaseKey, str] = {}
     maps = [

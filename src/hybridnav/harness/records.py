@@ -80,15 +80,8 @@ def _processor() -> str:
 class RecordFile:
     """The records of one run. Opening it drops a last line that a kill cut short.
 
-    Parameters
-    ----------
-    folder
-        Folder of `records.jsonl`, which may be missing.
-
-    Raises
-    ------
-    InvalidValueError
-        When the file holds a line that is no record.
+    `folder`: folder of `records.jsonl`, which may be missing. Raises `InvalidValueError` when the
+    file holds a line that is no record.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -182,11 +175,8 @@ def commands_of(folder: Path) -> list[str]:
 def read_records(folder: Path) -> list[Record]:
     """Return all whole records of a run in the order written; none without a file.
 
-    Raises
-    ------
-    InvalidValueError
-        When the file cannot be read, or a line of it is no record, or one of an older version whose
-        any-angle length is not proved to be shortest.
+    Raises `InvalidValueError` when the file cannot be read, or a line of it is no record, or one of
+    an older version whose any-angle length is not proved to be shortest.
     """
     path = folder / RECORDS_FILE
     records: list[Record] = []
@@ -223,10 +213,7 @@ _RUN = re.compile(r"([a-h])(\d{1,9})|\((-?\d{1,18}),(-?\d{1,18})\)")
 def encode_path(cells: LongArray) -> str:
     """Write a path's moves, such as "a12b3": twelve steps east, three north-east.
 
-    Parameters
-    ----------
-    cells
-        int64 (n, 2), n >= 1. A step that leads to no neighbour is written as "(rows,cols)".
+    `cells`: int64 (n, 2), n >= 1. A step that leads to no neighbour is written as "(rows,cols)".
     """
     steps = np.diff(cells, axis=0)
     ends = np.flatnonzero((steps[1:] != steps[:-1]).any(axis=1)) + 1
@@ -249,10 +236,7 @@ def path_steps(text: str) -> int:
 def decode_path(start: tuple[int, int], text: str) -> LongArray:
     """Return the cells of a path from its first cell and its moves.
 
-    Raises
-    ------
-    InvalidValueError
-        When the text is no path.
+    Raises `InvalidValueError` when the text is no path.
     """
     runs = []
     end = total = 0
@@ -267,5 +251,4 @@ def decode_path(start: tuple[int, int], text: str) -> LongArray:
     if end != len(text):
         raise InvalidValueError(f"no path: {text[end : end + 20]!r:.80} at character {end}")
     steps = [np.repeat(step, times, axis=0) for step, times in runs]
-    cells: LongArray = np.cumsum(np.concatenate([np.array([start]), *steps]), axis=0)
-    return cells
+    return np.cumsum(np.concatenate([np.array([start]), *steps]), axis=0)

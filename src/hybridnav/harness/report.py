@@ -71,12 +71,8 @@ class Chart:
 class Charts:
     """The charts of a report, in which each method looks the same.
 
-    Parameters
-    ----------
-    names
-        Methods of the report, in its order; they may repeat.
-    metric_of
-        The metric of the paths of a method, octile where it has none.
+    `names`: methods of the report, in its order; they may repeat; `metric_of`: the metric of the
+    paths of a method, octile where it has none.
     """
 
     def __init__(self, names: Iterable[str], metric_of: Mapping[str, str]) -> None:
@@ -145,12 +141,7 @@ class Charts:
 def paths_uri(grid: OccupancyGrid, path: FloatArray, shortest: FloatArray | None) -> str:
     """Return the picture of a path and a shortest one as a PNG, half as large as an SVG.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    path, shortest
-        float64 (n, 2), points `(x, y)` in metres.
+    `path`, `shortest`: float64 (n, 2), points `(x, y)` in metres.
     """
     ax = plot_paths(grid, path, shortest, title="", width_in=_CASE_WIDTH_IN)
     drawn, small = io.BytesIO(picture_bytes(ax, ".png", dpi=_CASE_DPI)), io.BytesIO()
@@ -243,18 +234,11 @@ class ReportData:
 def render_report(report: ReportData) -> str:
     """Return the report as one HTML text without scripts and without references to other files.
 
-    Equal data give equal text. Losses and times that are not finite are left out of the charts,
-    and so are methods that have none left; each chart names those.
+    Equal data give equal text. Losses and times that are not finite are left out of the charts, and
+    so are methods that have none left; each chart names those.
 
-    Parameters
-    ----------
-    report
-        What to show. Texts may hold any characters.
-
-    Returns
-    -------
-    str
-        An HTML document, to be written as UTF-8.
+    `report`: what to show. Texts may hold any characters. Returns an HTML document, to be written
+    as UTF-8.
     """
     from hybridnav.harness.report import Charts  # noqa: PLC0415 - loads matplotlib
 
@@ -302,18 +286,8 @@ CaseKey = tuple[str, str, str]
 def counter_examples(study: Study, drawn: dict[CaseKey, str]) -> list[CounterExample]:
     """Return the contradictions of a study, up to `MAX_FAULTS_SHOWN` of them.
 
-    Parameters
-    ----------
-    study
-        The study.
-    drawn
-        Anchors of the pictures of those that are drawn.
-
-    Returns
-    -------
-    list of CounterExample
-        The first of each method, then the second of each, and so on; a line about the number of
-        others last.
+    `drawn`: anchors of the pictures of those that are drawn. Returns the first of each method, then
+    the second of each, and so on; a line about the number of others last.
     """
     ranked = [
         (rank, outcome, record, text)

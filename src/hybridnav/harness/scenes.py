@@ -76,12 +76,8 @@ def read_map(spec: MapSpec) -> OccupancyGrid:
 def read_scene(spec: MapSpec) -> Scene:
     """Return the map of a file with its costs; the last two are kept.
 
-    Raises
-    ------
-    InvalidValueError
-        When the costs have another form, or are those of another map.
-    MapError
-        When a file cannot be read.
+    Raises `InvalidValueError` when the costs have another form, or are those of another map. Raises
+    `MapError` when a file cannot be read.
     """
     grid = read_map(replace(spec, costs=()))
     given = spec.costs
@@ -176,31 +172,14 @@ def sample_pairs(
 ) -> list[Pair]:
     """Draw pairs of free cells, stratified by distance.
 
-    Parameters
-    ----------
-    grid
-        The map, inflated.
-    count
-        Pairs in its largest component of free cells, equally many in each of five classes of
-        distance. The classes are equally wide between the least distance and the 95th percentile
-        of the distances of random pairs; the last one is open. For every twenty pairs one more
-        joins two components, if there are two.
-    seed
-        Seed of the generator (PCG64).
-    least_distance_m
-        Straight-line distance below which no pair of the largest component lies; halved as long
-        as the component has no such pair.
-
-    Returns
-    -------
-    list of Pair
-        `count` of kind "sampled", all different, fewer on a map of a few cells; then those of kind
-        "across".
-
-    Raises
-    ------
-    InvalidValueError
-        When the count or the seed is out of range.
+    `grid`: the map, inflated; `count`: pairs in its largest component of free cells, equally many
+    in each of five classes of distance. The classes are equally wide between the least distance and
+    the 95th percentile of the distances of random pairs; the last one is open. For every twenty
+    pairs one more joins two components, if there are two. `seed`: seed of the generator (PCG64);
+    `least_distance_m`: straight-line distance below which no pair of the largest component lies;
+    halved as long as the component has no such pair. Result: `count` of kind "sampled", all
+    different, fewer on a map of a few cells; then those of kind "across". Raises
+    `InvalidValueError` when the count or the seed is out of range.
     """
     if not 0 < count <= MAX_SAMPLED:
         raise InvalidValueError(f"the number of pairs must be from 1 to {MAX_SAMPLED}, got {count}")
@@ -245,8 +224,7 @@ def _stratified(
     turn[order] = np.arange(len(allowed)) - starts[stratum[order]]
     best = draws[allowed[np.lexsort((stratum, turn))]]
     first = np.sort(unique_rows(best).first)[:count]
-    chosen: LongArray = best[first]
-    return chosen
+    return best[first]
 
 
 def _across(labels: IntArray, largest: int, count: int, rng: np.random.Generator) -> list[Pair]:
@@ -262,17 +240,9 @@ def _across(labels: IntArray, largest: int, count: int, rng: np.random.Generator
 def lattice_pairs(grid: OccupancyGrid, step_m: float) -> list[Pair]:
     """Return all pairs, each in one direction, of the free cells on a lattice.
 
-    Parameters
-    ----------
-    grid
-        The map, inflated.
-    step_m
-        Distance of neighbouring lattice points in metres, rounded to whole cells.
-
-    Raises
-    ------
-    InvalidValueError
-        When the step is not positive or there would be more than ten million pairs.
+    `grid`: the map, inflated; `step_m`: distance of neighbouring lattice points in metres, rounded
+    to whole cells. Raises `InvalidValueError` when the step is not positive or there would be more
+    than ten million pairs.
     """
     if not 0 < step_m < np.inf:
         raise InvalidValueError(f"the step must be a positive length in metres, got {step_m}")
@@ -296,10 +266,7 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
     The stated optima do not hold on an inflated map, or if diagonals may cut corners: there pairs
     have none, and pairs with an endpoint that is not free are left out.
 
-    Raises
-    ------
-    InvalidValueError
-        When a scenario was made for a map of another size.
+    Raises `InvalidValueError` when a scenario was made for a map of another size.
     """
     pairs = []
     as_stated = not grid.corner_cutting and np.array_equal(grid.classes, grid.measured)

@@ -147,19 +147,8 @@ def ahead_of_presets(rows: Sequence[Row], columns: Iterable[str], presets: Colle
     Methods with a contradiction are not: what they found is no path. Figures that differ by less
     than half a per cent are equal.
 
-    Parameters
-    ----------
-    rows
-        Rows of the table, with `method` and `faults`.
-    columns
-        Columns of the table.
-    presets
-        Methods that are presets.
-
-    Returns
-    -------
-    str
-        Empty if the table holds no preset, or nothing else.
+    `rows`: rows of the table, with `method` and `faults`; `presets`: methods that are presets.
+    Result: empty if the table holds no preset, or nothing else.
     """
     own = [row for row in rows if row["method"] in presets]
     n_maps = max((row.get("maps", 1) for row in rows), default=1)

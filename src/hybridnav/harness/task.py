@@ -90,15 +90,8 @@ class Task:
 def run_task(task: Task) -> Iterator[Record]:
     """Prepare the method, answer the pairs, judge the answers.
 
-    Parameters
-    ----------
-    task
-        The map, the method, and the pairs.
-
-    Yields
-    ------
-    Record
-        The record of the preparation, then one for each pair; failures are records too.
+    `task`: the map, the method, and the pairs. Yields the record of the preparation, then one for
+    each pair; failures are records too.
     """
     scene = read_scene(task.map)
     common = {

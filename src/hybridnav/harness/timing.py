@@ -78,10 +78,7 @@ class TimingTask:
     def run(self) -> Iterator[Record]:
         """Prepare the methods, and time the pairs.
 
-        Yields
-        ------
-        Record
-            One of the beginning, then one for each pair.
+        Yields one of the beginning, then one for each pair.
         """
         scene = read_scene(self.map)
         if scene.digest != self.map_sha:
@@ -245,18 +242,9 @@ def lay_times(
 
     The pass with the most methods on a map counts, the last one of equals.
 
-    Parameters
-    ----------
-    timed
-        Records of timing passes.
-    pairs
-        Records of answers, by hashes of map and method; their `seconds` become the medians, the
-        times themselves their `repeats`, and `asked_seconds` keep what the answer took.
-
-    Returns
-    -------
-    dict
-        By the hash of a map the hashes of the methods in its pass.
+    `timed`: records of timing passes; `pairs`: records of answers, by hashes of map and method;
+    their `seconds` become the medians, the times themselves their `repeats`, and `asked_seconds`
+    keep what the answer took. Result: by the hash of a map the hashes of the methods in its pass.
     """
     heads = [record for record in timed if record["type"] == "timing" and "methods" in record]
     best: dict[str, Record] = {}
@@ -287,16 +275,8 @@ def circumstances_of(
 ) -> Circumstances:
     """Return the circumstances of the times of a study.
 
-    Parameters
-    ----------
-    timed
-        Records of timing passes.
-    outcomes
-        Outcomes of the study.
-    together
-        What `lay_times` returned.
-    commands
-        Command lines of the runs.
+    `timed`: records of timing passes; `together`: what `lay_times` returned; `commands`: command
+    lines of the runs.
     """
     used = [record for record in timed if record["status"] in {"ready", "timed"}]
     dates = [record["date"] for record in used if "date" in record]

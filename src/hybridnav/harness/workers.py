@@ -111,25 +111,10 @@ class _Worker:
 def run_local(tasks: Sequence[Work], *, workers: int, timeout_s: float) -> Iterator[list[Record]]:
     """Run tasks in processes of this machine.
 
-    Parameters
-    ----------
-    tasks
-        In the order in which they start.
-    workers
-        Processes.
-    timeout_s
-        Longest silence of a process, seconds. After it, or when the process dies, its query is
-        recorded as "timeout" or "lost", and another process resumes the rest.
-
-    Yields
-    ------
-    list of Record
-        Records in the order of arrival.
-
-    Raises
-    ------
-    InvalidValueError
-        When there is no worker or no time.
+    `tasks`: in the order in which they start; `workers`: processes; `timeout_s`: longest silence of
+    a process, seconds. After it, or when the process dies, its query is recorded as "timeout" or
+    "lost", and another process resumes the rest. Result: records in the order of arrival. Raises
+    `InvalidValueError` when there is no worker or no time.
     """
     if workers < 1 or not timeout_s > 0:
         raise InvalidValueError(
@@ -209,24 +194,10 @@ def _whole(task: Work) -> list[Record]:
 def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Record]]:
     """Run tasks on a dask.distributed cluster; those of a lost worker run again elsewhere.
 
-    Parameters
-    ----------
-    tasks
-        In any order.
-    address
-        Address of the scheduler, such as `tcp://10.0.0.1:8786`. Its workers need this package and
-        the map files under the same paths.
-
-    Yields
-    ------
-    list of Record
-        Records of one task, when it ends.
-
-    Raises
-    ------
-    InvalidValueError
-        When dask.distributed is not installed, the scheduler cannot be reached, or it has had no
-        worker for `NO_WORKER_S`.
+    `tasks`: in any order; `address`: address of the scheduler, such as `tcp://10.0.0.1:8786`. Its
+    workers need this package and the map files under the same paths. Result: records of one task,
+    when it ends. Raises `InvalidValueError` when dask.distributed is not installed, the scheduler
+    cannot be reached, or it has had no worker for `NO_WORKER_S`.
     """
     with _connected(address) as client:
         from dask import distributed  # noqa: PLC0415 - an optional extra

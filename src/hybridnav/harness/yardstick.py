@@ -138,17 +138,7 @@ def is_any_angle(record: Record) -> bool:
 def contradiction(record: Record, reference: Record) -> str | None:
     """Return the contradiction of an answer by the optima, None if there is none.
 
-    Parameters
-    ----------
-    record
-        Record of the answer.
-    reference
-        The reference's record of the same pair, which holds both optima.
-
-    Returns
-    -------
-    str or None
-        The contradiction.
+    `reference`: the reference's record of the same pair, which holds both optima.
     """
     if {record["status"], reference["status"]} == set(ANSWERED):
         return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"

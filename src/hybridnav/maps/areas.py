@@ -32,27 +32,12 @@ def box_of_area(
 ) -> Box:
     """Return the box of all cells that an area overlaps.
 
-    Parameters
-    ----------
-    changed
-        A shapely geometry in metres, whose bounds are taken, or `(x_min, y_min, x_max, y_max)` in
-        metres, map frame; a mask, bool (rows, cols); None for the whole map.
-    frame
-        Place of the map.
-    shape
-        Its rows and columns.
-
-    Returns
-    -------
-    tuple
-        First row, last row + 1, first column, last column + 1; nothing of it lies outside the map,
-        and it is empty for an area outside the map, or a mask of no cell.
-
-    Raises
-    ------
-    InvalidValueError
-        When the area is no mask of the map and not described by four finite numbers, the least
-        first.
+    `changed`: a shapely geometry in metres, whose bounds are taken, or
+    `(x_min, y_min, x_max, y_max)` in metres, map frame; a mask, bool (rows, cols); None for the
+    whole map; `frame`: place of the map; `shape`: its rows and columns. Result: first row, last row
+    + 1, first column, last column + 1; nothing of it lies outside the map, and it is empty for an
+    area outside the map, or a mask of no cell. Raises `InvalidValueError` when the area is no mask
+    of the map and not described by four finite numbers, the least first.
     """
     if changed is None:
         return 0, shape[0], 0, shape[1]

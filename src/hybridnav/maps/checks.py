@@ -21,19 +21,8 @@ _T = TypeVar("_T")
 def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
     """Return a value of a type.
 
-    Parameters
-    ----------
-    name
-        What the caller calls it.
-    value
-        What was given.
-    kind
-        The type.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is of another type.
+    `name`: what the caller calls it; `value`: what was given. Raises `InvalidValueError` when it is
+    of another type.
     """
     if isinstance(value, kind):
         return value
@@ -47,19 +36,9 @@ def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
 def checked_whole(name: str, value: Any, low: int, high: int) -> int:
     """Return a whole number in a range.
 
-    Parameters
-    ----------
-    name
-        What the caller calls it.
-    value
-        What was given.
-    low, high
-        The least and the greatest number.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is no whole number, or lies outside the range.
+    `name`: what the caller calls it; `value`: what was given; `low`, `high`: the least and the
+    greatest number. Raises `InvalidValueError` when it is no whole number, or lies outside the
+    range.
     """
     try:
         found = operator.index(value)
@@ -75,10 +54,7 @@ def checked_whole(name: str, value: Any, low: int, high: int) -> int:
 def checked_radius(radius_m: Any) -> float:
     """Return the radius of a robot in metres.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is no finite number >= 0.
+    Raises `InvalidValueError` when it is no finite number >= 0.
     """
     try:
         found = float(radius_m)
@@ -94,10 +70,7 @@ def checked_radius(radius_m: Any) -> float:
 def checked_thresholds(free: Any, occupied: Any) -> tuple[float, float]:
     """Return the thresholds of free and occupied cells.
 
-    Raises
-    ------
-    InvalidValueError
-        When these are not two ascending numbers from 0 to 1.
+    Raises `InvalidValueError` when these are not two ascending numbers from 0 to 1.
     """
     try:
         low, high = float(free), float(occupied)
@@ -114,17 +87,8 @@ def checked_thresholds(free: Any, occupied: Any) -> tuple[float, float]:
 def checked_cell(name: str, cell: Any) -> tuple[int, int]:
     """Return a cell as two integers.
 
-    Parameters
-    ----------
-    name
-        What the caller calls it.
-    cell
-        What was given.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is not two whole numbers.
+    `name`: what the caller calls it; `cell`: what was given. Raises `InvalidValueError` when it is
+    not two whole numbers.
     """
     try:
         row, col = cell
@@ -138,19 +102,8 @@ def checked_cell(name: str, cell: Any) -> tuple[int, int]:
 def checked_between(name: str, value: Any, low: float, high: float) -> float:
     """Return a number in a range.
 
-    Parameters
-    ----------
-    name
-        What the caller calls it.
-    value
-        What was given.
-    low, high
-        The least and the greatest number.
-
-    Raises
-    ------
-    InvalidValueError
-        When it is no number, or lies outside the range.
+    `name`: what the caller calls it; `value`: what was given; `low`, `high`: the least and the
+    greatest number. Raises `InvalidValueError` when it is no number, or lies outside the range.
     """
     if isinstance(value, int | float | np.number) and low <= value <= high:
         return float(value)
@@ -163,10 +116,7 @@ def checked_between(name: str, value: Any, low: float, high: float) -> float:
 def checked_points(points: ArrayLike) -> FloatArray:
     """Return the points as float64 (n, 2).
 
-    Raises
-    ------
-    InvalidValueError
-        When they are no finite array of shape (n, 2) or there is none.
+    Raises `InvalidValueError` when they are no finite array of shape (n, 2) or there is none.
     """
     xy = np.asarray(points, dtype=np.float64)
     if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004

@@ -21,17 +21,9 @@ _ROUNDING = 1e-9
 def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
     """Return the cells whose centre lies within a radius of the centre of an occupied cell.
 
-    Parameters
-    ----------
-    occupied
-        Shape `(rows, cols)`.
-    radius_cells
-        Radius in cells, finite and >= 0; a distance equal to it counts as within.
-
-    Returns
-    -------
-    BoolArray
-        Same shape; by exact Euclidean distances (compared as integers).
+    `occupied`: shape `(rows, cols)`; `radius_cells`: radius in cells, finite and >= 0; a distance
+    equal to it counts as within. Result: same shape; by exact Euclidean distances (compared as
+    integers).
     """
     if not occupied.any():
         return np.zeros_like(occupied)
@@ -54,17 +46,8 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
 def squares_near(occupied: BoolArray, reach: int) -> AnyArray:
     """Return the squared distance from each cell to the nearest occupied one, where it is small.
 
-    Parameters
-    ----------
-    occupied
-        Shape `(rows, cols)`.
-    reach
-        Cells, from 0 to 64.
-
-    Returns
-    -------
-    AnyArray
-        uint16, same shape, in cells; exact below the square of `reach + 1`, else not below it.
+    `occupied`: shape `(rows, cols)`; `reach`: cells, from 0 to 64. Returns uint16, same shape, in
+    cells; exact below the square of `reach + 1`, else not below it.
     """
     rows, cols = occupied.shape
     at, far = np.arange(cols, dtype=np.int32), np.int32(cols + reach + 1)
@@ -90,8 +73,7 @@ def _within_distance(occupied: BoolArray, most: int) -> BoolArray:
         offset = np.arange(size, dtype=np.int64)
         offset = offset[:, None] if axis == 0 else offset[None, :]
         squared += (nearest[axis] - offset) ** 2
-    within: BoolArray = squared <= most
-    return within
+    return squared <= most
 
 
 def clearance_cells(occupied: BoolArray) -> FloatArray:
@@ -99,23 +81,15 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
 
     Distances are between centres.
 
-    Parameters
-    ----------
-    occupied
-        Shape `(rows, cols)`.
-
-    Returns
-    -------
-    FloatArray
-        float64, same shape; 0 in occupied cells, infinite where none is occupied. Exact, by the
-        Euclidean distance transform. Cells beyond the grid are not occupied.
+    `occupied`: shape `(rows, cols)`. Returns float64, same shape; 0 in occupied cells, infinite
+    where none is occupied. Exact, by the Euclidean distance transform. Cells beyond the grid are
+    not occupied.
     """
     if not occupied.any():
         return np.full(occupied.shape, np.inf)
     from scipy import ndimage  # noqa: PLC0415 - on demand, as above
 
-    distances: FloatArray = ndimage.distance_transform_edt(~occupied)
-    return distances
+    return ndimage.distance_transform_edt(~occupied)
 
 
 def closing(cells: BoolArray, radius_cells: float) -> BoolArray:
@@ -123,12 +97,8 @@ def closing(cells: BoolArray, radius_cells: float) -> BoolArray:
 
     Distances take as long for a large disc as for a small one.
 
-    Parameters
-    ----------
-    cells
-        bool (rows, cols).
-    radius_cells
-        Radius of the disc, >= 1; a cell belongs to it if its centre does.
+    `cells`: bool (rows, cols); `radius_cells`: radius of the disc, >= 1; a cell belongs to it if
+    its centre does.
     """
     if not cells.any():
         return cells.copy()

@@ -42,21 +42,11 @@ __all__ = [
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
     """Find the cells that a polyline on free cells passes.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-    positions
-        float64 (n, 2), n >= 1, (row, col) on the lattice of the cells' corners.
-
-    Returns
-    -------
-    LongArray
-        int64 (m, 2), (row, col), each a neighbour of the one before, diagonally where the line
-        passes a corner. Where the line runs between two cells, a free one.
+    `free`: bool (rows, cols); `positions`: float64 (n, 2), n >= 1, (row, col) on the lattice of the
+    cells' corners. Returns int64 (m, 2), (row, col), each a neighbour of the one before, diagonally
+    where the line passes a corner. Where the line runs between two cells, a free one.
     """
     # One memory layout, so that the kernel is compiled once.
     cells = np.ascontiguousarray(free).view()
     cells.flags.writeable = False
-    found: LongArray = passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))
-    return found
+    return passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))

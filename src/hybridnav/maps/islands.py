@@ -32,10 +32,7 @@ def unique_rows(rows: AnyArray) -> UniqueRows:
     `numpy.unique` with an axis would do, but it compares records: an interrupt there ends as a
     TypeError, and nothing tells that it was one.
 
-    Parameters
-    ----------
-    rows
-        Shape (n, k), k >= 1.
+    `rows`: shape (n, k), k >= 1.
     """
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
@@ -51,17 +48,8 @@ def unique_rows(rows: AnyArray) -> UniqueRows:
 def in_runs(start: LongArray, length: LongArray) -> LongArray:
     """Return the numbers in runs, one run after the other.
 
-    Parameters
-    ----------
-    start
-        int64 (n,), the first number of each run.
-    length
-        int64 (n,), >= 0.
-
-    Returns
-    -------
-    LongArray
-        int64, as many numbers as the runs have in all.
+    `start`: int64 (n,), the first number of each run; `length`: int64 (n,), >= 0. Returns int64, as
+    many numbers as the runs have in all.
     """
     end = np.cumsum(length)
     numbers: LongArray = np.repeat(start - end + length, length)
@@ -108,19 +96,9 @@ def without_islands(
 ) -> tuple[ByteArray, DroppedIslands]:
     """Drop the islands of an array of classes; see `drop_islands`.
 
-    Parameters
-    ----------
-    classes
-        uint8 `CellClass`, shape `(rows, cols)`.
-    least_area_m2, cell_area_m2
-        Least area of an island, >= 0, and area of a cell, in square metres.
-
-    Returns
-    -------
-    ByteArray
-        A new array of the same shape.
-    DroppedIslands
-        Counts of the dropped islands.
+    `classes`: uint8 `CellClass`, shape `(rows, cols)`; `least_area_m2`, `cell_area_m2`: least area
+    of an island, >= 0, and area of a cell, in square metres. Returns a new array of the same shape.
+    Counts of the dropped islands.
     """
     least_cells = least_area_m2 / cell_area_m2 * (1 - _ROUNDING)
     free_of, areas = _islands(classes == CellClass.FREE)

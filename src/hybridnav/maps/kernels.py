@@ -173,12 +173,8 @@ def least_along(values, positions):
     A cell counts if the segment meets its closed square, or passes it by 1e-9 of a cell; outside of
     the grid values are infinite. In each row of cells a segment covers one range of columns.
 
-    Parameters
-    ----------
-    values
-        float64 (rows, cols).
-    positions
-        float64 (n, 2), n >= 1, (row, col) on the lattice of the cells' corners.
+    `values`: float64 (rows, cols); `positions`: float64 (n, 2), n >= 1, (row, col) on the lattice
+    of the cells' corners.
     """
     least = np.full(len(positions) - 1, np.inf)
     for i in range(len(least)):
@@ -205,12 +201,7 @@ def walks_clear(free, tails, heads):
     The walk is that of Nav2's collision monitor, Bresenham's line as its `LineIterator` visits it:
     one cell for each step along the longer axis. Backwards it may visit others.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-    tails, heads
-        int64 (n, 2), cells of the grid.
+    `free`: bool (rows, cols); `tails`, `heads`: int64 (n, 2), cells of the grid.
     """
     clear = np.ones(len(tails), np.bool_)
     for i in range(len(tails)):

@@ -30,23 +30,11 @@ _UNKNOWN, _FULL = -1, 100
 def read_cells(message: Any, what: str = "occupancy grid") -> tuple[SignArray, Frame]:
     """Return the cells of a `nav_msgs/OccupancyGrid`.
 
-    Parameters
-    ----------
-    message
-        An object or a mapping with its fields, `data` as any sequence of integers.
-    what
-        Name of the message in errors.
-
-    Returns
-    -------
-    tuple
-        int8 (rows, cols), 0 to 100, or -1 for unknown, row 0 at the lowest y; and their frame.
-
-    Raises
-    ------
-    InvalidValueError
-        When a field is missing or out of range, `data` has not width x height values, one of them
-        is not within -1 to 100, or the pose of the origin is tilted.
+    `message`: an object or a mapping with its fields, `data` as any sequence of integers; `what`:
+    name of the message in errors. Returns int8 (rows, cols), 0 to 100, or -1 for unknown, row 0 at
+    the lowest y; and their frame. Raises `InvalidValueError` when a field is missing or out of
+    range, `data` has not width x height values, one of them is not within -1 to 100, or the pose of
+    the origin is tilted.
     """
     cols, rows = (count_of(message, f"info.{name}", what) for name in ("width", "height"))
     if cols * rows > MAX_CELLS:
@@ -85,19 +73,8 @@ def read_probability(message: Any) -> tuple[NDArray[np.float32], Frame]:
 def grid_message(values: SignArray, frame: Frame, frame_id: str, stamp_ns: int) -> dict[str, Any]:
     """Return cells as a `nav_msgs/OccupancyGrid` of plain values.
 
-    Parameters
-    ----------
-    values
-        int8 (rows, cols), 0 to 100, or -1 for unknown.
-    frame
-        Their place.
-    frame_id, stamp_ns
-        As in `header_message`.
-
-    Raises
-    ------
-    InvalidValueError
-        As for `header_message`.
+    `values`: int8 (rows, cols), 0 to 100, or -1 for unknown; `frame_id`, `stamp_ns`: see
+    `header_message`. Raises `InvalidValueError` as for `header_message`.
     """
     header = header_message(frame_id, stamp_ns)
     rows, cols = values.shape
@@ -121,14 +98,8 @@ def percentages(
 
     They are rounded, but never across a threshold; what has no percentage is unknown.
 
-    Parameters
-    ----------
-    probability
-        float32 (rows, cols), NaN for cells that were never measured.
-    measured
-        uint8 (rows, cols), their class by the thresholds.
-    thresholds
-        U1 and U2.
+    `probability`: float32 (rows, cols), NaN for cells that were never measured; `measured`: uint8
+    (rows, cols), their class by the thresholds; `thresholds`: U1 and U2.
     """
     occupancy = (np.arange(_FULL + 1) / _FULL).astype(np.float32)
     low, high = (np.float32(threshold) for threshold in thresholds)

@@ -136,19 +136,8 @@ def did_you_mean(name: str, known: tuple[str, ...]) -> str:
 def place_of_name(name: str, known: tuple[str, ...], what: str) -> int:
     """Return the place of a name among those that are known.
 
-    Parameters
-    ----------
-    name
-        The name.
-    known
-        All names.
-    what
-        What they are the names of, such as "floor".
-
-    Raises
-    ------
-    InvalidValueError
-        When it is none of them; the message suggests the nearest ones.
+    `known`: all names; `what`: what they are the names of, such as "floor". Raises
+    `InvalidValueError` when it is none of them; the message suggests the nearest ones.
     """
     if name in known:
         return known.index(name)

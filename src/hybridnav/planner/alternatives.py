@@ -170,8 +170,7 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
         with a shorter one. Parts within a robot's diameter (at least a cell) of the other path
         count, and all between the same two doors of one room. None is 0.8.
     max_stretch
-        Greatest length, or cost, of an alternative over that of the first, at least 1.
-        None is 2.
+        Greatest length, or cost, of an alternative over that of the first, at least 1. None is 2.
     at
         Position in a named room, as in `HybridPlanner.plan`.
     blocked
@@ -217,16 +216,8 @@ def _by_doors(
 ) -> Alternatives:
     """Return the alternatives by sequences of doors.
 
-    Parameters
-    ----------
-    search
-        The search for sequences of doors; None on a map without rooms.
-    first
-        The plain plan, solved.
-    limits
-        What they must keep to.
-    by_costs
-        Whether the planner plans by costs.
+    `search`: the search for sequences of doors; None on a map without rooms; `first`: the plain
+    plan, solved; `limits`: what they must keep to; `by_costs`: whether the planner plans by costs.
     """
     chosen = [Chosen(first)] if search is None else search.find(limits)
     found = tuple(Alternative(one.tour, one.overlap) for one in chosen)

@@ -36,10 +36,7 @@ _QUARTERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
 def checked_area(area: BaseGeometry | ArrayLike) -> BaseGeometry:
     """Return an area as a geometry that is valid, finite and of a kind that can be closed.
 
-    Raises
-    ------
-    InvalidValueError
-        When the area is not like that.
+    Raises `InvalidValueError` when the area is not like that.
     """
     shape = area if isinstance(area, BaseGeometry) else _polygon(area)
     if shape.geom_type not in _SHAPES:
@@ -78,10 +75,7 @@ def runs_of(area: BaseGeometry, grid: OccupancyGrid, *, radius_m: float) -> Long
 
     The robot keeps the radius off the area; 0 for its centre alone.
 
-    Raises
-    ------
-    InvalidValueError
-        When the area closes no cell.
+    Raises `InvalidValueError` when the area closes no cell.
     """
     runs = runs_near(area, grid, radius_m=radius_m)
     if not len(runs):
@@ -99,10 +93,7 @@ def runs_near(area: BaseGeometry, grid: OccupancyGrid, *, radius_m: float) -> Lo
 def parts_on(area: BaseGeometry, grid: OccupancyGrid) -> list[BaseGeometry]:
     """Return the parts of an area, x along the columns and y along the rows, one unit a cell.
 
-    Raises
-    ------
-    InvalidValueError
-        When no part comes as near to the map as the robot's radius.
+    Raises `InvalidValueError` when no part comes as near to the map as the robot's radius.
     """
     parts = _in_cells(area, grid.frame)
     whole = shapely.box(0, 0, grid.shape[1], grid.shape[0])
@@ -181,10 +172,7 @@ def _near_throughout(
     inside = shapely.covers(part, shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0]))
     reach = radius_cells - np.hypot(*(high - low).T) / 2
     middles = shapely.points((low + high)[:, ::-1] / 2)
-    found: BoolArray = inside | (
-        (reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0))
-    )
-    return found
+    return inside | ((reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0)))
 
 
 def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:
@@ -209,22 +197,8 @@ def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
     A diagonal between two places across a boundary has a cell pair of that boundary among the four
     cells round its middle, and needs all four: closing one cell of each pair stops it too.
 
-    Parameters
-    ----------
-    level
-        The level of the arcs, places or rooms.
-    arcs
-        int64 (n,), dense indices, each once.
-
-    Returns
-    -------
-    list of LongArray
-        The cells of each arc.
-
-    Raises
-    ------
-    InvalidValueError
-        When an arc is a self-loop.
+    `level`: the level of the arcs, places or rooms; `arcs`: int64 (n,), dense indices, each once.
+    Returns the cells of each arc. Raises `InvalidValueError` when an arc is a self-loop.
     """
     grid = level.grid
     cols = grid.shape[1]

@@ -79,8 +79,7 @@ class PlanBatch:
 
     def path(self, query: int) -> FloatArray:
         """Return the points of one path, float64 (k, 2); none where there is no path."""
-        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
-        return points
+        return self.points[self.path_start[query] : self.path_start[query + 1]]
 
 
 def plan_many(
@@ -92,18 +91,9 @@ def plan_many(
 ) -> PlanBatch:
     """Return the answers to pairs of points, in arrays.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    at_once
-        Planner for many queries at once; None leaves all to `alone`.
-    endpoints
-        Starts and goals, float64 (n, 2) each, or poses (n, 3).
-    closed
-        Closed cells; None for none.
-    alone
-        Plans one of the remaining queries, between two of the `endpoints`.
+    `at_once`: planner for many queries at once; None leaves all to `alone`; `endpoints`: starts and
+    goals, float64 (n, 2) each, or poses (n, 3); `closed`: closed cells; None for none; `alone`:
+    plans one of the remaining queries, between two of the `endpoints`.
     """
     starts, goals = endpoints
     n = len(starts)

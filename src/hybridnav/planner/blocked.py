@@ -156,8 +156,7 @@ class Blocked:
             found += self._on_boundaries(topology)
         single = np.concatenate(found)
         if not (self.polygons or self.keepout):  # rooms have many cells, and need no runs
-            cells_alone: LongArray = np.unique(single)
-            return cells_alone
+            return np.unique(single)
         runs = [np.stack([single, single + 1], axis=1)]
         for given, radius_m in ((self.polygons, grid.robot_radius_m), (self.keepout, 0.0)):
             areas = cast("Sequence[BaseGeometry]", given)
@@ -221,16 +220,9 @@ names of the attributes of a `Blocked`."""
 def as_blocked(value: Closable) -> Blocked:
     """Convert any accepted form of closures to a `Blocked`.
 
-    Parameters
-    ----------
-    value
-        A `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
-        attributes.
-
-    Raises
-    ------
-    InvalidValueError
-        When the value is of another kind, has other names, or invalid content.
+    `value`: a `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
+    attributes. Raises `InvalidValueError` when the value is of another kind, has other names, or
+    invalid content.
     """
     if isinstance(value, Blocked):
         return value

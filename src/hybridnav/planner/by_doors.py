@@ -54,15 +54,9 @@ def keys_of_legs(legs: tuple[Leg, ...]) -> list[LegKey]:
 class Track:
     """The line of a tour, for comparisons with others.
 
-    Parameters
-    ----------
-    tour
-        A solved tour of one plan.
-    near_m
-        Distance up to which two paths count as one, in metres.
-    costs
-        The map and the costs of its cells, by which the tour was planned: then shares are of its
-        cost. None for lengths.
+    `tour`: a solved tour of one plan; `near_m`: distance up to which two paths count as one, in
+    metres; `costs`: the map and the costs of its cells, by which the tour was planned: then shares
+    are of its cost. None for lengths.
     """
 
     def __init__(
@@ -141,16 +135,8 @@ class Chosen:
 class DoorTours:
     """The search for tours by other doors than those of a first one.
 
-    Parameters
-    ----------
-    planner
-        Planner of each; its map has rooms.
-    first
-        The plain plan, solved.
-    waypoints
-        Start and goal, as the caller named them.
-    closed
-        Cells closed for the query; None for none.
+    `planner`: planner of each; its map has rooms; `first`: the plain plan, solved; `waypoints`:
+    start and goal, as the caller named them; `closed`: cells closed for the query; None for none.
     """
 
     def __init__(
@@ -221,16 +207,8 @@ class DoorTours:
         Rooms from which no path leads back, other than through the boundary by which it came, stay
         open: no shortest path passes them.
 
-        Parameters
-        ----------
-        vertices, arcs
-            Of the room level.
-
-        Returns
-        -------
-        LongArray | None
-            int64 (n,), flat cells, sorted, each once; None if they would close an endpoint or an
-            arc that is to stay open.
+        `vertices`, `arcs`: of the room level. Returns int64 (n,), flat cells, sorted, each once;
+        None if they would close an endpoint or an arc that is to stay open.
         """
         graph = self._graph
         inside = np.zeros(self._rooms.level.n_vertices, dtype=np.bool_)
@@ -329,8 +307,7 @@ class DoorTours:
         tails, heads = self._graph.endpoints[is_outside].T
         count = self._rooms.level.n_vertices
         joined = coo_array((np.ones(len(tails), dtype=np.int8), (tails, heads)), (count, count))
-        parts: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
-        return parts
+        return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
 def admissible(
@@ -339,12 +316,7 @@ def admissible(
     """Return the tours that do not share too much with a shorter one, by length, or by cost, after
     the first.
 
-    Parameters
-    ----------
-    planned
-        Tours with their tracks, the first one first.
-    limits
-        What they must keep to.
+    `planned`: tours with their tracks, the first one first; `limits`: what they must keep to.
     """
     chosen = planned[:1]
     for one, track in sorted(planned[1:], key=lambda pair: pair[1].cost_m):

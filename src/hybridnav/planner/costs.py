@@ -33,20 +33,9 @@ if TYPE_CHECKING:
 class PlannerCosts:
     """The costs by which a planner plans: of its preset, joined with those given to it.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    preset
-        A preset, which may name costs that are computed from the map.
-    given
-        A layer for this planner; None for none.
-
-    Raises
-    ------
-    InvalidValueError
-        When the layer is one of another map, or the preset plans on a structure that knows no
-        costs.
+    `preset`: a preset, which may name costs that are computed from the map; `given`: a layer for
+    this planner; None for none. Raises `InvalidValueError` when the layer is one of another map, or
+    the preset plans on a structure that knows no costs.
     """
 
     def __init__(self, grid: OccupancyGrid, preset: Preset, given: CostLayer | None) -> None:
@@ -74,17 +63,8 @@ class PlannerCosts:
         """Return the costs with the cells in a box as another given layer has them, and the box of
         all cells that this changes: closed ones reach as far as the robot's radius.
 
-        Parameters
-        ----------
-        given
-            A layer of the map; it is read inside the box only.
-        box
-            First row, last row + 1, first column, last column + 1 of its cells.
-
-        Raises
-        ------
-        InvalidValueError
-            As for the first one.
+        `given`: a layer of the map; it is read inside the box only; `box`: first row, last row + 1,
+        first column, last column + 1 of its cells. Raises `InvalidValueError` as for the first one.
         """
         self._check(given)
         none = CostLayer(np.ones(self._grid.shape, np.float32))
@@ -161,14 +141,8 @@ def _grown(box: Box, reach: int, shape: tuple[int, int]) -> Box:
 class CostFinish:
     """The last step of plans by costs: length and cost of a path, and its any-angle finish.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    layer
-        Costs of its cells.
-    settings
-        Whether unexplored cells may be entered, and the turning radius.
+    `layer`: costs of its cells; `settings`: whether unexplored cells may be entered, and the
+    turning radius.
     """
 
     def __init__(self, grid: OccupancyGrid, layer: CostLayer, settings: PlannerSettings) -> None:

@@ -68,10 +68,7 @@ def no_places() -> NoReturn:
 def check_at(at: str) -> None:
     """Refuse a position in a room that is none of the two.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is another word.
+    Raises `InvalidValueError` when it is another word.
     """
     if at not in {"anywhere", "point"}:
         raise InvalidValueError(f"at must be 'anywhere' or 'point', got {brief(at)}")

@@ -313,8 +313,7 @@ def _area(rings: Sequence[Any]) -> dict[str, Any]:
     import shapely  # noqa: PLC0415 - rooms alone need it
 
     area = shapely.build_area(shapely.MultiLineString([[*ring, ring[0]] for ring in rings]))
-    shape: dict[str, Any] = json.loads(shapely.to_geojson(shapely.orient_polygons(area)))
-    return shape
+    return json.loads(shapely.to_geojson(shapely.orient_polygons(area)))
 
 
 def _point(x: float, y: float) -> dict[str, Any]:

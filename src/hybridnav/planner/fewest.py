@@ -41,19 +41,9 @@ def fewest_to_open(
     algorithm. Its states are a region, and which of the closures that bar more than one passage are
     open: no other is met twice.
 
-    Parameters
-    ----------
-    ground
-        Where a robot may go.
-    closures
-        What each closes: flat cells, int64 (n,), or moves between two, int64 (n, 2).
-    cells
-        Start and goal, (row, col), open.
-
-    Returns
-    -------
-    tuple
-        Names of closures, in the order given; none if no opening makes a path.
+    `ground`: where a robot may go; `closures`: what each closes: flat cells, int64 (n,), or moves
+    between two, int64 (n, 2); `cells`: start and goal, (row, col), open. Returns names of closures,
+    in the order given; none if no opening makes a path.
     """
     names = list(closures)
     regions = _Regions(ground, list(closures.values()))

@@ -45,10 +45,7 @@ def update_of(
 ) -> PlannerUpdate:
     """Return the update that was given.
 
-    Raises
-    ------
-    InvalidValueError
-        When nothing is given, or something of another type.
+    Raises `InvalidValueError` when nothing is given, or something of another type.
     """
     if topology is not None:
         checked_type("topology", topology, TopologicalMap)
@@ -64,10 +61,8 @@ def update_of(
 def begun(now: Planning, update: PlannerUpdate) -> Callable[[], Planning]:
     """Check all of an update, and return what ends it while no query runs: how to plan then.
 
-    Raises
-    ------
-    InvalidValueError
-        When the planner cannot follow, or the grid or the costs are those of another map.
+    Raises `InvalidValueError` when the planner cannot follow, or the grid or the costs are those of
+    another map.
     """
     if now.ompl is not None:
         raise InvalidValueError(
@@ -122,18 +117,10 @@ def _followed(now: Planning, update: PlannerUpdate) -> Planning:
 def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongArray:
     """Return the cells whose class changed, int64 (m, 2), (row, col), in the order of rows.
 
-    Parameters
-    ----------
-    before, now
-        The map before and after.
-    box
-        First row, last row + 1, first column, last column + 1 of the cells whose measurements may
-        have changed; the robot's radius is added here.
-
-    Raises
-    ------
-    InvalidValueError
-        When the grids differ in shape, frame, or in what is legal, or outside the box.
+    `before`, `now`: the map before and after; `box`: first row, last row + 1, first column, last
+    column + 1 of the cells whose measurements may have changed; the robot's radius is added here.
+    Raises `InvalidValueError` when the grids differ in shape, frame, or in what is legal, or
+    outside the box.
     """
     for what, old, new in (
         ("a shape of cells", before.shape, now.shape),

@@ -57,36 +57,17 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
 ) -> list[ArrayLike]:
     """Return a point for each waypoint, so that the path through all of them is cheapest.
 
-    Parameters
-    ----------
-    topology
-        The map.
-    settings
-        Settings of the planner, which determine the cells that may be entered, and whether points
-        have headings.
-    waypoints
-        Two or more points `(x, y)` in metres, names of rooms or of named points that passed
-        `check_names`. With OMPL in a space with headings, points are `(x, y, yaw)`, radians.
-    at
-        Position in a room: anywhere, or at the room's point.
-    closed
-        Cells that are closed for this query.
-    costs
-        Costs of the cells; None makes costs lengths.
-
-    Returns
-    -------
-    list
-        Points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
-        waypoints, or a point cannot be entered, rooms are represented by their points, and so is a
-        room without a cell at whose centre the robot's footprint fits with any heading. In a space
-        with headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
-        leads to it; the first waypoint faces along the path that leaves it.
-
-    Raises
-    ------
-    InvalidValueError
-        When `at` is another word.
+    `settings`: settings of the planner, which determine the cells that may be entered, and whether
+    points have headings; `waypoints`: two or more points `(x, y)` in metres, names of rooms or of
+    named points that passed `check_names`. With OMPL in a space with headings, points are
+    `(x, y, yaw)`, radians. `at`: position in a room: anywhere, or at the room's point; `closed`:
+    cells that are closed for this query; `costs`: costs of the cells; None makes costs lengths.
+    Result: points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
+    waypoints, or a point cannot be entered, rooms are represented by their points, and so is a room
+    without a cell at whose centre the robot's footprint fits with any heading. In a space with
+    headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that leads to
+    it; the first waypoint faces along the path that leaves it. Raises `InvalidValueError` when `at`
+    is another word.
     """
     check_at(at)
     enterable = topology.grid.enterable(allow_unexplored=settings.allow_unexplored)
@@ -104,10 +85,8 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
 def check_names(topology: TopologicalMap, waypoints: Sequence[ArrayLike | str]) -> None:
     """Refuse waypoints with unusable names, before anything is computed for the others.
 
-    Raises
-    ------
-    InvalidValueError
-        When a name is not known, a room has no free cell, or the map has no rooms.
+    Raises `InvalidValueError` when a name is not known, a room has no free cell, or the map has no
+    rooms.
     """
     if any(isinstance(waypoint, str) for waypoint in waypoints):
         check_waypoints(topology.rooms.labels, topology.grid, waypoints)
@@ -118,19 +97,10 @@ def check_waypoints(
 ) -> None:
     """Refuse unknown names, and rooms that the robot does not fit in.
 
-    Parameters
-    ----------
-    rooms
-        The rooms, read or found; no pyramid is needed.
-    grid
-        The map, inflated by the robot's radius.
-    waypoints
-        Points, and names of rooms or of named points.
-
-    Raises
-    ------
-    InvalidValueError
-        When a waypoint is refused; the message has the name and the nearest known ones.
+    `rooms`: the rooms, read or found; no pyramid is needed; `grid`: the map, inflated by the
+    robot's radius; `waypoints`: points, and names of rooms or of named points. Raises
+    `InvalidValueError` when a waypoint is refused; the message has the name and the nearest known
+    ones.
     """
     for waypoint in waypoints:
         if not isinstance(waypoint, str) or (
@@ -268,8 +238,7 @@ def _where_it_fits(grid: OccupancyGrid, cells: LongArray, radius_m: float) -> Lo
     row, col = max(rows.min() - reach, 0), max(cols.min() - reach, 0)
     window = grid.measured[row : rows.max() + reach + 1, col : cols.max() + reach + 1]
     distance = _to_sides(window == CellClass.OCCUPIED)[rows - row, cols - col]
-    fitting: LongArray = cells[distance >= radius_cells]
-    return fitting
+    return cells[distance >= radius_cells]
 
 
 def _to_sides(occupied: BoolArray) -> FloatArray:
@@ -282,8 +251,7 @@ def _to_sides(occupied: BoolArray) -> FloatArray:
     within = np.zeros((2 * rows + 1, 2 * cols + 1), dtype=np.bool_)
     for up, right in itertools.product(range(3), repeat=2):
         within[up : up + 2 * rows : 2, right : right + 2 * cols : 2] |= occupied
-    distance: FloatArray = clearance_cells(within)[1::2, 1::2] / 2
-    return distance
+    return clearance_cells(within)[1::2, 1::2] / 2
 
 
 def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:

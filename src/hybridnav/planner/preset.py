@@ -84,8 +84,7 @@ class Preset(Section):
         plain = self.description.isprintable()
         tree = self.model_dump(exclude={"name"})
         tree["planner"] = {"method": self.planner.method, **tree["planner"]}  # the method first
-        text: str = yaml.safe_dump(tree, sort_keys=False, allow_unicode=plain)
-        return text
+        return yaml.safe_dump(tree, sort_keys=False, allow_unicode=plain)
 
 
 def planner_settings(method: str = "paper", **settings: Any) -> PlannerSettings:
@@ -131,15 +130,8 @@ def preset_names() -> list[str]:
 def is_preset_name(source: PathLike) -> bool:
     """Return whether this is the name of a preset; with a suffix or a separator it is a path.
 
-    Parameters
-    ----------
-    source
-        What was given for a preset.
-
-    Returns
-    -------
-    bool
-        Whether it is a name; there need not be such a preset.
+    `source`: what was given for a preset. Returns whether it is a name; there need not be such a
+    preset.
     """
     text = os.fspath(source)
     separators = [mark for mark in (os.sep, os.altsep) if mark is not None]
@@ -294,10 +286,8 @@ def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
 
     A radius that the caller chose for the map wins over the preset's, and results record it.
 
-    Raises
-    ------
-    InvalidValueError
-        When the map has the default radius, not chosen by the caller, and the preset names another.
+    Raises `InvalidValueError` when the map has the default radius, not chosen by the caller, and
+    the preset names another.
     """
     wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
     if grid.radius_is_default and wanted_m != radius_m:

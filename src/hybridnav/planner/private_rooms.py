@@ -44,16 +44,9 @@ class PartGround(NamedTuple):
     ) -> PartGround:
         """Find the parts.
 
-        Parameters
-        ----------
-        is_open
-            bool (rows, cols), cells that the robot may enter.
-        label_of
-            int32 (rows, cols), the room of each cell.
-        private
-            Labels of private rooms.
-        corners
-            Whether corners may be cut.
+        `is_open`: bool (rows, cols), cells that the robot may enter; `label_of`: int32 (rows,
+        cols), the room of each cell; `private`: labels of private rooms; `corners`: whether corners
+        may be cut.
         """
         from scipy import ndimage  # noqa: PLC0415 - most queries need none
 
@@ -93,19 +86,9 @@ def opened(
     fewest private parts beside their ends, and their rooms are open. A way that enters private
     rooms in its middle, between public parts, does not count.
 
-    Parameters
-    ----------
-    room_of
-        The private room of each part, None for a public part.
-    beside
-        The parts that each part touches, or a link joins with it.
-    ends
-        The parts of the start and of the goal; none for an end that cannot be entered.
-
-    Returns
-    -------
-    set
-        Rooms of `room_of`, those of the ends not among them.
+    `room_of`: the private room of each part, None for a public part; `beside`: the parts that each
+    part touches, or a link joins with it; `ends`: the parts of the start and of the goal; none for
+    an end that cannot be entered. Result: rooms of `room_of`, those of the ends not among them.
     """
     ways = _PartSearch(room_of, beside, {room_of[part] for end in ends for part in end})
     first, last = (ways.away(end) for end in ends)
@@ -197,14 +180,8 @@ End = tuple[int, "ArrayLike | str"]
 class Privacy:
     """The private rooms of some floors under a profile, and which of them a query leaves open.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    floors
-        The floors, in the order of their indices.
-    whole
-        The planner of one map without the profile; None for a building.
+    `floors`: the floors, in the order of their indices; `whole`: the planner of one map without the
+    profile; None for a building.
     """
 
     def __init__(
@@ -243,14 +220,8 @@ class Privacy:
         """Return what a profile closes on each floor for a query: private rooms but those of its
         ends and the ones that must be crossed from there, and where it cannot turn at the goal.
 
-        Parameters
-        ----------
-        ends
-            Start and goal, and what lies between: floors with points or names.
-        shut
-            Cells that are closed besides, by floor.
-        links
-            The ends of each link that may be used.
+        `ends`: start and goal, and what lies between: floors with points or names; `shut`: cells
+        that are closed besides, by floor; `links`: the ends of each link that may be used.
         """
         own = {(floor, self._floors[floor].label_at(waypoint)) for floor, waypoint in ends}
         own = {(floor, label) for floor, label in own if label in self._private[floor]}
@@ -283,13 +254,8 @@ class Privacy:
         """Return the result of a plan on one map, whose settings name the profile, and what it
         forbids if there is no path.
 
-        Parameters
-        ----------
-        result
-            The plan.
-        ends, blocked
-            As they were given; closed cells, as a search for alternatives gives them, ask for no
-            reason.
+        `ends`, `blocked`: as they were given; closed cells, as a search for alternatives gives
+        them, ask for no reason.
         """
 
         def passed(other: Profile) -> list[str] | None:

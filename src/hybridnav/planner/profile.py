@@ -119,10 +119,8 @@ PROFILES = (
 def profile_of(given: Profile | str, known: Sequence[Profile] = PROFILES) -> Profile:
     """Return a profile, or the one that a name means.
 
-    Raises
-    ------
-    InvalidValueError
-        When there is none of the name; the message suggests the nearest ones.
+    Raises `InvalidValueError` when there is none of the name; the message suggests the nearest
+    ones.
     """
     if isinstance(given, Profile):
         return given
@@ -168,15 +166,9 @@ def under_profile(
     """Return the map, the preset and the costs of a planner with the width and the costs of a
     profile: those given where nothing changes. Private rooms are not closed.
 
-    Parameters
-    ----------
-    topology, preset, given
-        Of the planner without the profile.
-    profile
-        The profile.
-    by_costs
-        Whether it plans by costs, also where each metre counts one: floors of a building plan by
-        one method. Where the preset knows lengths only, the cells of the whole map are searched.
+    `topology`, `preset`, `given`: of the planner without the profile; `by_costs`: whether it plans
+    by costs, also where each metre counts one: floors of a building plan by one method. Where the
+    preset knows lengths only, the cells of the whole map are searched.
     """
     grid, rooms = topology.grid, topology.pyramid.rooms
     if profile.width_m is not None:
@@ -247,13 +239,8 @@ class ProfiledFloor:
 def forbidden(profile: Profile, passed: Callable[[Profile], list[str] | None]) -> str:
     """Return what of a profile leaves no route, one line; empty where none is there without it.
 
-    Parameters
-    ----------
-    profile
-        The profile under which there is no route.
-    passed
-        Returns what a route under another profile passes that this one does not allow, as words;
-        None if there is no route either.
+    `profile`: the profile under which there is no route; `passed`: returns what a route under
+    another profile passes that this one does not allow, as words; None if there is no route either.
     """
     width, turn = profile.width_m or 0.0, profile.turn_m or 0.0
     wider: dict[str, tuple[Any, str]] = {
@@ -290,17 +277,9 @@ def in_the_way(
 ) -> list[str]:
     """Return what a path passes that a profile does not allow: private rooms, narrow doors.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    rooms, guide
-        The rooms of the map, and what tells the doors of a path.
-    path
-        A path under another profile.
-    whole
-        Whether the route begins where the path begins, and ends where it ends: it may do so in any
-        room.
+    `rooms`, `guide`: the rooms of the map, and what tells the doors of a path; `path`: a path under
+    another profile; `whole`: whether the route begins where the path begins, and ends where it
+    ends: it may do so in any room.
     """
     labels = rooms.label_of[tuple(path.cells.T)].tolist()
     own = {labels[place] for place, is_end in zip((0, -1), whole, strict=True) if is_end}

@@ -39,12 +39,8 @@ def proof_of(
 ) -> dict[str, Any]:
     """Return the proof of a result; see `PlanResult.proof`.
 
-    Parameters
-    ----------
-    result
-        The result of a query.
-    grid, costs, closed
-        The map and the costs that it was planned by, and the closed cells of the query.
+    `grid`, `costs`, `closed`: the map and the costs that it was planned by, and the closed cells of
+    the query.
     """
     if grid.corner_cutting:
         raise PlanError(
@@ -203,8 +199,7 @@ def _line(problem: _Problem) -> dict[str, Any]:
 
 def _distinct(line: FloatArray) -> FloatArray:
     """Return a line without points that repeat the one before."""
-    distinct: FloatArray = line[np.append([True], (np.diff(line, axis=0) != 0).any(axis=1))]
-    return distinct
+    return line[np.append([True], (np.diff(line, axis=0) != 0).any(axis=1))]
 
 
 def _walk(cells: LongArray) -> list[Any]:

@@ -123,8 +123,7 @@ class SpeedMap:
             float64 (n - 1,), m / s. On the line between two cells both count.
         """
         positions = np.ascontiguousarray(self.frame.positions_of(points))
-        found: FloatArray = least_along(self.limits_m_s, positions)
-        return found
+        return least_along(self.limits_m_s, positions)
 
 
 @copies_alike
@@ -254,8 +253,7 @@ def _slowly_rising(most: FloatArray, along: FloatArray, rise: float) -> FloatArr
     """
     risen = rise * along
     bound = risen + np.minimum.accumulate(most - risen)
-    found: FloatArray = np.clip(bound, 0.0, most)
-    return found
+    return np.clip(bound, 0.0, most)
 
 
 def _drive_seconds(
@@ -270,15 +268,11 @@ def _drive_seconds(
     top = np.sqrt(peak)
     change = 2 * (top - np.sqrt(first)) / rise + 2 * (top - np.sqrt(last)) / fall
     kept = np.divide(np.maximum(level, 0.0), top, out=np.zeros_like(top), where=top > 0)
-    seconds: FloatArray = change + kept
-    return seconds
+    return change + kept
 
 
 def _spot_seconds(angles_rad: FloatArray, limits: MotionLimits) -> FloatArray:
     """Return the seconds of turns on the spot: the rate rises, stays and falls as a trapezoid."""
     rate, gain = limits.max_turning_rate_rad_s, limits.max_angular_acceleration_rad_s2
     short = angles_rad * gain < rate * rate
-    seconds: FloatArray = np.where(
-        short, 2 * np.sqrt(angles_rad / gain), angles_rad / rate + rate / gain
-    )
-    return seconds
+    return np.where(short, 2 * np.sqrt(angles_rad / gain), angles_rad / rate + rate / gain)

@@ -258,14 +258,9 @@ def tour_of(
 ) -> Tour:
     """Return the tour of plans from waypoint to waypoint.
 
-    Parameters
-    ----------
-    planner
-        Planner of the map; without rooms the tour has no legs.
-    results
-        Plans in order, at least one; only the last may be unsolved.
-    waypoints
-        Points or names, one more than plans if all are solved.
+    `planner`: planner of the map; without rooms the tour has no legs; `results`: plans in order, at
+    least one; only the last may be unsolved; `waypoints`: points or names, one more than plans if
+    all are solved.
     """
     if not results[-1].solved or planner.guide is None:
         return Tour(tuple(results), ())

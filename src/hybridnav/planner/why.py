@@ -204,8 +204,7 @@ class Case:
             index = int(np.searchsorted(topology.arc_ids, arc))
             arc = LevelArc(topology.pyramid.place_level, index)
         pairs = topology.pyramid[arc.level].boundary(arc.index)
-        moves: LongArray = pairs @ np.array([self.grid.shape[1], 1])
-        return moves
+        return pairs @ np.array([self.grid.shape[1], 1])
 
     @cached_property
     def _shut(self) -> BoolArray:
@@ -343,14 +342,8 @@ def explain(
 ) -> Explanation:
     """Explain a query of a planner; see `HybridPlanner.explain`.
 
-    Parameters
-    ----------
-    now
-        How the planner plans.
-    ends
-        Start and goal, `(x, y)` or `(x, y, yaw)` each, metres, map frame.
-    blocked, radius_m
-        As in `HybridPlanner.explain`.
+    `now`: how the planner plans; `ends`: start and goal, `(x, y)` or `(x, y, yaw)` each, metres,
+    map frame; `blocked`, `radius_m`: see `HybridPlanner.explain`.
     """
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):

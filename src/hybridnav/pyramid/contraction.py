@@ -324,10 +324,7 @@ class Decimation:
     def field_of(self) -> IntArray:
         """Return the current vertex of each flat cell, int32 (n_cells,), -1 for none."""
         record = self.record
-        labels: IntArray = _field_kernels.label_fields(
-            record.vertex_end, record.vertex_parent, MAX_LEVELS
-        )[0]
-        return labels
+        return _field_kernels.label_fields(record.vertex_end, record.vertex_parent, MAX_LEVELS)[0]
 
     def _merge_vertices(self, scratch: Scratch) -> None:
         record = self.record
@@ -388,19 +385,8 @@ class Decimation:
 def merge_hulls(hulls: Hulls, merged_into: IntArray, n_vertices: int) -> Hulls:
     """Compute the hulls of fields from the hulls of their parts.
 
-    Parameters
-    ----------
-    hulls
-        Hulls of the parts.
-    merged_into
-        int (n_parts,), the field that each part belongs to.
-    n_vertices
-        Number of fields.
-
-    Returns
-    -------
-    Hulls
-        Hulls of the fields.
+    `merged_into`: int (n_parts,), the field that each part belongs to; `n_vertices`: number of
+    fields. Result: hulls of the fields.
     """
     of_point = np.repeat(merged_into, np.diff(hulls.start))
     rows, cols = hulls.points.T.astype(np.int64)

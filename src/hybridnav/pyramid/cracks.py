@@ -41,41 +41,28 @@ def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
 
     The centre of cell (0, 0) is (0.5, 0.5).
     """
-    middles: FloatArray = cell_pairs(base_edges, cols).mean(axis=1) + 0.5
-    return middles
+    return cell_pairs(base_edges, cols).mean(axis=1) + 0.5
 
 
 def middle_sides(sides: FloatArray, boundary: LongArray, count: int) -> LongArray:
     """Return the side in the middle of each boundary.
 
-    Parameters
-    ----------
-    sides
-        float64 (n, 2), middles of sides.
-    boundary
-        int64 (n,), the boundary of each side; every one from 0 to count - 1 has a side.
-    count
-        Number of boundaries.
-
-    Returns
-    -------
-    LongArray
-        int64 (count,), the side nearest the mean of all sides of its boundary, so that its middle
-        lies on the boundary; ties go to the first side.
+    `sides`: float64 (n, 2), middles of sides; `boundary`: int64 (n,), the boundary of each side;
+    every one from 0 to count - 1 has a side; `count`: number of boundaries. Returns int64 (count,),
+    the side nearest the mean of all sides of its boundary, so that its middle lies on the boundary;
+    ties go to the first side.
     """
     sizes = np.bincount(boundary, minlength=count)
     sums = [np.bincount(boundary, weights=w, minlength=count) for w in sides.T]
     mean = np.stack(sums, axis=1) / sizes[:, None]
     squared = ((sides - mean[boundary]) ** 2).sum(axis=1)
     order = np.lexsort((squared, boundary))
-    found: LongArray = order[np.cumsum(sizes) - sizes]
-    return found
+    return order[np.cumsum(sizes) - sizes]
 
 
 def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
     """Return the middle of the side that `middle_sides` returns, float64 (count, 2)."""
-    middles: FloatArray = sides[middle_sides(sides, boundary, count)]
-    return middles
+    return sides[middle_sides(sides, boundary, count)]
 
 
 def line_of_loop(
@@ -85,15 +72,9 @@ def line_of_loop(
 
     The line leads to the face on either side.
 
-    Parameters
-    ----------
-    base_edge
-        The base edge that represents the self-loop.
-    level
-        Vertex of each flat cell, `edge_end` of the record, the index of the level, and the columns
-        of the grid.
-    came
-        Scratch, uint8 (rows * cols + cols,), zeros.
+    `base_edge`: the base edge that represents the self-loop; `level`: vertex of each flat cell,
+    `edge_end` of the record, the index of the level, and the columns of the grid; `came`: scratch,
+    uint8 (rows * cols + cols,), zeros.
     """
     field_of, _, _, cols = level
     cell = base_edge >> 1
@@ -107,14 +88,8 @@ def boundaries_of(
 ) -> tuple[LongArray, LongArray]:
     """Return the base edges of all boundaries of a level, and the arc of each, sorted by arc.
 
-    Parameters
-    ----------
-    base_edges
-        int64 (n_arcs,), the base edge that represents each arc.
-    is_self_loop
-        bool (n_arcs,).
-    level
-        As in `line_of_loop`.
+    `base_edges`: int64 (n_arcs,), the base edge that represents each arc; `is_self_loop`: bool
+    (n_arcs,); `level`: see `line_of_loop`.
     """
     field_of, _, _, cols = level
     cracks, classes = find_cracks(field_of, len(field_of) // cols, cols)

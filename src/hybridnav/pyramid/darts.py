@@ -35,12 +35,8 @@ class Resists(Protocol):
     def steering(self, field_of: IntArray, n_vertices: int) -> Steering:
         """Return the steering from a level on.
 
-        Parameters
-        ----------
-        field_of
-            int32 (n_cells,), the vertex of each cell at that level, -1 for none.
-        n_vertices
-            Vertices of that level.
+        `field_of`: int32 (n_cells,), the vertex of each cell at that level, -1 for none;
+        `n_vertices`: vertices of that level.
         """
 
 
@@ -52,20 +48,9 @@ class Steering(Protocol):
     ) -> tuple[LongArray, LongArray]:
         """Return the arcs that may be contracted at this level, and the rank of each.
 
-        Parameters
-        ----------
-        field_of
-            Returns the vertex of each flat cell, int32 (n_cells,), -1 for none: a pass over the
-            map.
-        darts, vertices
-            Those of the level.
-
-        Returns
-        -------
-        LongArray
-            int64 (n,), arcs, ascending.
-        LongArray
-            int64 (n,), from 0 to `WORST_RANK`, the least first.
+        `field_of`: returns the vertex of each flat cell, int32 (n_cells,), -1 for none: a pass over
+        the map; `darts`, `vertices`: those of the level. Returns int64 (n,), arcs, ascending. int64
+        (n,), from 0 to `WORST_RANK`, the least first.
         """
 
     def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
@@ -74,10 +59,6 @@ class Steering(Protocol):
     def merge(self, merged_into: IntArray, n_vertices: int) -> None:
         """Go on to the next level.
 
-        Parameters
-        ----------
-        merged_into
-            int32, the vertex of the next level that each vertex becomes part of.
-        n_vertices
-            Vertices of the next level.
+        `merged_into`: int32, the vertex of the next level that each vertex becomes part of;
+        `n_vertices`: vertices of the next level.
         """

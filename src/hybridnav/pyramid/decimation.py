@@ -71,27 +71,11 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     resistance there are none either, and the last round ends when every arc resists; the labels
     that it keeps apart, if any, stand for rooms.
 
-    Parameters
-    ----------
-    classes
-        uint8 `CellClass`, shape `(rows, cols)`.
-    linkage
-        The distance that stays below the limit.
-    limit
-        See `squared_limit`.
-    seed
-        Breaks ties between edges of equal attribute.
-    rooms
-        int32, label of each cell's room, -1 for none; same shape.
-    resistance
-        The rule by which arcs resist above the places.
-
-    Returns
-    -------
-    Record, BuildStats
-        All levels, and their sizes.
-    CombinatorialMap
-        The darts of the places: from the record they take longer than a build.
+    `classes`: uint8 `CellClass`, shape `(rows, cols)`; `linkage`: the distance that stays below the
+    limit; `limit`: see `squared_limit`; `seed`: breaks ties between edges of equal attribute;
+    `rooms`: int32, label of each cell's room, -1 for none; same shape; `resistance`: the rule by
+    which arcs resist above the places. Returns all levels, and their sizes. The darts of the
+    places: from the record they take longer than a build.
     """
     labels = rooms if resistance is None else resistance.kept_apart
     began = time.perf_counter()
@@ -135,17 +119,11 @@ def contract_within(  # noqa: PLR0913 - each criterion of merging is an argument
 ) -> None:
     """Contract stars from a start until no edge may be contracted and all that joins has joined.
 
-    Parameters
-    ----------
-    start
-        Where to start, with a record of the base. The kinds of vertices that join differ.
-    linkage, limit, seed
-        See `decimate`.
-    joins
-        uint8 by base edge, the level at which its two cells join whatever lies between them, 0 for
-        edges that this does not concern; empty for none.
-    survivors
-        bool by flat cell, cells that survive whatever they merge with; at most one of each kind.
+    `start`: where to start, with a record of the base. The kinds of vertices that join differ.
+    `linkage`, `limit`, `seed`: see `decimate`; `joins`: uint8 by base edge, the level at which its
+    two cells join whatever lies between them, 0 for edges that this does not concern; empty for
+    none; `survivors`: bool by flat cell, cells that survive whatever they merge with; at most one
+    of each kind.
     """
     run = Decimation(start, seed, _LINKAGES[linkage], limit)
     run.joins, run.last_join = joins, int(joins.max(initial=0))
@@ -167,23 +145,10 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
     There are two rounds: up to a number of cells a field, which makes the regions, and without such
     a limit. With rooms the first two stay inside them, and a third one forgets them.
 
-    Parameters
-    ----------
-    places
-        The level to start at.
-    record, stats
-        Those of its pyramid, which stay as they are.
-    most_cells
-        Most cells of a region.
-    seed
-        Breaks ties between arcs of equal rating.
-    rooms
-        int32, label of each cell's room, -1 for none.
-
-    Returns
-    -------
-    Record, BuildStats
-        Up to the level of the places they describe the same levels.
+    `places`: the level to start at; `record`, `stats`: those of its pyramid, which stay as they
+    are; `most_cells`: most cells of a region; `seed`: breaks ties between arcs of equal rating;
+    `rooms`: int32, label of each cell's room, -1 for none. Up to the level of the places
+    they describe the same levels.
     """
     classes = places.grid.classes
     kinds = classes if rooms is None else kinds_of(classes, rooms)
@@ -220,12 +185,8 @@ class Expansion:
     takes all of them away. An arc waits while another one at either of its endpoints is rated more
     than twice as high, so that the order is nearly that of one contraction at a time.
 
-    Parameters
-    ----------
-    places
-        The level to start from, whose arcs and fields are measured.
-    most_cells
-        Most cells of a field.
+    `places`: the level to start from, whose arcs and fields are measured; `most_cells`: most cells
+    of a field.
     """
 
     def __init__(self, places: Level, most_cells: int) -> None:
@@ -278,8 +239,7 @@ class Expansion:
         """Return the rating of arcs, int32 (n, 2), between different fields."""
         at = np.searchsorted(self._keys, self._keys_of(endpoints))
         area = self._areas[endpoints].astype(np.float64)
-        ratings: FloatArray = self._lengths[at] ** 2 / (area[:, 0] * area[:, 1])
-        return ratings
+        return self._lengths[at] ** 2 / (area[:, 0] * area[:, 1])
 
     def _joined(self, endpoints: IntArray, lengths: LongArray) -> tuple[LongArray, LongArray]:
         """Return the pairs of fields that have boundaries, and the length of all of each pair."""
@@ -291,8 +251,7 @@ class Expansion:
     def _keys_of(self, endpoints: IntArray) -> LongArray:
         """Return one number for each pair of vertices, in either order."""
         low, high = np.sort(endpoints.astype(np.int64), axis=1).T
-        keys: LongArray = low * len(self._areas) + high
-        return keys
+        return low * len(self._areas) + high
 
 
 _FIRST_KIND = 3
@@ -333,27 +292,15 @@ def contract_places(
 ) -> Fields:
     """Contract each of some places to its surviving cell, beside fields that stay as they are.
 
-    Parameters
-    ----------
-    places
-        int32 (rows, cols), the place of each cell that starts as a vertex of the base, from 1; 0
-        elsewhere.
-    survivors
-        bool (rows, cols), the cell of each place that survives. The linkage is "radius", and no
-        cell is too far from that of its place.
-    beside
-        bool (rows, cols), the cells beside the places: all that share a 2x2 block with one of
-        theirs; and uint8 by base edge, the level at which two of these join, 0 for all other edges.
-        Only these cells of the fields that stay are looked at. They join one another at the levels
-        at which they do so in their fields, so that edges to them end where they must.
-    criterion
-        When two fields merge.
-
-    Returns
-    -------
-    Fields
-        One for each place, with the ends of all its edges. What is stated about the cells beside
-        them is of no use elsewhere.
+    `places`: int32 (rows, cols), the place of each cell that starts as a vertex of the base, from
+    1; 0 elsewhere; `survivors`: bool (rows, cols), the cell of each place that survives. The
+    linkage is "radius", and no cell is too far from that of its place. `beside`: bool (rows, cols),
+    the cells beside the places: all that share a 2x2 block with one of theirs; and uint8 by base
+    edge, the level at which two of these join, 0 for all other edges. Only these cells of the
+    fields that stay are looked at. They join one another at the levels at which they do so in their
+    fields, so that edges to them end where they must. `criterion`: when two fields merge. Returns
+    one for each place, with the ends of all its edges. What is stated about the cells beside them
+    is of no use elsewhere.
     """
     in_blocks = np.where(survivors, np.int32(0), places)
     ring, joins = beside
@@ -372,12 +319,8 @@ def contract_places(
 def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
     """Contract cells until no edge between two of them may be contracted.
 
-    Parameters
-    ----------
-    classes
-        uint8 (rows, cols), `CellClass`; what is 0 counts as no vertex.
-    criterion
-        When two fields merge.
+    `classes`: uint8 (rows, cols), `CellClass`; what is 0 counts as no vertex; `criterion`: when two
+    fields merge.
     """
     classes.flags.writeable = False  # as the classes of a grid are: another type compiles anew
     start = start_at_base(classes, criterion.limit)

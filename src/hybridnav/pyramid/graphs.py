@@ -57,8 +57,7 @@ class CombinatorialMap:
     @property
     def phi(self) -> IntArray:
         """int32 (2 n_edges,), next dart round the face, which lies on the right of its darts."""
-        phi: IntArray = self.sigma[np.arange(len(self.sigma)) ^ 1]
-        return phi
+        return self.sigma[np.arange(len(self.sigma)) ^ 1]
 
     def faces(self) -> LongArray:
         """Label the faces: for each dart the number of its orbit under phi, dense from 0."""
@@ -140,16 +139,9 @@ def multigraph(
 ) -> nx.MultiGraph[int]:
     """Return a multigraph with an edge for each arc, parallel arcs and self-loops included.
 
-    Parameters
-    ----------
-    about
-        Attributes of the graph.
-    nodes
-        Nodes with their attributes.
-    endpoints
-        int (n_arcs, 2), the nodes that each arc joins; the key of an edge is the index of its arc.
-    columns
-        Attributes of the edges, a value for each arc.
+    `about`: attributes of the graph; `nodes`: nodes with their attributes; `endpoints`: int
+    (n_arcs, 2), the nodes that each arc joins; the key of an edge is the index of its arc;
+    `columns`: attributes of the edges, a value for each arc.
     """
     from networkx import MultiGraph  # noqa: PLC0415 - only who looks at graphs pays
 
@@ -165,16 +157,8 @@ def vertices_with_attributes(
 ) -> Iterator[Node]:
     """Yield each vertex with the attributes of its node in `Level.to_networkx`.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    cells
-        int64 (n, 2), the surviving cells.
-    classes
-        uint8 (n,), their `CellClass`.
-    areas
-        int64 (n,), cells of the receptive fields.
+    `cells`: int64 (n, 2), the surviving cells; `classes`: uint8 (n,), their `CellClass`; `areas`:
+    int64 (n,), cells of the receptive fields.
     """
     columns = zip(
         cells.tolist(),
@@ -275,21 +259,9 @@ def simple_graph(
 ) -> SimpleGraph:
     """Return a graph with at most one edge between two vertices and no self-loop.
 
-    Parameters
-    ----------
-    about
-        Attributes of the graph.
-    nodes
-        Vertices with their attributes.
-    arcs
-        int (n_arcs, 2), the vertices that each arc joins.
-    max_distance_m, through_m
-        float64 (n_arcs,), as in `Level`.
-
-    Returns
-    -------
-    SimpleGraph
-        The graph, and a report of the arcs that it drops.
+    `about`: attributes of the graph; `nodes`: vertices with their attributes; `arcs`: int (n_arcs,
+    2), the vertices that each arc joins; `max_distance_m`, `through_m`: float64 (n_arcs,), as in
+    `Level`. Returns the graph, and a report of the arcs that it drops.
     """
     from networkx import Graph  # noqa: PLC0415 - only who looks at graphs pays
 
@@ -313,12 +285,7 @@ def simple_graph(
 def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
     """Report the arcs of a graph that a simple graph drops.
 
-    Parameters
-    ----------
-    arcs
-        int (n_arcs, 2), the vertices that each arc joins.
-    n_vertices
-        Vertices of the graph.
+    `arcs`: int (n_arcs, 2), the vertices that each arc joins; `n_vertices`: vertices of the graph.
     """
     loops: BoolArray = arcs[:, 0] == arcs[:, 1]
     parallel = tuple(group for group in _groups(arcs, ~loops) if len(group.arcs) > 1)

@@ -188,8 +188,7 @@ class Level:
     @property
     def is_self_loop(self) -> BoolArray:
         """bool (n_arcs,), arcs that join a vertex to itself."""
-        loops: BoolArray = self.arcs[:, 0] == self.arcs[:, 1]
-        return loops
+        return self.arcs[:, 0] == self.arcs[:, 1]
 
     @cached_property
     def darts(self) -> CombinatorialMap:
@@ -245,10 +244,9 @@ class Level:
             ends[:-1, 0] = among.ravel()[:-1] & among.ravel()[1:]
             ends[: -among.shape[1], 1] = (among[:-1] & among[1:]).ravel()
             edge_end = np.where(ends.ravel(), edge_end, 0).astype(np.uint8)
-        found: LongArray = _field_kernels.darts_at_corners(
+        return _field_kernels.darts_at_corners(
             cells, direction, self.base_edges, edge_end, self.index, self._grid.shape[1]
         )
-        return found
 
     @cached_property
     def dual(self) -> DualGraph:

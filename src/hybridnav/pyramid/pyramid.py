@@ -260,8 +260,7 @@ class DualGraphPyramid:
         rows, cols = np.moveaxis(
             lower.cells[checked_vertices(vertices, lower.index, lower.n_vertices)], -1, 0
         )
-        found: IntArray = upper.field_of[rows, cols]
-        return found
+        return upper.field_of[rows, cols]
 
     def descendants(self, vertex: int, *, level: int, to: int) -> LongArray:
         """Return the vertices of a lower level whose fields lie in the field of a higher one.

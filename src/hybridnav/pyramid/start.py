@@ -86,8 +86,7 @@ class Parts(NamedTuple):
         """Return the part of each of some cells, (n, 2), int32: -1 for those that are not free."""
         row, col = cells.T
         fine = np.where(self.classes[row, col] == 1, self.fine_of_square[row // 2, col // 2], -1)
-        labels: IntArray = np.append(self.part_of, np.int32(-1))[fine]
-        return labels
+        return np.append(self.part_of, np.int32(-1))[fine]
 
 
 # Shares of the merge distance, so that a map in other units has the same parts. At 4 m: passages
@@ -113,12 +112,7 @@ def parts_of(classes: ByteArray, limit: int) -> Parts:
     are where a topological map of a building is divided is the idea of S. Thrun's critical lines
     (Artificial Intelligence 99(1), 1998).
 
-    Parameters
-    ----------
-    classes
-        uint8 `CellClass`, shape `(rows, cols)`.
-    limit
-        See `decimation.squared_limit`.
+    `classes`: uint8 `CellClass`, shape `(rows, cols)`; `limit`: see `decimation.squared_limit`.
     """
     farthest = _WIDEST * _throat_kernels.STRAIGHT * limit**0.5
     most = int(min(max(farthest, _throat_kernels.STRAIGHT), _FARTHEST))
@@ -168,14 +162,9 @@ def mark_blocks(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = N
 def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = None) -> Start:
     """Fill the record for the blocks of the base, and return their darts and vertices.
 
-    Parameters
-    ----------
-    kinds
-        uint8, uint16 or int32 (rows, cols); see `kinds_of`.
-    limit
-        See `squared_limit`; no block is wider than half of it.
-    in_blocks
-        The kinds of the cells that may lie in blocks, 0 elsewhere; None for all cells.
+    `kinds`: uint8, uint16 or int32 (rows, cols); see `kinds_of`; `limit`: see `squared_limit`; no
+    block is wider than half of it; `in_blocks`: the kinds of the cells that may lie in blocks, 0
+    elsewhere; None for all cells.
     """
     marked = mark_blocks(kinds, limit, in_blocks=in_blocks)
     record, power, new_edge, n_vertices, n_edges = marked
@@ -187,14 +176,9 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
 def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
     """Forget what a record has above a level, and return the darts and vertices of the level.
 
-    Parameters
-    ----------
-    level
-        A level at which all blocks are whole, such as that of the places.
-    record
-        The record of its pyramid; it is copied.
-    kinds
-        uint8, uint16 or int32 (rows, cols), kinds that no field of the level mixes.
+    `level`: a level at which all blocks are whole, such as that of the places; `record`: the record
+    of its pyramid; it is copied; `kinds`: uint8, uint16 or int32 (rows, cols), kinds that no field
+    of the level mixes.
     """
     record = record.up_to(level.index)
     cols = kinds.shape[1]
@@ -362,18 +346,9 @@ def steps_to_parents(cols: int) -> LongArray:
 def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
     """Return the power of the block of every aligned 2x2 cells, 0 outside blocks.
 
-    Parameters
-    ----------
-    kinds
-        The kind of each cell, (rows, cols), read-only; 0 for no vertex.
-    largest
-        Power of the largest blocks.
-
-    Returns
-    -------
-    ByteArray
-        uint8, with one row and one column more than there are whole squares, for the cells beyond
-        them.
+    `kinds`: the kind of each cell, (rows, cols), read-only; 0 for no vertex; `largest`: power of
+    the largest blocks. Returns uint8, with one row and one column more than there are whole
+    squares, for the cells beyond them.
     """
     power = np.zeros((kinds.shape[0] // 2 + 1, kinds.shape[1] // 2 + 1), np.uint8)
     squares = kinds

@@ -131,8 +131,7 @@ class CostLine:
         FloatArray
             float64 (m, 2), positions with the same ends; never dearer.
         """
-        found: FloatArray = kernels.settle(self.free, self.factors, path)[0]
-        return found
+        return kernels.settle(self.free, self.factors, path)[0]
 
     def rest_of(self, line: FloatArray, start: FloatArray, most_m: float) -> FloatArray | None:
         """Return the rest of a line from a point beside it.

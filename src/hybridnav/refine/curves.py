@@ -46,21 +46,9 @@ class Curve:
         """Return poses along the curve, at most a step apart, including the endpoints of segments,
         each once.
 
-        Parameters
-        ----------
-        step_m
-            Metres, positive.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n, 3), `(x, y, yaw)`, metres and radians; the yaw is not wrapped.
-
-        Raises
-        ------
-        InvalidValueError
-            When the step is not positive, or so small that there would be more than ten million
-            poses.
+        `step_m`: metres, positive. Returns float64 (n, 3), `(x, y, yaw)`, metres and radians; the
+        yaw is not wrapped. Raises `InvalidValueError` when the step is not positive, or so small
+        that there would be more than ten million poses.
         """
         if not step_m > 0 or self.length_m / step_m > _MAX_POSES:
             raise InvalidValueError(
@@ -146,22 +134,12 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
     headings of the poses in between are left out: a robot that can turn to them can turn past them,
     one way round or the other.
 
-    Parameters
-    ----------
-    check
-        Check of motions.
-    poses
-        float64 (n, 3), n >= 1, `(x, y, yaw)`, metres and radians, map frame.
-    reverses
-        Whether the robot may drive backwards too.
-
-    Returns
-    -------
-    FloatArray
-        float64 (m, 3). From each pose to the next the robot either turns on the spot, the short
-        way, or drives straight with one heading. Where it turns, a point occurs with the heading
-        before and after, and with one half-way if it turns by half a circle or the long way round.
-        Without rows if a motion between two of the poses is not valid.
+    `poses`: float64 (n, 3), n >= 1, `(x, y, yaw)`, metres and radians, map frame; `reverses`:
+    whether the robot may drive backwards too. Returns float64 (m, 3). From each pose to the next
+    the robot either turns on the spot, the short way, or drives straight with one heading. Where it
+    turns, a point occurs with the heading before and after, and with one half-way if it turns by
+    half a circle or the long way round. Without rows if a motion between two of the poses is not
+    valid.
     """
     states: list[Pose] = [tuple(pose) for pose in poses.tolist()]
     drives = _drives(check, states, reverses=reverses)

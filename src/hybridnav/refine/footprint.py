@@ -64,16 +64,9 @@ class Footprint:
     def of(cls, shape: Any) -> Footprint:
         """Return a footprint from another one, from a shapely polygon or from corners.
 
-        Parameters
-        ----------
-        shape
-            A footprint; a shapely `Polygon` without holes; or corners in order, (n, 2). Metres,
-            robot frame.
-
-        Raises
-        ------
-        InvalidValueError
-            When the polygon has holes, or the corners are refused.
+        `shape`: a footprint; a shapely `Polygon` without holes; or corners in order, (n, 2).
+        Metres, robot frame. Raises `InvalidValueError` when the polygon has holes, or the corners
+        are refused.
         """
         if isinstance(shape, cls):
             return shape
@@ -89,10 +82,7 @@ class Footprint:
         Nav2 moves each corner outwards along both axes of the robot: the same for a rectangle along
         them about the base, and less than the padding for some others.
 
-        Parameters
-        ----------
-        padding_m
-            Metres, >= 0.
+        `padding_m`: metres, >= 0.
         """
         if not padding_m > 0:
             return self

@@ -29,14 +29,8 @@ if TYPE_CHECKING:
 def open_cells(grid: OccupancyGrid, *closed: LongArray | None, allow_unexplored: bool) -> BoolArray:
     """Return which cells may be entered, bool (rows, cols), in an array of its own.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    closed
-        int64 (n,), flat cells that may not be entered; None for none.
-    allow_unexplored
-        Whether unexplored cells may be entered.
+    `closed`: int64 (n,), flat cells that may not be entered; None for none; `allow_unexplored`:
+    whether unexplored cells may be entered.
     """
     free = grid.enterable(allow_unexplored=allow_unexplored)
     for cells in closed:
@@ -174,10 +168,7 @@ class Sight:
         BoolArray
             bool (n,); true for two equal endpoints.
         """
-        found: BoolArray = clear_segments(
-            self._marks, np.ascontiguousarray(tails), np.ascontiguousarray(heads)
-        )
-        return found
+        return clear_segments(self._marks, np.ascontiguousarray(tails), np.ascontiguousarray(heads))
 
     def apart(
         self, taken: FloatArray, candidates: FloatArray, spacing_cells: float, most: int
@@ -201,8 +192,7 @@ class Sight:
             bool (n,), the chosen candidates.
         """
         both = np.concatenate([taken, candidates])
-        found: BoolArray = apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
-        return found
+        return apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
 
     def reaches(self, corners: FloatArray, steps: FloatArray, farthest: float) -> FloatArray:
         """Return about how far rays from lattice corners run through free cells.
@@ -221,8 +211,7 @@ class Sight:
         FloatArray
             float64 (n,), in cells, up to a step of half a cell.
         """
-        found: FloatArray = reaches(self._marks, corners, steps, farthest)
-        return found
+        return reaches(self._marks, corners, steps, farthest)
 
     def shared(
         self, starts: FloatArray, goals: FloatArray, limits: FloatArray, positions: FloatArray
@@ -243,8 +232,7 @@ class Sight:
         BoolArray
             bool (n,).
         """
-        found: BoolArray = shared(self._marks, starts, goals, limits, positions)
-        return found
+        return shared(self._marks, starts, goals, limits, positions)
 
 
 class Refiner(Protocol):

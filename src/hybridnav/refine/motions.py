@@ -139,8 +139,7 @@ class MotionCheck:
         x0, y0, x1, y1
             Metres, map frame.
         """
-        valid: bool = kernels.point_runs(self._marks, self._place, x0, y0, x1, y1)
-        return valid
+        return kernels.point_runs(self._marks, self._place, x0, y0, x1, y1)
 
     def turn_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float
@@ -158,10 +157,7 @@ class MotionCheck:
         yaw0, yaw1
             Headings in radians.
         """
-        valid: bool = kernels.body_turns(
-            self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1
-        )
-        return valid
+        return kernels.body_turns(self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1)
 
     def drive_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self,
@@ -186,10 +182,9 @@ class MotionCheck:
         backwards
             Whether it drives backwards: its heading is then opposite to the direction of travel.
         """
-        valid: bool = kernels.body_drives_straight(
+        return kernels.body_drives_straight(
             self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, backwards
         )
-        return valid
 
     def spin(self, x: float, y: float, yaw0: float, yaw1: float) -> float:
         """Return the turn on the spot by which the robot gets from one heading to another.
@@ -207,10 +202,7 @@ class MotionCheck:
             Radians, positive counter-clockwise: the short way if it is free, else the other way
             round; NaN if neither is.
         """
-        turn: float = kernels.turn_on_the_spot(
-            self._marks, self._place, self._body, x, y, yaw0, yaw1
-        )
-        return turn
+        return kernels.turn_on_the_spot(self._marks, self._place, self._body, x, y, yaw0, yaw1)
 
     def curve_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self,
@@ -234,10 +226,9 @@ class MotionCheck:
         radius_m
             Radius of every arc, positive.
         """
-        valid: bool = kernels.body_drives(
+        return kernels.body_drives(
             self._marks, self._place, self._body, x0, y0, yaw0, kinds, lengths_m, radius_m
         )
-        return valid
 
     def dubins_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
@@ -251,10 +242,9 @@ class MotionCheck:
         radius_m
             Turning radius.
         """
-        valid: bool = kernels.body_steers(
+        return kernels.body_steers(
             self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, radius_m, False
         )
-        return valid
 
     def reeds_shepp_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
@@ -263,10 +253,9 @@ class MotionCheck:
 
         Parameters are those of `dubins_valid`.
         """
-        valid: bool = kernels.body_steers(
+        return kernels.body_steers(
             self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, radius_m, True
         )
-        return valid
 
     def path_valid(self, points: ArrayLike) -> bool:
         """Return whether the robot may go along a polyline.

@@ -38,17 +38,10 @@ class ArcWalk:
 class ArcSearch:
     """Search of an undirected graph for the cheapest walks.
 
-    Parameters
-    ----------
-    allowed
-        bool (n_vertices,), the vertices that walks may pass.
-    arcs
-        int (n_arcs, 2), the vertices that each arc joins.
-    costs, ties
-        float64 (n_arcs,), the cost of an arc, and a second cost that decides between walks of equal
-        cost; >= 0, any unit.
-    kept
-        Indices of the arcs that walks may use; None for all.
+    `allowed`: bool (n_vertices,), the vertices that walks may pass; `arcs`: int (n_arcs, 2), the
+    vertices that each arc joins; `costs`, `ties`: float64 (n_arcs,), the cost of an arc, and a
+    second cost that decides between walks of equal cost; >= 0, any unit; `kept`: indices of the
+    arcs that walks may use; None for all.
     """
 
     def __init__(

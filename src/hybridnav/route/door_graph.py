@@ -163,8 +163,7 @@ class DoorGraph:
 
         They are -1 if closed cells leave nothing of the boundary. `arcs` are indices into `arcs`.
         """
-        found: LongArray = self._middle[arcs]
-        return found
+        return self._middle[arcs]
 
     def closed(self, flat: LongArray) -> DoorGraph:
         """Return the graph with some cells closed; those of the last closures are kept.

@@ -20,14 +20,8 @@ if TYPE_CHECKING:
 class RoomFields:
     """The fields of the room level.
 
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    closed
-        int64 (m,), flat cells that may not be entered; None for none.
-    units
-        int64 (rows, cols), the factor of each cell in units; None for lengths.
+    `closed`: int64 (m,), flat cells that may not be entered; None for none; `units`: int64 (rows,
+    cols), the factor of each cell in units; None for lengths.
     """
 
     def __init__(
@@ -42,8 +36,7 @@ class RoomFields:
 
     def vertices_of(self, cells: LongArray) -> LongArray:
         """Return the vertex of each flat cell, -1 for none."""
-        found: LongArray = self._field_of.ravel()[cells].astype(np.int64)
-        return found
+        return self._field_of.ravel()[cells].astype(np.int64)
 
     def window(self, vertex: int) -> FieldWindow:
         """Return the part of the map that a field spans."""
@@ -92,8 +85,7 @@ class FieldWindow(NamedTuple):
 
             reached = dijkstra(self.moves, directed=False, indices=at[:1])[0]
             found = np.where(np.isfinite(reached), reached, -1.0).astype(np.int64)
-        costs: LongArray = np.where(inside, found[at], -1)[1:]
-        return costs
+        return np.where(inside, found[at], -1)[1:]
 
 
 def _weighted_moves(

@@ -158,5 +158,4 @@ class Corridor:
 
     def mask(self) -> BoolArray:
         """Return the cells in the corridor, bool (rows, cols)."""
-        inside: BoolArray = (self.field_of >= 0) & self.places[self.field_of]
-        return inside
+        return (self.field_of >= 0) & self.places[self.field_of]

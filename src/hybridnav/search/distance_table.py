@@ -71,17 +71,8 @@ def distance_blocks(
     Labels of a block of goals are sorted into buckets by corner, and looked up for each start, on
     all cores. Memory is that of two blocks of labels and the blocks of the table at work.
 
-    Parameters
-    ----------
-    source
-        Makes labels.
-    starts, goals
-        The ends; their cells are free.
-
-    Yields
-    ------
-    tuple
-        The rows and columns of a block, and float64 lengths, infinite without a path.
+    `source`: makes labels; `starts`, `goals`: the ends; their cells are free. Yields the rows and
+    columns of a block, and float64 lengths, infinite without a path.
     """
     with ThreadPoolExecutor(cores()) as pool:
         for first in range(0, len(goals[0]), BLOCK):
@@ -133,14 +124,8 @@ def _parts(whole: slice, most: int) -> list[slice]:
 class GridLabels:
     """Least costs of cells from each start to all goals, by Dijkstra's algorithm; no labels.
 
-    Parameters
-    ----------
-    enterable
-        bool (rows, cols), cells that may be entered.
-    units
-        int32 (rows, cols), the factor of each cell in units; None for 1.
-    corner_cutting
-        As for `GridSearch`.
+    `enterable`: bool (rows, cols), cells that may be entered; `units`: int32 (rows, cols), the
+    factor of each cell in units; None for 1; `corner_cutting`: see `GridSearch`.
     """
 
     n_corners, most = 1, 16
@@ -155,8 +140,7 @@ class GridLabels:
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells."""
-        flat: LongArray = ends[0] @ np.array([self._grid[2], 1])
-        return flat
+        return ends[0] @ np.array([self._grid[2], 1])
 
     def labels(self, ends: LongArray) -> Labels:
         """Return labels without entries."""

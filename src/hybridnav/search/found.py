@@ -67,8 +67,7 @@ class ClosedCells:
         if not len(self.flat):
             return np.zeros(len(flat), dtype=np.bool_)
         at = np.minimum(np.searchsorted(self.flat, flat), len(self.flat) - 1)
-        found: BoolArray = self.flat[at] == flat
-        return found
+        return self.flat[at] == flat
 
     def __or__(self, other: ClosedCells) -> ClosedCells:
         """Return the cells that either closes."""
@@ -79,12 +78,8 @@ class ClosedCells:
     def meets(self, cells: LongArray, grid: OccupancyGrid) -> bool:
         """Return whether a path stands on a closed cell, or illegally passes one on a diagonal.
 
-        Parameters
-        ----------
-        cells
-            int64 (n, 2), legal moves.
-        grid
-            The map; if its corners may be cut, diagonals need no side cells.
+        `cells`: int64 (n, 2), legal moves; `grid`: the map; if its corners may be cut, diagonals
+        need no side cells.
         """
         cols = grid.shape[1]
         flat = cells[:, 0] * cols + cells[:, 1]
@@ -261,11 +256,7 @@ class Method(Protocol):
     def take_costs(self, costs: CostLayer, box: Box) -> bool:  # noqa: ARG002 - a default
         """Plan by other costs from now on; no query runs meanwhile. False to be made anew.
 
-        Parameters
-        ----------
-        costs
-            The new costs of all cells.
-        box
-            First row, last row + 1, first column, last column + 1 of the cells that differ.
+        `costs`: the new costs of all cells; `box`: first row, last row + 1, first column, last
+        column + 1 of the cells that differ.
         """
         return False

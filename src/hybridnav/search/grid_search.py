@@ -71,12 +71,7 @@ class _Work:
 class _Weights:
     """The factors of the cells in units, and what they determine.
 
-    Parameters
-    ----------
-    units
-        int32 (rows, cols).
-    enterable
-        bool (rows, cols), the cells whose units matter.
+    `units`: int32 (rows, cols); `enterable`: bool (rows, cols), the cells whose units matter.
     """
 
     def __init__(self, units: IntArray, enterable: BoolArray) -> None:
@@ -100,15 +95,10 @@ class GridSearch:
     Moves go to the 8 neighbours; a diagonal needs both side cells enterable (no corner cutting).
     Moves are judged once, on the whole grid; a corridor limits only the cells stood on.
 
-    Parameters
-    ----------
-    enterable
-        bool (rows, cols), cells that paths may use; start and goal must be among them.
-    corner_cutting
-        Whether a diagonal needs no side cell enterable.
-    units
-        int32 (rows, cols), the factor of each cell in units, from 1 to 2^24: a move costs its
-        length times the sum of the units of its two cells. None makes costs lengths.
+    `enterable`: bool (rows, cols), cells that paths may use; start and goal must be among them;
+    `corner_cutting`: whether a diagonal needs no side cell enterable; `units`: int32 (rows, cols),
+    the factor of each cell in units, from 1 to 2^24: a move costs its length times the sum of the
+    units of its two cells. None makes costs lengths.
     """
 
     def __init__(
@@ -141,20 +131,13 @@ class GridSearch:
     ) -> CellPath:
         """Find a path of the least cost between the centres of two cells.
 
-        Parameters
-        ----------
-        start, goal
-            Enterable cells as (row, col); with a corridor, inside it.
-        field_of
-            int16 or int32 (rows, cols), a label for each enterable cell; None for the whole grid.
-        in_corridor
-            bool, whether the cells of each label may be stood on; goes with `field_of`.
-        limit
-            Integer cost: only cheaper paths are searched; None for all. Lengths are counted in
-            `STRAIGHT` and `DIAGONAL`.
-        blocked
-            int64 (n,), flat cells of the grid that this search may not enter, or pass on a diagonal
-            unless corners may be cut; the time is proportional to n.
+        `start`, `goal`: enterable cells as (row, col); with a corridor, inside it; `field_of`:
+        int16 or int32 (rows, cols), a label for each enterable cell; None for the whole grid;
+        `in_corridor`: bool, whether the cells of each label may be stood on; goes with `field_of`;
+        `limit`: integer cost: only cheaper paths are searched; None for all. Lengths are counted in
+        `STRAIGHT` and `DIAGONAL`. `blocked`: int64 (n,), flat cells of the grid that this search
+        may not enter, or pass on a diagonal unless corners may be cut; the time is proportional to
+        n.
         """
         first = start[0] * self._cols + start[1]
         last = goal[0] * self._cols + goal[1]
@@ -212,10 +195,7 @@ class GridSearch:
 def moves_ahead() -> NDArray[np.uint32]:
     """Return the legal moves by direction of arrival that turn by at most 90 degrees.
 
-    Returns
-    -------
-    NDArray
-        uint32 (9 * 256,), as the successors of `move_tables`.
+    Returns uint32 (9 * 256,), as the successors of `move_tables`.
     """
     mask = np.arange(256, dtype=np.uint32)
     successors = np.zeros((9, 256), dtype=np.uint32)
@@ -245,12 +225,9 @@ def move_tables(*, corner_cutting: bool) -> tuple[NDArray[np.uint32], NDArray[np
     the left or right of d, z two turns; d diagonal, y two turns, z three. These y are the detours,
     and must be put back where z is outside a corridor. All other paths are one move from p to y.
 
-    Returns
-    -------
-    tuple
-        uint32 (9 * 256,) each, index 256 * d + mask, d = 8 for the start: the successors, and the
-        detours that are not among them. Moves are digits of four bits, 8 + direction, the first one
-        lowest.
+    Returns uint32 (9 * 256,) each, index 256 * d + mask, d = 8 for the start: the successors, and
+    the detours that are not among them. Moves are digits of four bits, 8 + direction, the first one
+    lowest.
     """
     mask = np.arange(256, dtype=np.uint32)
     legal = [mask >> k & 1 == 1 for k in range(8)]
@@ -308,22 +285,11 @@ def cheapest_waypoints(
     Dijkstra's algorithm runs from set to set: the search for the next set begins with the costs of
     the cells of the last one.
 
-    Parameters
-    ----------
-    enterable
-        bool (rows, cols), cells that the path may use. Moves go to the 8 neighbours; a diagonal
-        needs both side cells, unless corners may be cut.
-    sets
-        Two or more sets, int64 (n,), of flat enterable cells.
-    corner_cutting
-        Whether a diagonal needs no side cell.
-    units
-        int32 (rows, cols), the factor of each cell in units; None makes costs lengths.
-
-    Returns
-    -------
-    list of int | None
-        A flat cell of each set; None if one of them cannot be reached.
+    `enterable`: bool (rows, cols), cells that the path may use. Moves go to the 8 neighbours; a
+    diagonal needs both side cells, unless corners may be cut. `sets`: two or more sets, int64 (n,),
+    of flat enterable cells; `corner_cutting`: whether a diagonal needs no side cell; `units`: int32
+    (rows, cols), the factor of each cell in units; None makes costs lengths. Returns a flat cell of
+    each set; None if one of them cannot be reached.
     """
     moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
     weights = None if units is None else np.ascontiguousarray(units).ravel()
@@ -350,21 +316,15 @@ def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> L
     """Return the octile costs of shortest paths from a cell, int64 (rows * cols,), -1 where
     unsettled.
 
-    Parameters
-    ----------
-    moves
-        uint8 (rows, cols), legal moves of each cell.
-    cell
-        Where the search starts, (row, col).
-    targets
-        int64 (n,), flat cells: the search ends once all that can be reached are settled.
+    `moves`: uint8 (rows, cols), legal moves of each cell; `cell`: where the search starts, (row,
+    col); `targets`: int64 (n,), flat cells: the search ends once all that can be reached are
+    settled.
     """
     cols = moves.shape[1]
     is_target = np.zeros(moves.size, dtype=np.bool_)
     is_target[targets] = True
     source = np.array([cell[0] * cols + cell[1]])
     start_cost = np.zeros(1, dtype=np.int64)
-    costs: LongArray = _waypoint_kernels.spread(
-        moves.ravel(), None, cols, source, start_cost, is_target, True
-    )[0]
-    return costs
+    return _waypoint_kernels.spread(moves.ravel(), None, cols, source, start_cost, is_target, True)[
+        0
+    ]

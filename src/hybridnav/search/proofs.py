@@ -50,16 +50,9 @@ def grid_near(
 ) -> Grid:
     """Return the part of a map where a path between two nodes may be shorter than a length.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), cells that may be entered.
-    units
-        int32 (rows, cols), the factors of the cells in units of 2^-14; None for 1.
-    ends
-        int64 (2, 2), the nodes (row, col), cells or corners of cells.
-    length_cells
-        Length that no path of interest has.
+    `free`: bool (rows, cols), cells that may be entered; `units`: int32 (rows, cols), the factors
+    of the cells in units of 2^-14; None for 1; `ends`: int64 (2, 2), the nodes (row, col), cells or
+    corners of cells; `length_cells`: length that no path of interest has.
     """
     low, high = _box_of(free, (ends[0], ends[1]), length_cells)
     part = np.s_[low[0] : high[0], low[1] : high[1]]
@@ -149,19 +142,11 @@ def parting_chain(
 ) -> LongArray | None:
     """Return walls that part two cells: a closed chain that goes round one of the two.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), cells that may be entered; all else, and the outside, are walls.
-    start, goal
-        Free cells (row, col).
-
-    Returns
-    -------
-    LongArray | None
-        int64 (n, 2), (row, col), the last one equal to the first one; each is an 8-neighbour of
-        the next one. Cells outside the map, from -1 to rows or columns, are its rim. It is the
-        shorter border of all that one of both reaches, beside the other. None if they are joined.
+    `free`: bool (rows, cols), cells that may be entered; all else, and the outside, are walls;
+    `start`, `goal`: free cells (row, col). Returns int64 (n, 2), (row, col), the last one equal to
+    the first one; each is an 8-neighbour of the next one. Cells outside the map, from -1 to rows or
+    columns, are its rim. It is the shorter border of all that one of both reaches, beside the
+    other. None if they are joined.
     """
     parts, _ = ndimage.label(np.pad(free, 2))
     one, other = (parts[row + 2, col + 2] for row, col in (start, goal))
@@ -180,27 +165,16 @@ def _chain_round(area: BoolArray, goal: tuple[int, int]) -> LongArray:
     chain = np.concatenate([chain, chain[:1]])
     is_new = np.ones(len(chain), np.bool_)
     is_new[1:] = (chain[1:] != chain[:-1]).any(axis=1)
-    found: LongArray = chain[is_new]
-    return found
+    return chain[is_new]
 
 
 def strings_near(free: BoolArray, ends: FloatArray, bound_cells: float) -> list[Any]:
     """Return the corners over which a path may be shorter than a bound, as far as the straight way
     to the goal tells.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), cells that may be entered.
-    ends
-        float64 (2, 2), positions (row, col) of start and goal in grid units.
-    bound_cells
-        Length in cells.
-
-    Returns
-    -------
-    list
-        Of (row, col, distance from the start in cells).
+    `free`: bool (rows, cols), cells that may be entered; `ends`: float64 (2, 2), positions (row,
+    col) of start and goal in grid units; `bound_cells`: length in cells. Returns rows of (row, col,
+    distance from the start in cells).
     """
     cells = np.floor(ends).astype(np.int64)
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)

@@ -44,12 +44,8 @@ class Enclosed:
 class Inclusion:
     """Inclusion on one level of a pyramid.
 
-    Parameters
-    ----------
-    level
-        The level whose vertices are the places.
-    islands
-        Obstacles and components of its grid.
+    `level`: the level whose vertices are the places; `islands`: obstacles and components of its
+    grid.
     """
 
     def __init__(self, level: Level, islands: Islands) -> None:
@@ -140,12 +136,8 @@ class Inclusion:
     def encloses(self, place: int, *, least_area_cells: float = 0.0) -> Enclosed:
         """Find what lies inside the self-loops of a place.
 
-        Parameters
-        ----------
-        place
-            Dense index.
-        least_area_cells
-            Obstacles smaller than this, with all they surround, are left out and counted.
+        `place`: dense index; `least_area_cells`: obstacles smaller than this, with all they
+        surround, are left out and counted.
         """
         islands = self._islands
         inside = np.zeros(self._level.n_vertices, dtype=np.bool_)
@@ -173,17 +165,9 @@ class Inclusion:
     def ring_round_places(self, places: LongArray) -> LongArray:
         """Return the cycle of places round a connected set of places, counter-clockwise.
 
-        Parameters
-        ----------
-        places
-            Dense indices of places that arcs connect.
-
-        Returns
-        -------
-        LongArray
-            Places, the smallest index first; empty where the set touches the rim. Obstacles that
-            the set touches count as part of it; where one of them surrounds its component, these
-            are the places round that obstacle.
+        `places`: dense indices of places that arcs connect. Result: places, the smallest index
+        first; empty where the set touches the rim. Obstacles that the set touches count as part of
+        it; where one of them surrounds its component, these are the places round that obstacle.
         """
         level, dual = self._level, self._level.dual
         inside = np.zeros(level.n_vertices, dtype=np.bool_)
@@ -260,8 +244,7 @@ def _value_at(values: LongArray, index: LongArray) -> LongArray:
 def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:
     ones = np.ones(len(arcs), dtype=np.int8)
     graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
-    label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
-    return label
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:

@@ -174,8 +174,7 @@ class TopologicalMap:
     @cached_property
     def areas_m2(self) -> FloatArray:
         """float64 (n_places,), area of each place in square metres."""
-        areas: FloatArray = self.level.areas * np.float64(self.grid.cell_area_m2)
-        return areas
+        return self.level.areas * np.float64(self.grid.cell_area_m2)
 
     def place_at(self, cell: tuple[int, int]) -> int:
         """Return the dense index of the place that holds a cell of the grid, -1 for an occupied

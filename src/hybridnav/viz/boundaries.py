@@ -37,18 +37,9 @@ _TAUT = 0.5
 def boundary_line(level: Level, arc: int) -> LongArray:
     """Return the line of a dual edge, along the sides between the cells of its boundary.
 
-    Parameters
-    ----------
-    level
-        A level.
-    arc
-        Index of the arc that the dual edge crosses.
-
-    Returns
-    -------
-    LongArray
-        int64 (n_cracks + 1, 2), corners (row, col) in grid units, from the face of dart 2 arc to
-        that of dart 2 arc + 1. The line of a ring ends at its start.
+    `arc`: index of the arc that the dual edge crosses. Returns int64 (n_cracks + 1, 2), corners
+    (row, col) in grid units, from the face of dart 2 arc to that of dart 2 arc + 1. The line of a
+    ring ends at its start.
     """
     pairs = np.sort(level.boundary(arc), axis=1)
     sides = [_endpoints_of_side(*pair) for pair in pairs.tolist()]
@@ -248,16 +239,9 @@ class Hole:
     ) -> Hole:
         """Find a place for the dual vertex: deep inside a hole, between the endpoints outside.
 
-        Parameters
-        ----------
-        mask
-            Cells of the hole in a window with a margin of one cell.
-        nearest
-            int64 (n, 2), the cell beside each end of a dual edge.
-        endpoints
-            float64 (n, 2), these endpoints.
-        outside
-            Whether the vertex stands for the outside.
+        `mask`: cells of the hole in a window with a margin of one cell; `nearest`: int64 (n, 2),
+        the cell beside each end of a dual edge; `endpoints`: float64 (n, 2), these endpoints;
+        `outside`: whether the vertex stands for the outside.
         """
         cells = np.argwhere(mask)
         number = np.full(mask.shape, -1, dtype=np.int64)

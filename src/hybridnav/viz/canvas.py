@@ -40,17 +40,8 @@ _MOST_IN = 500
 def new_figure(width_in: float, height: float) -> Figure:
     """Return a new figure.
 
-    Parameters
-    ----------
-    width_in
-        Width in inches.
-    height
-        Height in widths.
-
-    Raises
-    ------
-    InvalidValueError
-        When the width is not positive, or above 500 inches.
+    `width_in`: width in inches; `height`: height in widths. Raises `InvalidValueError` when the
+    width is not positive, or above 500 inches.
     """
     if not 0 < width_in <= _MOST_IN:
         raise InvalidValueError(
@@ -219,8 +210,7 @@ def _averaged(image: ByteArray, block: int) -> ByteArray:
     rows, cols, _ = image.shape
     padded = np.pad(image, ((0, -rows % block), (0, -cols % block), (0, 0)), mode="edge")
     blocks = padded.reshape(padded.shape[0] // block, block, -1, block, 3)
-    averaged: ByteArray = blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
-    return averaged
+    return blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
 
 
 # Files of figures: equal bytes for equal pictures.

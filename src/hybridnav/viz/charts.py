@@ -126,8 +126,7 @@ def plot_losses(
     Parameters
     ----------
     losses
-        For each method the losses of its pairs, 0.01 for 1 %. Infinite and NaN ones are left
-        out.
+        For each method the losses of its pairs, 0.01 for 1 %. Infinite and NaN ones are left out.
     styles
         By method, see `method_styles`; by default made here.
     ax
@@ -196,8 +195,7 @@ def plot_speed(  # noqa: PLR0913 - all but two have defaults
     Parameters
     ----------
     losses
-        For each method the losses of its pairs, 0.01 for 1 %. Infinite and NaN ones are left
-        out.
+        For each method the losses of its pairs, 0.01 for 1 %. Infinite and NaN ones are left out.
     times_ms
         For each method of `losses` the median time of a query in milliseconds.
     styles

@@ -44,8 +44,7 @@ class Field:
     @cached_property
     def corner(self) -> LongArray:
         """(row, col) of the window's first cell in the grid."""
-        corner: LongArray = self.level.receptive_field(self.vertex).min(axis=0) - 1
-        return corner
+        return self.level.receptive_field(self.vertex).min(axis=0) - 1
 
     @cached_property
     def cells(self) -> LongArray:
@@ -74,13 +73,10 @@ class Field:
     def graph(self, lines: LongArray | None = None) -> Any:
         """Return the moves between the cells of copies of the field, dearer at the rim.
 
-        Parameters
-        ----------
-        lines
-            int64 (2, rows, cols), a set of bits for the side between each cell and its neighbour
-            north, and that between it and its neighbour east. Walks are distinguished by the set of
-            sides that they cross an odd number of times: each set has a copy of the field, and a
-            walk across a side continues in another copy. By default there is one copy.
+        `lines`: int64 (2, rows, cols), a set of bits for the side between each cell and its
+        neighbour north, and that between it and its neighbour east. Walks are distinguished by the
+        set of sides that they cross an odd number of times: each set has a copy of the field, and a
+        walk across a side continues in another copy. By default there is one copy.
         """
         if lines is None:
             lines = np.zeros((2, *self.mask.shape), dtype=np.int64)
@@ -108,8 +104,7 @@ class Field:
     @property
     def start(self) -> LongArray:
         """The number of the surviving cell, as an array of one."""
-        start: LongArray = self.number[tuple((self.level.cells[[self.vertex]] - self.corner).T)]
-        return start
+        return self.number[tuple((self.level.cells[[self.vertex]] - self.corner).T)]
 
     @cached_property
     def walks(self) -> WalkTree:
@@ -131,33 +126,21 @@ class WalkTree:
         walk = [at]
         while (at := int(self.before[at])) >= 0:
             walk.append(at)
-        cells: FloatArray = self.cells[np.array(walk[::-1]) % len(self.cells)].astype(np.float64)
-        return cells
+        return self.cells[np.array(walk[::-1]) % len(self.cells)].astype(np.float64)
 
 
 def distance_to_rim(mask: BoolArray) -> FloatArray:
     """Return the distance of each cell of a mask to the nearest cell outside it, in cells."""
-    distance: FloatArray = np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
-    return distance
+    return np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
 
 
 def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatArray:
     """Return a walk smoothed like a rubber band that is fixed at its endpoints and pushed off the
     rim.
 
-    Parameters
-    ----------
-    walk
-        float64 (n, 2), cells.
-    distance
-        Distance of each cell to the cells that the band avoids.
-    clearance
-        Distance that the band keeps where there is room.
-
-    Returns
-    -------
-    FloatArray
-        float64 (n, 2), a smooth curve; it may slip over obstacles of a cell or two.
+    `walk`: float64 (n, 2), cells; `distance`: distance of each cell to the cells that the band
+    avoids; `clearance`: distance that the band keeps where there is room. Returns float64 (n, 2), a
+    smooth curve; it may slip over obstacles of a cell or two.
     """
     slope = [np.gradient(distance, axis=axis) for axis in (0, 1)]
     potential = np.stack([distance, *slope], axis=-1)
@@ -184,8 +167,7 @@ def _between(values: FloatArray, points: FloatArray) -> FloatArray:
     up, right = (points - low).T[..., None]
     lower = values[row, col] * (1 - right) + values[row, col + 1] * right
     upper = values[row + 1, col] * (1 - right) + values[row + 1, col + 1] * right
-    between: FloatArray = lower * (1 - up) + upper * up
-    return between
+    return lower * (1 - up) + upper * up
 
 
 def _evenly(line: FloatArray, spacing: float) -> FloatArray:
@@ -286,16 +268,9 @@ class Loops:
     def curve(self, loop: int) -> FloatArray:
         """Return a closed curve from the surviving cell round the holes that a loop encloses.
 
-        Parameters
-        ----------
-        loop
-            A self-loop of the place.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1]. A
-            petal that only points at the holes if they are too small or lie among too many others.
+        `loop`: a self-loop of the place. Returns float64 (n, 2), (row, col) in grid units, where
+        cell (0, 0) spans [0, 1] x [0, 1]. A petal that only points at the holes if they are too
+        small or lie among too many others.
         """
         field = self.field
         if self.enclosed[loop].sum() < (_TINY * field.clearance) ** 2:
@@ -355,5 +330,4 @@ class Loops:
         t = np.linspace(0, 1, _PETAL_POINTS)[:, None]
         # Inner control points that lie 4/3 out make a cubic curve pass through the tip at 1/2.
         out, back = 4 * t * (1 - t) ** 2, 4 * t**2 * (1 - t)
-        petal: FloatArray = at + out * (tip + across) + back * (tip - across)
-        return petal
+        return at + out * (tip + across) + back * (tip - across)

@@ -80,18 +80,9 @@ class LabelPlacer:
     def write(self, words: str, box: FloatArray, gid: str, *, halo: float, **font: Any) -> None:
         """Write words in a box, which is taken from now on.
 
-        Parameters
-        ----------
-        words
-            The words; nothing in them is mathematics.
-        box
-            The box.
-        gid
-            Id of the text in the picture.
-        halo
-            Width of the rim round the letters, in points.
-        **font
-            Properties of a matplotlib text.
+        `words`: the words; nothing in them is mathematics; `gid`: id of the text in the picture;
+        `halo`: width of the rim round the letters, in points; `font`: properties of a matplotlib
+        text.
         """
         x, y = box.mean(axis=0).tolist()
         text = Text(
@@ -218,17 +209,7 @@ class NumberedDoor(Protocol):
 
 
 class RoomWriter:
-    """Writer of names and numbers that do not hide each other.
-
-    Parameters
-    ----------
-    canvas
-        The canvas to write on.
-    grid
-        The map.
-    labels
-        Its rooms.
-    """
+    """Writer of names and numbers that do not hide each other."""
 
     def __init__(self, canvas: Canvas, grid: OccupancyGrid, labels: RoomLabels) -> None:
         self._sizes = canvas.sizes
@@ -242,12 +223,7 @@ class RoomWriter:
     def number_doors(self, doors: Sequence[NumberedDoor], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
 
-        Parameters
-        ----------
-        doors
-            The doors.
-        always
-            Whether to write a number even if it hides another one, rather than leave it out.
+        `always`: whether to write a number even if it hides another one, rather than leave it out.
         """
         size = _NUMBER_SIZE * self._sizes.font
         font = {"fontsize": size, "fontweight": "bold", "color": style.PATH}
@@ -264,19 +240,10 @@ class RoomWriter:
     def write_names(self, first: Collection[str] = (), *, lines: Sequence[FloatArray] = ()) -> int:
         """Write each name well inside its room, smaller if necessary.
 
-        Parameters
-        ----------
-        first
-            Names that are written before the others, which follow from the largest room down.
-        lines
-            Points of lines, float64 (n, 2) each, `(x, y)` in metres. A name hides a line only if
-            there is no spot beside it.
-
-        Returns
-        -------
-        int
-            Number of rooms without names: their names would reach into another room, over the rim
-            of the picture or over other texts.
+        `first`: names that are written before the others, which follow from the largest room down;
+        `lines`: points of lines, float64 (n, 2) each, `(x, y)` in metres. A name hides a line only
+        if there is no spot beside it. Result: number of rooms without names: their names would
+        reach into another room, over the rim of the picture or over other texts.
         """
         names = self._rooms.names
         areas = np.bincount(self._rooms.label_of.ravel() + 1, minlength=len(names) + 1)[1:]

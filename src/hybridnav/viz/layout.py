@@ -139,16 +139,9 @@ def add_scale_bar(canvas: Canvas) -> float:
 def add_legend(canvas: Canvas, entries: Sequence[Entry], *, bar: float, below: float) -> Legend:
     """Put a legend below the map, beside the scale bar if that takes at most one more row.
 
-    Parameters
-    ----------
-    canvas
-        The axes, with the sizes of lines.
-    entries
-        Handles and labels.
-    bar
-        Width of the scale bar in points, 0 without one.
-    below
-        Points below the axes at which items other than the scale bar end.
+    `canvas`: the axes, with the sizes of lines; `entries`: handles and labels; `bar`: width of the
+    scale bar in points, 0 without one; `below`: points below the axes at which items other than the
+    scale bar end.
     """
     font = canvas.sizes.font
     widths = [_HINTING * text_width(label, font) for _, label in entries]

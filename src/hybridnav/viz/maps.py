@@ -253,21 +253,9 @@ def draw_query(
 ) -> list[Entry]:
     """Draw what a query was planned with over the cells: costs as shades, closed cells.
 
-    Parameters
-    ----------
-    canvas
-        Canvas on which the cells are drawn.
-    topology
-        The map.
-    costs
-        Costs of its cells; the more a metre costs, the less of the cell shows through.
-    blocked
-        Closures of the query.
-
-    Returns
-    -------
-    list of Entry
-        Entries of the legend.
+    `canvas`: canvas on which the cells are drawn; `costs`: costs of its cells; the more a metre
+    costs, the less of the cell shows through; `blocked`: closures of the query. Result: entries of
+    the legend.
     """
     grid = topology.grid
     entries: list[Entry] = []
@@ -306,8 +294,7 @@ def _wider(cells: BoolArray, steps: int) -> BoolArray:
 
     if not steps:
         return cells
-    wider: BoolArray = ndimage.binary_dilation(cells, iterations=steps)
-    return wider
+    return ndimage.binary_dilation(cells, iterations=steps)
 
 
 def _scale_of(grid: OccupancyGrid, layer: CostLayer) -> Normalize:

@@ -38,15 +38,13 @@ class Places:
     @cached_property
     def free(self) -> BoolArray:
         """Places of free cells."""
-        free: BoolArray = self.level.classes == CellClass.FREE
-        return free
+        return self.level.classes == CellClass.FREE
 
     @cached_property
     def large(self) -> BoolArray:
         """Mask of the places that are no specks; of all places if all are specks."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        large: BoolArray = areas >= min(TINY_M2, areas.max(initial=0.0))
-        return large
+        return areas >= min(TINY_M2, areas.max(initial=0.0))
 
     def colours(self, strong: BoolArray | None = None, *, unexplored: bool = True) -> ByteArray:
         """Return RGB per place and one row more, for cells without a place; `strong` are not pale,
@@ -139,17 +137,9 @@ def colour_vertices(arcs: IntArray, n_vertices: int) -> LongArray:
     neighbours (Matula and Beck's smallest-last order, in layers for numpy: networkx takes minutes
     on the base of a map with two million cells). Equal input has equal colours.
 
-    Parameters
-    ----------
-    arcs
-        int (n_arcs, 2), the vertices that each arc joins; self-loops and parallel arcs allowed.
-    n_vertices
-        Vertices of the graph.
-
-    Returns
-    -------
-    LongArray
-        (n_vertices,), colours from 0 to 5, all six used about equally often.
+    `arcs`: int (n_arcs, 2), the vertices that each arc joins; self-loops and parallel arcs allowed;
+    `n_vertices`: vertices of the graph. Result: (n_vertices,), colours from 0 to 5, all six used
+    about equally often.
     """
     low, high = arcs.min(axis=1).astype(np.int64), arcs.max(axis=1)
     pairs = np.sort((low * n_vertices + high)[low != high])

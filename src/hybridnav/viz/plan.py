@@ -210,8 +210,7 @@ def _middles(topology: TopologicalMap, path: FloatArray) -> FloatArray:
     places = topology.level.field_of[tuple(cells.T)]
     points, places = points[places >= 0], places[places >= 0]  # a side of a wall lies in a wall
     begins = np.flatnonzero(np.diff(places, prepend=-1))
-    middles: FloatArray = points[(begins + np.append(begins[1:], len(places))) // 2]
-    return middles
+    return points[(begins + np.append(begins[1:], len(places))) // 2]
 
 
 def draw_path(canvas: Canvas, points: FloatArray) -> None:

@@ -223,14 +223,7 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
     """Draw doors as dots and openings as squares, hollow dots where the robot does not pass; return
     the legend's entries.
 
-    Parameters
-    ----------
-    canvas
-        Canvas to draw on.
-    doors
-        The doors.
-    left_out
-        Description of the omitted doors, for the legend.
+    `left_out`: description of the omitted doors, for the legend.
     """
     entries: list[Entry] = []
     passed = [door for door in doors if door.passable]

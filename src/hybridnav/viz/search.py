@@ -169,8 +169,7 @@ def _views(trace: SearchTrace) -> FloatArray:
     later, before = later[kept], before[kept]
     for end in (0, 1):
         near[later, end] = _met(trace.roots[later], far[later, end], trace.intervals[before])
-    views: FloatArray = np.concatenate([far, near[:, ::-1]], axis=1)
-    return views
+    return np.concatenate([far, near[:, ::-1]], axis=1)
 
 
 def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatArray:
@@ -181,8 +180,7 @@ def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatA
     cross = drawn[:, 0] * along[:, 1] - drawn[:, 1] * along[:, 0]
     reach = off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0]
     share = np.divide(reach, cross, out=np.zeros(len(cross)), where=cross != 0)
-    met: FloatArray = roots + share.clip(0, 1)[:, None] * drawn
-    return met
+    return roots + share.clip(0, 1)[:, None] * drawn
 
 
 # Pictures of a search: states or intervals, corridor, and path.

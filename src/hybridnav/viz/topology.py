@@ -57,14 +57,12 @@ class Graph:
     def seen(self) -> BoolArray:
         """Mask of the drawn vertices, always including the largest."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        seen: BoolArray = areas >= min(self.least_area_m2, areas.max(initial=0.0))
-        return seen
+        return areas >= min(self.least_area_m2, areas.max(initial=0.0))
 
     @cached_property
     def plain(self) -> BoolArray:
         """Arcs drawn between two vertices."""
-        plain: BoolArray = self.seen[self.level.arcs].all(axis=1) & ~self.level.is_self_loop
-        return plain
+        return self.seen[self.level.arcs].all(axis=1) & ~self.level.is_self_loop
 
     @cached_property
     def parallel(self) -> BoolArray:
@@ -88,10 +86,7 @@ class Graph:
     def curves(self, clearance_m: float) -> dict[int, FloatArray]:
         """Return a curve for each arc and self-loop drawn, `(x, y)` in metres.
 
-        Parameters
-        ----------
-        clearance_m
-            Distance that curves keep from obstacles, where there is room.
+        `clearance_m`: distance that curves keep from obstacles, where there is room.
         """
         level, cell_m = self.level, self.level.grid.resolution_m
         least = self.least_area_m2 / cell_m**2
@@ -311,10 +306,7 @@ class Arc:
         The curve is straight if both fields have room for it, else it is the smoothed shortest walk
         across the boundary, so that arcs on two sides of an obstacle run on two sides of it.
 
-        Returns
-        -------
-        FloatArray
-            float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+        Returns float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
         """
         line = self._straight()
         if self._has_room(line) and self._crosses(line):

@@ -31,12 +31,8 @@ class GridAstar:
     P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determination of minimum
     cost paths, 1968.
 
-    Parameters
-    ----------
-    grid
-        The map; free cells are entered, all others not.
-    costs
-        Costs of its cells, by which paths are cheapest; None for lengths.
+    `grid`: the map; free cells are entered, all others not; `costs`: costs of its cells, by which
+    paths are cheapest; None for lengths.
     """
 
     def __init__(self, grid: OccupancyGrid, *, costs: CostLayer | None = None) -> None:
@@ -72,10 +68,7 @@ class GridDijkstra:
     buckets as wide as a straight step (E. A. Dinic, 1978), so that some cells in the goal's own
     bucket are expanded, some not.
 
-    Parameters
-    ----------
-    grid
-        The map; free cells are entered, all others not.
+    `grid`: the map; free cells are entered, all others not.
     """
 
     def __init__(self, grid: OccupancyGrid) -> None:
@@ -107,17 +100,8 @@ class WeightedAstar:
     open or would have had to be expanded again (E. A. Hansen, R. Zhou: Anytime heuristic search,
     2007; M. Likhachev, G. Gordon, S. Thrun: ARA*, 2003).
 
-    Parameters
-    ----------
-    grid
-        The map; free cells are entered, all others not.
-    weight
-        Factor on the estimate, >= 1.
-
-    Raises
-    ------
-    InvalidValueError
-        When the weight is less than 1 or not finite.
+    `grid`: the map; free cells are entered, all others not; `weight`: factor on the estimate, >= 1.
+    Raises `InvalidValueError` when the weight is less than 1 or not finite.
     """
 
     def __init__(self, grid: OccupancyGrid, *, weight: float = 1.5) -> None:

@@ -42,22 +42,11 @@ class HpaStar:
     pass from cluster to cluster only between two occupied cells are therefore not found: there the
     method gives up and does not claim that no path exists.
 
-    Parameters
-    ----------
-    grid
-        The map; free cells are entered, all others not.
-    cluster_cells
-        Side of a cluster in cells, >= 2.
-    smooth
-        Whether paths are smoothed.
-    line_cells
-        Moves in the longest straight line that smoothing tries, >= 1; None for the side of a
-        cluster. Long lines make paths three to five times nearer to the shortest.
-
-    Raises
-    ------
-    InvalidValueError
-        When the side of the clusters is less than 2, or lines are shorter than 1.
+    `grid`: the map; free cells are entered, all others not; `cluster_cells`: side of a cluster in
+    cells, >= 2; `smooth`: whether paths are smoothed; `line_cells`: moves in the longest straight
+    line that smoothing tries, >= 1; None for the side of a cluster. Long lines make paths three to
+    five times nearer to the shortest. Raises `InvalidValueError` when the side of the clusters is
+    less than 2, or lines are shorter than 1.
     """
 
     def __init__(

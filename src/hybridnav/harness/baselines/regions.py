@@ -28,17 +28,10 @@ if TYPE_CHECKING:
 class RegionPlanner:
     """A coarse search on a graph of regions, then grid A* on the cells of the route's regions.
 
-    Parameters
-    ----------
-    region_of
-        int32 (rows, cols), the region of each free cell, -1 elsewhere.
-    graph
-        The graph of the regions.
-    corner_cutting
-        Whether diagonals may cut corners.
-    joined
-        int (n, 2), the arcs by which regions beside a route belong to its corridor, as those of
-        the preset `paper` do; None for the regions of the route alone.
+    `region_of`: int32 (rows, cols), the region of each free cell, -1 elsewhere; `corner_cutting`:
+    whether diagonals may cut corners; `joined`: int (n, 2), the arcs by which regions beside a
+    route belong to its corridor, as those of the preset `paper` do; None for the regions of the
+    route alone.
     """
 
     def __init__(
@@ -59,10 +52,7 @@ class RegionPlanner:
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells.
 
-        Raises
-        ------
-        InvalidValueError
-            When a cell lies outside the map or is not free.
+        Raises `InvalidValueError` when a cell lies outside the map or is not free.
         """
         first = region_at(self._region_of, start)
         last = region_at(self._region_of, goal)
@@ -105,10 +95,7 @@ def free_fields(topology: TopologicalMap) -> IntArray:
 def region_at(region_of: IntArray, cell: Cell) -> int:
     """Return the region of a free cell.
 
-    Raises
-    ------
-    InvalidValueError
-        When the cell lies outside the map or is not free.
+    Raises `InvalidValueError` when the cell lies outside the map or is not free.
     """
     rows, cols = region_of.shape
     row, col = cell
@@ -125,18 +112,10 @@ def joined_regions(
 ) -> tuple[LongArray, FloatArray]:
     """Return the pairs of regions with a legal move from one to the other.
 
-    Parameters
-    ----------
-    region_of
-        int32 (rows, cols), the region of each free cell, -1 elsewhere.
-    corner_cutting
-        Whether diagonals may cut corners.
-
-    Returns
-    -------
-    tuple of LongArray and FloatArray
-        int64 (n_pairs, 2), the lower label first, sorted; float64 (n_pairs, 2), the mean of the
-        middles of the moves between the two, (row, col) with cells at whole numbers.
+    `region_of`: int32 (rows, cols), the region of each free cell, -1 elsewhere; `corner_cutting`:
+    whether diagonals may cut corners. Returns int64 (n_pairs, 2), the lower label first, sorted;
+    float64 (n_pairs, 2), the mean of the middles of the moves between the two, (row, col) with
+    cells at whole numbers.
     """
     n_regions = int(region_of.max(initial=-1)) + 1
     free = region_of >= 0
@@ -328,14 +307,11 @@ class SimpleGraphPyramid:
     `max_distance_m` of its arcs, which is the same for all of them; ties are decided by the
     `through_m` of the arc with the lowest index, since a simple graph keeps the first arc that it
     meets and ignores the others. (`Level.to_simple_graph` is kinder: it keeps the shortest.) The
-    path is the shortest inside the fields of the route and of the places that its edges join to
-    it, as with the preset `paper`. If corners may be cut, a missing route
-    proves nothing, and the method gives up.
+    path is the shortest inside the fields of the route and of the places that its edges join to it,
+    as with the preset `paper`. If corners may be cut, a missing route proves nothing, and the
+    method gives up.
 
-    Parameters
-    ----------
-    topology
-        The map whose free places are planned on.
+    `topology`: the map whose free places are planned on.
     """
 
     def __init__(self, topology: TopologicalMap) -> None:

@@ -58,18 +58,10 @@ class ThrunMap:
       to 5 %. The path is the shortest inside the regions of the plan, and so no longer than
       Thrun's, which joins plans for three regions at a time.
 
-    Parameters
-    ----------
-    grid
-        The map whose free cells are planned on.
-    epsilon_cells
-        Steps along the diagram within which a critical point has the least clearance, >= 1. Larger
-        values make fewer, larger regions.
-
-    Raises
-    ------
-    InvalidValueError
-        When `epsilon_cells` is less than 1, or scikit-image, of the extra `study`, is missing.
+    `grid`: the map whose free cells are planned on; `epsilon_cells`: steps along the diagram within
+    which a critical point has the least clearance, >= 1. Larger values make fewer, larger regions.
+    Raises `InvalidValueError` when `epsilon_cells` is less than 1, or scikit-image, of the extra
+    `study`, is missing.
     """
 
     def __init__(self, grid: OccupancyGrid, *, epsilon_cells: int = 10) -> None:
@@ -101,17 +93,8 @@ class ThrunMap:
 def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, LongArray]:
     """Return the critical points of free space's Voronoi diagram, and two basis points of each.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), free space; cells outside are not free.
-    epsilon_cells
-        See `ThrunMap`.
-
-    Returns
-    -------
-    tuple of LongArray
-        int64 (n, 2) and (n, 2, 2) as (row, col).
+    `free`: bool (rows, cols), free space; cells outside are not free; `epsilon_cells`: see
+    `ThrunMap`. Returns int64 (n, 2) and (n, 2, 2) as (row, col).
     """
     padded = np.pad(free, 1)
     clearance, basis = ndimage.distance_transform_edt(padded, return_indices=True)
@@ -130,12 +113,8 @@ def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, Lon
 def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
     """Return the Voronoi diagram of free space: its integer medial axis, thinned.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), with a rim that is not free.
-    basis
-        int32 (2, rows, cols), row and column of the nearest cell that is not free.
+    `free`: bool (rows, cols), with a rim that is not free; `basis`: int32 (2, rows, cols), row and
+    column of the nearest cell that is not free.
     """
     try:
         from skimage import morphology  # noqa: PLC0415 - an optional extra
@@ -154,11 +133,10 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
         meet = (apart**2).sum(axis=0) > 1
         axis[here] |= meet & (hand >= 0)
         axis[there] |= meet & (hand <= 0)
-    thin: BoolArray = np.asarray(
+    return np.asarray(
         morphology.skeletonize(axis & free),  # type: ignore[no-untyped-call]
         dtype=np.bool_,
     )
-    return thin
 
 
 def basis_pairs(cells: LongArray, basis: IntArray) -> tuple[LongArray, FloatArray]:
@@ -228,17 +206,9 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
 def regions_between(free: BoolArray, cells: LongArray, basis: LongArray) -> IntArray:
     """Return the regions between critical lines; the cells of lines go to regions beside them.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), free space.
-    cells, basis
-        Critical points and their basis points; see `critical_points`.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), -1 where not free; numbered in the order of their first cells.
+    `free`: bool (rows, cols), free space; `cells`, `basis`: critical points and their basis points;
+    see `critical_points`. Returns int32 (rows, cols), -1 where not free; numbered in the order of
+    their first cells.
     """
     padded = np.pad(free, 1)
     on_line = kernels.draw_lines(padded, cells + 1, basis + 1)[1:-1, 1:-1]
@@ -261,5 +231,4 @@ def centres_of(region_of: IntArray, n_regions: int) -> FloatArray:
     rows, cols = np.nonzero(region_of >= 0)
     label = region_of[rows, cols]
     sums = [np.bincount(label, weights=w, minlength=n_regions) for w in (rows, cols)]
-    centres: FloatArray = np.stack(sums, axis=1) / np.bincount(label, minlength=n_regions)[:, None]
-    return centres
+    return np.stack(sums, axis=1) / np.bincount(label, minlength=n_regions)[:, None]

@@ -255,5 +255,4 @@ def _arc(
     sines, cosines = sines_and_cosines(angles)
     along = hand * radius_m * (sines - sin(heading_rad))
     across = hand * radius_m * (cos(heading_rad) - cosines)
-    found: FloatArray = start + np.stack([along, across], axis=1)
-    return found
+    return start + np.stack([along, across], axis=1)

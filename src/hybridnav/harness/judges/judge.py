@@ -185,15 +185,7 @@ def segment_faults(
 def free_classes(*, allow_unexplored: bool) -> BoolArray:
     """Return whether a cell of each `CellClass` is free.
 
-    Parameters
-    ----------
-    allow_unexplored
-        Whether unexplored cells count as free.
-
-    Returns
-    -------
-    BoolArray
-        bool (3,), indexed by class.
+    `allow_unexplored`: whether unexplored cells count as free. Returns bool (3,), indexed by class.
     """
     free_of = np.zeros(len(CellClass), dtype=np.bool_)
     free_of[CellClass.FREE] = True
@@ -213,8 +205,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
     positions = np.clip(frame.positions_of(xy), -_OUTERMOST, _OUTERMOST)
-    rounded: FloatArray = np.rint(positions / _QUANTUM) * _QUANTUM
-    return rounded
+    return np.rint(positions / _QUANTUM) * _QUANTUM
 
 
 def _wrong_endpoints(path: LongArray, start: Cell, goal: Cell) -> list[str]:

@@ -319,14 +319,9 @@ def cheapest_cost(factors, cuts_corners, start, goal):
     Buckets take turns; each is a chain of entries, and those left behind by a better cost are
     skipped.
 
-    Parameters
-    ----------
-    factors
-        float64 (rows, cols) with a rim of zeros: at least 1 in cells that may be entered, else 0.
-    cuts_corners
-        Whether a diagonal may pass a cell that may not be entered.
-    start, goal
-        Flat cells.
+    `factors`: float64 (rows, cols) with a rim of zeros: at least 1 in cells that may be entered,
+    else 0; `cuts_corners`: whether a diagonal may pass a cell that may not be entered; `start`,
+    `goal`: flat cells.
     """
     cols = factors.shape[1]
     factor = factors.ravel()

@@ -119,15 +119,8 @@ def mcc_per_zone(cells: FloatArray) -> float:
     found room whose true rooms are all taken share the last of them, and it counts a true room
     without a partner once for each found room that touches it.
 
-    Parameters
-    ----------
-    cells
-        float64 (n_true, n_found), number of cells in each pair of rooms, n_true >= 1.
-
-    Returns
-    -------
-    float
-        From -1 to 1; 0 when no room was found.
+    `cells`: float64 (n_true, n_found), number of cells in each pair of rooms, n_true >= 1. Result:
+    from -1 to 1; 0 when no room was found.
     """
     left = cells.copy()
     total, n_partners, n = 0.0, 0, cells.sum()
@@ -149,5 +142,4 @@ def mcc_per_zone(cells: FloatArray) -> float:
 def _best_iou(cells: FloatArray, is_room: BoolArray) -> FloatArray:
     """Return the greatest intersection over union of each row with any column that is a room."""
     union = cells.sum(axis=1)[:, None] + cells.sum(axis=0) - cells
-    best: FloatArray = np.where(is_room, cells / union, 0.0).max(axis=1)
-    return best
+    return np.where(is_room, cells / union, 0.0).max(axis=1)

@@ -34,17 +34,13 @@ MOST_FACTOR = 1000.0
 def rounded(factors: AnyArray) -> NDArray[np.float32]:
     """Return factors, rounded down to units; float32 holds these exactly."""
     units = np.floor(np.asarray(factors, dtype=np.float64) * (1 << UNIT_BITS))
-    rounded: NDArray[np.float32] = (units / (1 << UNIT_BITS)).astype(np.float32)
-    return rounded
+    return (units / (1 << UNIT_BITS)).astype(np.float32)
 
 
 def checked_factors(given: ArrayLike) -> NDArray[np.float32]:
     """Return the factors as a new float32 array in units.
 
-    Raises
-    ------
-    InvalidValueError
-        When they are no numbers from 1 to 1000 of two dimensions.
+    Raises `InvalidValueError` when they are no numbers from 1 to 1000 of two dimensions.
     """
     try:
         array = np.asarray(given)
@@ -69,10 +65,7 @@ def checked_factors(given: ArrayLike) -> NDArray[np.float32]:
 def checked_cells(name: str, given: ArrayLike | None, shape: tuple[int, int]) -> BoolArray | None:
     """Return closed cells of a layer of some rows and columns, None for none.
 
-    Raises
-    ------
-    InvalidValueError
-        When they are no bool array of this shape.
+    Raises `InvalidValueError` when they are no bool array of this shape.
     """
     if given is None:
         return None
@@ -127,10 +120,8 @@ def checked_multiplier(multiplier: float) -> float:
 def checked_box(box: Any, shape: tuple[int, int]) -> Box:
     """Return a box of cells of a layer that has a number of rows and columns.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is not four whole numbers, has no cell, or reaches beyond the layer.
+    Raises `InvalidValueError` when it is not four whole numbers, has no cell, or reaches beyond the
+    layer.
     """
     rows, cols = shape
     try:
@@ -254,10 +245,7 @@ class SpeedLimits:
 def checked_speeds(base: float, multiplier: float, unit: str, full_mps: float | None) -> Any:
     """Return the settings of a speed mask.
 
-    Raises
-    ------
-    InvalidValueError
-        When one is out of range.
+    Raises `InvalidValueError` when one is out of range.
     """
     if unit not in get_args(Unit):
         raise InvalidValueError(f"the unit of speed limits is percent or m/s, got {unit!r:.80}")
@@ -286,10 +274,7 @@ def keepout_costs() -> LongArray:
 def checked_values(values: ArrayLike) -> NDArray[np.int8]:
     """Return the values of a mask as int8.
 
-    Raises
-    ------
-    InvalidValueError
-        When they are no integers from -1 to 100 of two dimensions.
+    Raises `InvalidValueError` when they are no integers from -1 to 100 of two dimensions.
     """
     try:
         array = np.asarray(values)
@@ -333,14 +318,7 @@ def mask_on_map(
 def holding_centres(grid: OccupancyGrid, marked: BoolArray, frame: Frame | None) -> BoolArray:
     """Return the cells of a map in which the centre of a marked cell of a mask lies.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    marked
-        bool (rows, cols), cells of the mask.
-    frame
-        Their place; None for that of the map.
+    `marked`: bool (rows, cols), cells of the mask; `frame`: their place; None for that of the map.
     """
     if _is_cell_by_cell(grid, marked, frame):
         return marked

@@ -63,17 +63,10 @@ class CostSpec:
 def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
     """Return what some texts state.
 
-    Parameters
-    ----------
-    texts
-        `clearance[:KEY=VALUE,...]`, at most once, `speed:FILE[,KEY=VALUE,...]` or
-        `keepout:FILE[,KEY=VALUE,...]`; keys are the parameters of `CostLayer.clearance`,
-        `load_speed_mask` and `load_keepout_mask`, and x, y, yaw instead of a pose.
-
-    Raises
-    ------
-    InvalidValueError
-        When one of them has another form.
+    `texts`: `clearance[:KEY=VALUE,...]`, at most once, `speed:FILE[,KEY=VALUE,...]` or
+    `keepout:FILE[,KEY=VALUE,...]`; keys are the parameters of `CostLayer.clearance`,
+    `load_speed_mask` and `load_keepout_mask`, and x, y, yaw instead of a pose. Raises
+    `InvalidValueError` when one of them has another form.
     """
     specs: list[CostSpec] = []
     for text in texts:
@@ -95,12 +88,8 @@ def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
 def read_costs(texts: Sequence[str], grid: OccupancyGrid) -> CostLayer | None:
     """Return the layer of the larger factors that some texts state, None for no texts.
 
-    Raises
-    ------
-    InvalidValueError
-        When a text has another form, or a setting is out of range.
-    MapError
-        When a mask cannot be read.
+    Raises `InvalidValueError` when a text has another form, or a setting is out of range. Raises
+    `MapError` when a mask cannot be read.
     """
     layers = [spec.layer(grid) for spec in parse_costs(texts)]
     return reduce(or_, layers) if layers else None

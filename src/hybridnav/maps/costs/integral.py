@@ -81,5 +81,4 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
 
 def _positions_on(frame: Frame, points: FloatArray) -> FloatArray:
     """Return points `(x, y)` in metres as positions (row, col), rounded to 2^-24 of a cell."""
-    rounded: FloatArray = np.rint(frame.positions_of(points) * GRAIN) / GRAIN
-    return rounded
+    return np.rint(frame.positions_of(points) * GRAIN) / GRAIN

@@ -22,14 +22,9 @@ def _along_line(factors, lies, fixed, low, high):
 
     On the line between two cells the larger of their factors counts.
 
-    Parameters
-    ----------
-    factors
-        float32 (rows, cols).
-    lies
-        Whether the segment lies in a row: `fixed` is its row, else its column.
-    fixed, low, high
-        The position that does not change, and the range of the other one.
+    `factors`: float32 (rows, cols); `lies`: whether the segment lies in a row: `fixed` is its row,
+    else its column; `fixed`, `low`, `high`: the position that does not change, and the range of the
+    other one.
     """
     rows, cols = factors.shape
     line = math.floor(fixed)
@@ -53,12 +48,8 @@ def segment_cost(factors, a_row, a_col, b_row, b_col):
     algorithm for ray tracing, 1987). Which side of a cell the segment leaves by is decided exactly;
     through a corner it passes to the cell behind.
 
-    Parameters
-    ----------
-    factors
-        float32 (rows, cols).
-    a_row, a_col, b_row, b_col
-        The endpoints. Exchanged, they have the same integral, bit for bit.
+    `factors`: float32 (rows, cols); `a_row`, `a_col`, `b_row`, `b_col`: the endpoints. Exchanged,
+    they have the same integral, bit for bit.
     """
     if a_row == b_row:
         return _along_line(factors, True, a_row, min(a_col, b_col), max(a_col, b_col))

@@ -42,14 +42,9 @@ _OPENING = threading.Lock()
 class Raster:
     """Brightness of an image.
 
-    Parameters
-    ----------
-    level
-        Brightness as an integer in [0, white], shape `(rows, cols)`, the top row first.
-    white
-        Level of white: 255, 3 * 255 (a colour is the sum of its channels) or 65535.
-    opaque
-        Mask of the fully opaque pixels, same shape; None if all are opaque.
+    `level`: brightness as an integer in [0, white], shape `(rows, cols)`, the top row first;
+    `white`: level of white: 255, 3 * 255 (a colour is the sum of its channels) or 65535; `opaque`:
+    mask of the fully opaque pixels, same shape; None if all are opaque.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16]
@@ -60,27 +55,11 @@ class Raster:
 def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], None]) -> Raster:
     """Read an image of one to four channels.
 
-    Parameters
-    ----------
-    path
-        The image file; for an animation, its first frame is read.
-    what
-        Name of the image in messages, which begin with it.
-    check_size
-        Called with columns and rows before any pixel is read, to raise if there are too many.
-
-    Returns
-    -------
-    Raster
-        Brightness and opacity of each pixel.
-
-    Raises
-    ------
-    MapNotFoundError
-        When the file does not exist.
-    MapError
-        When the file is no image, damaged, larger than a grid may be, or has pixels of more than 16
-        bits.
+    `path`: the image file; for an animation, its first frame is read; `what`: name of the image in
+    messages, which begin with it; `check_size`: called with columns and rows before any pixel is
+    read, to raise if there are too many. Result: brightness and opacity of each pixel. Raises
+    `MapNotFoundError` when the file does not exist. Raises `MapError` when the file is no image,
+    damaged, larger than a grid may be, or has pixels of more than 16 bits.
     """
     where = f"{what} {printable(path)}"
     with (
@@ -218,15 +197,8 @@ def check_png(stream: BinaryIO) -> None:
     data must inflate, with its Adler-32, to exactly the bytes of the image. Any single flipped bit
     is found. Bytes behind the end are not read.
 
-    Parameters
-    ----------
-    stream
-        The file, seekable; its position is restored unless it is damaged.
-
-    Raises
-    ------
-    DamagedPngError
-        When the file is damaged or truncated.
+    `stream`: the file, seekable; its position is restored unless it is damaged. Raises
+    `DamagedPngError` when the file is damaged or truncated.
     """
     position = stream.tell()
     stream.seek(0)

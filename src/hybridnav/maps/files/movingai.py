@@ -30,10 +30,7 @@ _GB = 1e9
 def check_max_cells(max_cells: int) -> None:
     """Refuse a limit that is not a positive number of cells.
 
-    Raises
-    ------
-    InvalidValueError
-        When the limit is not positive.
+    Raises `InvalidValueError` when the limit is not positive.
     """
     if max_cells < 1:
         raise InvalidValueError(f"max_cells must be a positive number of cells, got {max_cells}")
@@ -42,19 +39,9 @@ def check_max_cells(max_cells: int) -> None:
 def check_size(cols: int, rows: int, *, max_cells: int, where: str) -> None:
     """Refuse a map with more cells than a grid holds, or than the limit.
 
-    Parameters
-    ----------
-    cols, rows
-        As the header of the file states them.
-    max_cells
-        The limit.
-    where
-        The file; the message begins with it.
-
-    Raises
-    ------
-    MapError
-        When there are more; the message states the cells, their memory, and the option.
+    `cols`, `rows`: as the header of the file states them; `where`: the file; the message begins
+    with it. Raises `MapError` when there are more; the message states the cells, their memory, and
+    the option.
     """
     cells = cols * rows
     if cells > MAX_CELLS:

@@ -116,24 +116,10 @@ def load_ros_map(
 def read_mask(path: PathLike, *, max_cells: int) -> tuple[NDArray[np.int8], Frame]:
     """Read a map of map_server as the values of a `nav_msgs/OccupancyGrid`.
 
-    Parameters
-    ----------
-    path
-        The YAML file.
-    max_cells
-        The most cells that the map may have.
-
-    Returns
-    -------
-    tuple
-        int8 (rows, cols), from 0 to 100, -1 for unknown, row 0 at the lowest y; and the place of
-        the cells. Trinary maps hold 0, 100 and -1; in the mode `scale` occupancies between the
-        thresholds are spread over 0 to 100.
-
-    Raises
-    ------
-    MapNotFoundError, MapError, InvalidValueError
-        As in `load_ros_map`.
+    `max_cells`: the most cells that the map may have. Returns int8 (rows, cols), from 0 to 100, -1
+    for unknown, row 0 at the lowest y; and the place of the cells. Trinary maps hold 0, 100 and -1;
+    in the mode `scale` occupancies between the thresholds are spread over 0 to 100. Raises
+    `MapNotFoundError, MapError, InvalidValueError` as in `load_ros_map`.
     """
     description = _read_description(Path(path), None, None)
     occupancy = _probability(_read_image(description, max_cells), description)
@@ -164,10 +150,7 @@ def _read_image(description: _Description, max_cells: int) -> Raster:
 def files_of(path: Path) -> list[Path]:
     """Return the YAML file of a map and the image that it names.
 
-    Raises
-    ------
-    MapError
-        When the YAML file cannot be read.
+    Raises `MapError` when the YAML file cannot be read.
     """
     return [path, _read_description(path, None, None).image]
 

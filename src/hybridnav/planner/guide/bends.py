@@ -88,10 +88,7 @@ class Bend:
 class Line:
     """The paths of a tour as one line, by its length.
 
-    Parameters
-    ----------
-    paths
-        At least one path; each begins where the one before ends.
+    `paths`: at least one path; each begins where the one before ends.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:

@@ -225,16 +225,8 @@ def with_glances(  # noqa: C901 - a door is seen, led to by a wall, or walked to
 ) -> list[Event]:
     """Return events without the turns on the way to a door that a person sees from afar.
 
-    Parameters
-    ----------
-    line
-        The path.
-    events
-        What happens along it.
-    landmarks
-        The doors of the map.
-    facing_rad
-        Direction in which a person looks at the start, radians; NaN for one who knows none.
+    `events`: what happens along it; `landmarks`: the doors of the map; `facing_rad`: direction in
+    which a person looks at the start, radians; NaN for one who knows none.
     """
     kept: list[Event] = []
     pose: tuple[tuple[float, float], float] | None = (line.at(0.0), facing_rad)

@@ -79,13 +79,7 @@ class Look:
 
 
 class DoorsInSight:
-    """The doors of a map as a person looks for them.
-
-    Parameters
-    ----------
-    rooms
-        The rooms of the map.
-    """
+    """The doors of a map as a person looks for them."""
 
     def __init__(self, rooms: Rooms) -> None:
         self._rooms = rooms
@@ -106,18 +100,9 @@ class DoorsInSight:
     def way_out_rad(self, door: Door, *, is_forward: bool) -> float:
         """Return the direction in which one passes a door at right angles.
 
-        Parameters
-        ----------
-        door
-            The door.
-        is_forward
-            Whether one comes from the first of its rooms.
-
-        Returns
-        -------
-        float
-            Radians, map frame: the mean of the steps across its boundary, which does not depend on
-            how the boundary winds between its ends; NaN for one that closes into a ring.
+        `is_forward`: whether one comes from the first of its rooms. Result: radians, map frame: the
+        mean of the steps across its boundary, which does not depend on how the boundary winds
+        between its ends; NaN for one that closes into a ring.
         """
         way = self._way_through_rad.get(door.number)
         if way is None:
@@ -148,22 +133,11 @@ class DoorsInSight:
     ) -> int | None:
         """Return which of the doors at one hand a person takes who walks along a path.
 
-        Parameters
-        ----------
-        line
-            The path.
-        between_m
-            Begin of the stretch, and where it comes to the door, by the length of the path.
-        room
-            The room in which it lies, None outside rooms.
-        look
-            The door, the hand at which it lies, and the door by which one came.
-
-        Returns
-        -------
-        int or None
-            The first, second, ... fifth; -1 for the last before the space ends; None where the
-            distance alone shows the door, or nothing does.
+        `between_m`: begin of the stretch, and where it comes to the door, by the length of the
+        path; `room`: the room in which it lies, None outside rooms; `look`: the door, the hand at
+        which it lies, and the door by which one came. Returns the first, second, ... fifth; -1 for
+        the last before the space ends; None where the distance alone shows the door, or nothing
+        does.
         """
         begin_m, end_m = between_m
         length_m, heading_rad = end_m - begin_m, line.heading(max(begin_m, end_m - 3.0), end_m)
@@ -219,23 +193,10 @@ class DoorsInSight:
     ) -> Glance | None:
         """Return how a person finds a door who looks round in a room.
 
-        Parameters
-        ----------
-        door
-            The door.
-        room
-            The room.
-        seen_from
-            Where the person stands, `(x, y)` in metres, map frame, and the direction in which it
-            looks, radians; NaN for a person who knows none.
-        came_by
-            Number of the door by which it came, 0 for none.
-
-        Returns
-        -------
-        Glance or None
-            The side at which it lies, and which of the doors there it is, the nearest first; None
-            if that is not clear.
+        `seen_from`: where the person stands, `(x, y)` in metres, map frame, and the direction in
+        which it looks, radians; NaN for a person who knows none; `came_by`: number of the door by
+        which it came, 0 for none. Returns the side at which it lies, and which of the doors there
+        it is, the nearest first; None if that is not clear.
         """
         point, facing_rad = seen_from
         away_m = math.dist(point, door.position)
@@ -352,8 +313,7 @@ class DoorsInSight:
 
     @cached_property
     def _is_hidden(self) -> BoolArray:
-        hidden: BoolArray = self._rooms.grid.measured != CellClass.FREE
-        return hidden
+        return self._rooms.grid.measured != CellClass.FREE
 
 
 def is_named(room: str | None) -> bool:

@@ -62,16 +62,8 @@ def instructions_of(
 ) -> Iterator[Instruction]:
     """Yield the instructions for a person who walks along paths.
 
-    Parameters
-    ----------
-    paths
-        Those of a tour in order.
-    legs
-        The legs of each.
-    landmarks
-        The doors of the map.
-    heading_rad
-        Heading at the start, None if there is none.
+    `paths`: those of a tour in order; `landmarks`: the doors of the map; `heading_rad`: heading at
+    the start, None if there is none.
     """
     line = Line(paths)
     stretches = without_slivers(list(stretches_of(line, legs)))
@@ -259,19 +251,9 @@ def _beside(
 def _heading(line: Line, at_m: float, length_m: float) -> float:
     """Return the direction of the path behind a door, or before it if the length is negative.
 
-    Parameters
-    ----------
-    line
-        The path.
-    at_m
-        Where it passes the door.
-    length_m
-        Length from there to the instruction behind it, or, negative, to that before it.
-
-    Returns
-    -------
-    float
-        Radians, map frame, from 0.5 to 3 m off the door; NaN where the path is shorter.
+    `at_m`: where it passes the door; `length_m`: length from there to the instruction behind it,
+    or, negative, to that before it. Result: radians, map frame, from 0.5 to 3 m off the door; NaN
+    where the path is shorter.
     """
     sign = math.copysign(1.0, length_m)
     near_m, far_m = (at_m + sign * min(each, abs(length_m)) for each in (_CLEAR_M, _LOOK_M))

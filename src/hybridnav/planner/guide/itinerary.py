@@ -47,10 +47,7 @@ def heading_of(start: Sequence[float] | None) -> float | None:
 class Guide:
     """Descriptions of paths on a map with rooms.
 
-    Parameters
-    ----------
-    rooms
-        The rooms; the crossings of their doors are computed once.
+    `rooms`: the rooms; the crossings of their doors are computed once.
     """
 
     def __init__(self, rooms: Rooms) -> None:
@@ -61,18 +58,9 @@ class Guide:
     def legs(self, path: Path, *, waypoint: str | None = None) -> list[Leg]:
         """Divide a path into its legs.
 
-        Parameters
-        ----------
-        path
-            A cell path, or an any-angle one, whose length is divided in the proportions of its cell
-            path.
-        waypoint
-            Waypoint at the end of the path.
-
-        Returns
-        -------
-        list of Leg
-            At least one leg; the lengths sum to that of the path.
+        `path`: a cell path, or an any-angle one, whose length is divided in the proportions of its
+        cell path; `waypoint`: waypoint at the end of the path. Result: at least one leg; the
+        lengths sum to that of the path.
         """
         rooms, cells = self._rooms, path.cells
         vertices, arcs, steps = self._route_finder.crossings(cells)
@@ -116,14 +104,8 @@ class Guide:
     ) -> tuple[Instruction, ...]:
         """Return the instructions for a person who walks along paths.
 
-        Parameters
-        ----------
-        paths
-            Those of a tour in order, at least one.
-        legs
-            The legs of each.
-        heading_rad
-            Heading at the start, radians counter-clockwise from the x axis; None if there is none.
+        `paths`: those of a tour in order, at least one; `heading_rad`: heading at the start,
+        radians counter-clockwise from the x axis; None if there is none.
         """
         told = [[self._told(leg) for leg in each] for each in legs]
         return tuple(instructions_of(paths, told, self._landmarks, heading_rad))
@@ -131,14 +113,8 @@ class Guide:
     def of(self, path: Path, waypoint: ArrayLike | str, start: Sequence[float]) -> GuidedPath:
         """Return what the instructions of one path are found from.
 
-        Parameters
-        ----------
-        path
-            The path.
-        waypoint
-            The goal, as it was given.
-        start
-            `(x, y)`, or `(x, y, yaw)` of a robot with a heading.
+        `waypoint`: the goal, as it was given; `start`: `(x, y)`, or `(x, y, yaw)` of a robot with a
+        heading.
         """
         return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
 

@@ -58,13 +58,7 @@ _BESIDE_RAD = math.radians(60.0)
 
 
 class Landmarks(DoorsInSight):
-    """The doors of a map, as a person on a path sees them.
-
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    """
+    """The doors of a map, as a person on a path sees them."""
 
     def __init__(self, rooms: Rooms) -> None:
         super().__init__(rooms)
@@ -76,24 +70,10 @@ class Landmarks(DoorsInSight):
     ) -> Wall | None:
         """Return the wall of a room that leads a person from one door to another.
 
-        Parameters
-        ----------
-        came_by
-            Number of the door behind the person.
-        door
-            The other door.
-        room
-            The room, None outside rooms.
-        most_m
-            Length of wall that nobody follows farther, metres.
-        beyond
-            The room behind the door, or behind a gap that follows it.
-
-        Returns
-        -------
-        Wall or None
-            The shortest: that of the door, or the one opposite, at either hand. None where all are
-            too long, or have too many doors.
+        `came_by`: number of the door behind the person; `room`: the room, None outside rooms;
+        `most_m`: length of wall that nobody follows farther, metres; `beyond`: the room behind the
+        door, or behind a gap that follows it. Returns the shortest: that of the door, or the one
+        opposite, at either hand. None where all are too long, or have too many doors.
         """
         if room is None or came_by == door.number:
             return None
@@ -246,21 +226,11 @@ class Landmarks(DoorsInSight):
     def at_start(self, line: Line, room: str | None, exits: Collection[int]) -> Landmark | None:
         """Return the door that shows a person at the begin of a path in which direction to go.
 
-        Parameters
-        ----------
-        line
-            The path.
-        room
-            The room of its begin, None outside rooms.
-        exits
-            Numbers of the doors by which the path leaves the room.
-
-        Returns
-        -------
-        Landmark or None
-            The exit straight ahead, over furniture too; else the exit in sight if it lies ahead at
-            one hand; else the nearest other door in sight, within 20 m; else the exit in sight;
-            else what lies ahead behind furniture, or, for a path that stays in the room, anywhere.
+        `room`: the room of its begin, None outside rooms; `exits`: numbers of the doors by which
+        the path leaves the room. Returns the exit straight ahead, over furniture too; else the exit
+        in sight if it lies ahead at one hand; else the nearest other door in sight, within 20 m;
+        else the exit in sight; else what lies ahead behind furniture, or, for a path that stays in
+        the room, anywhere.
         """
         point, heading_rad = line.at(0.0), line.first_heading()
         found: list[tuple[int, float, int, Landmark]] = []
@@ -288,21 +258,10 @@ class Landmarks(DoorsInSight):
     ) -> Landmark | None:
         """Return the door that shows a person where a path ends.
 
-        Parameters
-        ----------
-        point
-            Where it ends, `(x, y)` in metres, map frame.
-        heading_rad
-            Direction in which the person looks, radians; NaN without one.
-        room
-            The room in which it ends, None outside rooms.
-        but
-            Numbers of the doors by which the path comes.
-
-        Returns
-        -------
-        Landmark or None
-            The nearest other door in sight, within 5 m.
+        `point`: where it ends, `(x, y)` in metres, map frame; `heading_rad`: direction in which the
+        person looks, radians; NaN without one; `room`: the room in which it ends, None outside
+        rooms; `but`: numbers of the doors by which the path comes. Returns the nearest other door
+        in sight, within 5 m.
         """
         near = [
             (away_m, door.number, door)

@@ -20,16 +20,9 @@ _STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 class RoomWalls:
     """The closed walls of a room.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), the label of each free cell, another value elsewhere.
-    label
-        That of the room.
-    exits
-        The cells on both sides of each boundary, int64 (n, 2), by its number.
-    step
-        How many sides of cells a person walks past straight on.
+    `label_of`: int32 (rows, cols), the label of each free cell, another value elsewhere; `label`:
+    that of the room; `exits`: the cells on both sides of each boundary, int64 (n, 2), by its
+    number; `step`: how many sides of cells a person walks past straight on.
     """
 
     def __init__(
@@ -59,8 +52,7 @@ class RoomWalls:
     def _side(self, row: LongArray, col: LongArray, course: LongArray) -> LongArray:
         """Return the indices of the sides of cells of the room that look along steps."""
         flat = (row - self._first[0]) * self._inside.shape[1] + col - self._first[1]
-        found: LongArray = np.searchsorted(self._sides, 4 * flat + course)
-        return found
+        return np.searchsorted(self._sides, 4 * flat + course)
 
     def _length_along(self, sides: list[int], step: int) -> FloatArray:
         """Return how far it is to each side for a person, who walks straight past what is small,
@@ -69,8 +61,7 @@ class RoomWalls:
         row, col = np.divmod(cells, self._inside.shape[1])
         lengths = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(row), np.diff(col)))])
         ends = np.append(np.arange(0, len(sides), step), len(sides))
-        along: FloatArray = np.interp(np.arange(len(sides) + 1), ends, lengths)
-        return along
+        return np.interp(np.arange(len(sides) + 1), ends, lengths)
 
     def _follow(self, following: list[int], step: int) -> None:
         exit_of = self._exit_of
@@ -105,18 +96,9 @@ class RoomWalls:
         """Return where one comes to a wall straight on, how far it is, and whether no door is
         there.
 
-        Parameters
-        ----------
-        cell
-            Where one begins, (row, col), in cells.
-        step
-            Step of a cell's length, likewise.
-
-        Returns
-        -------
-        tuple or None
-            The wall by its index and the side of a cell, and the cells up to there, past what
-            stands free.
+        `cell`: where one begins, (row, col), in cells; `step`: step of a cell's length, likewise.
+        Returns the wall by its index and the side of a cell, and the cells up to there, past what
+        stands free.
         """
         row, col = (value - first for value, first in zip(cell, self._first, strict=True))
         last = None
@@ -145,12 +127,7 @@ class RoomWalls:
     def met(self, begin: tuple[int, int], hand: Hand) -> Iterator[tuple[int, float]]:
         """Yield the numbers of what leads out in a wall, and how far each is, in cells.
 
-        Parameters
-        ----------
-        begin
-            The wall, and where one begins.
-        hand
-            That at which one has it.
+        `begin`: the wall, and where one begins; `hand`: that at which one has it.
         """
         lengths, sign = self._lengths[begin[0]], 1 if hand == "right" else -1
         length = float(lengths[-1])

@@ -321,8 +321,7 @@ class _Writer:
     def _space(self, space: Space) -> SpaceWords:
         """Return the words for a space, with its name filled in."""
         if space.name is None:
-            found: SpaceWords = getattr(self.words, space.shape)
-            return found
+            return getattr(self.words, space.shape)
         if space.shape != "room":
             shape: SpaceWords = getattr(self.words, space.shape)
             texts = {part: f"{text} {space.name}" for part, text in vars(shape).items()}

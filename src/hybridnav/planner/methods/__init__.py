@@ -26,12 +26,9 @@ _METHODS = {
 def make_method(known: KnownMap, settings: PlannerSettings) -> Method:
     """Make the method that some settings name.
 
-    Raises
-    ------
-    InvalidValueError
-        When these settings do not use structures of the given kind, or the map does not suit.
-    PresetError
-        When the settings name a refiner of the user's own that cannot be used.
+    Raises `InvalidValueError` when these settings do not use structures of the given kind, or the
+    map does not suit. Raises `PresetError` when the settings name a refiner of the user's own that
+    cannot be used.
     """
     by_costs = settings.sampling is not None and known.costs is not None
     allowed = settings.allow_unexplored

@@ -41,17 +41,9 @@ class OverLattice(Method):
     belongs to costs, and these may change. Equal queries have equal answers, bit for bit, whatever
     was asked before.
 
-    Parameters
-    ----------
-    known
-        The map, without corner cutting, and its costs; without costs a metre costs a metre.
-    settings
-        Whether unexplored cells may be entered.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map allows corner cutting.
+    `known`: the map, without corner cutting, and its costs; without costs a metre costs a metre;
+    `settings`: whether unexplored cells may be entered. Raises `InvalidValueError` when the map
+    allows corner cutting.
     """
 
     def __init__(self, known: KnownMap, settings: CheapestSettings) -> None:

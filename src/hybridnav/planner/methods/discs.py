@@ -46,16 +46,9 @@ class Discs:
     is free for the circumscribed disc if that meets none anywhere: its path is valid with every
     heading. Both keep the rules of the map for the base.
 
-    Parameters
-    ----------
-    grid
-        The map, without corner cutting, inflated by no more than the inscribed radius.
-    footprint
-        The robot.
-    allow_unexplored
-        Whether unexplored cells may be entered.
-    costs
-        Costs of the cells; None for lengths.
+    `grid`: the map, without corner cutting, inflated by no more than the inscribed radius;
+    `allow_unexplored`: whether unexplored cells may be entered; `costs`: costs of the cells; None
+    for lengths.
     """
 
     def __init__(
@@ -110,8 +103,7 @@ class Discs:
 
     @property
     def _obstacles(self) -> BoolArray:
-        occupied: BoolArray = self._grid.measured == CellClass.OCCUPIED
-        return occupied
+        return self._grid.measured == CellClass.OCCUPIED
 
     def _near(self, obstacles: BoolArray) -> BoolArray:
         """Return the cells with a point that is nearer to an obstacle than the large radius."""

@@ -90,12 +90,8 @@ def enterable_of(grid: OccupancyGrid, cells: LongArray, *, allow_unexplored: boo
 class WholeMap(Method):
     """Grid A* on the whole map: optimal; or a refiner of the user's own, with the octile bound.
 
-    Parameters
-    ----------
-    known
-        The map and its costs.
-    settings
-        Whether unexplored cells may be entered, and the refiner, used where nothing is closed.
+    `known`: the map and its costs; `settings`: whether unexplored cells may be entered, and the
+    refiner, used where nothing is closed.
     """
 
     def __init__(self, known: KnownMap, settings: PlannerSettings) -> None:

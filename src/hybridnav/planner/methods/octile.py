@@ -39,12 +39,8 @@ class OverJumps(Method):
 
     If corners may be cut, the graph lacks some moves: then A* searches the whole map.
 
-    Parameters
-    ----------
-    known
-        The map, and the search of its graph, if it is built already.
-    settings
-        Whether unexplored cells may be entered.
+    `known`: the map, and the search of its graph, if it is built already; `settings`: whether
+    unexplored cells may be entered.
     """
 
     metric: Metric = "octile"

@@ -75,10 +75,8 @@ class _Between(NamedTuple):
 def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings) -> OmplPlanner:
     """Make a planner with OMPL along the paths of a method.
 
-    Raises
-    ------
-    OmplError
-        When OMPL is not installed, refuses the settings, or its process does not start.
+    Raises `OmplError` when OMPL is not installed, refuses the settings, or its process does not
+    start.
     """
     grid, field_of = known.grid, None
     if settings.along != "grid-astar" and known.topology is not None:
@@ -108,22 +106,10 @@ class OmplPlanner:
     path of the larger disc counts, or the grid's own path, shortened by line of sight. A copied or
     unpickled planner starts its own process at its first query.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    settings
-        Settings with a section `ompl`.
-    field_of
-        int16 or int32 (rows, cols), the field of each cell; None where the whole map is the
-        corridor.
-    costs
-        Costs of the cells, for a footprint that can follow a disc; None for lengths.
-
-    Raises
-    ------
-    OmplError
-        When OMPL is not installed, refuses the settings, or its process does not start.
+    `settings`: settings with a section `ompl`; `field_of`: int16 or int32 (rows, cols), the field
+    of each cell; None where the whole map is the corridor; `costs`: costs of the cells, for a
+    footprint that can follow a disc; None for lengths. Raises `OmplError` when OMPL is not
+    installed, refuses the settings, or its process does not start.
     """
 
     def __init__(
@@ -159,22 +145,12 @@ class OmplPlanner:
     ) -> OmplPlan:
         """Find a path of the state space along a path of cells.
 
-        Parameters
-        ----------
-        cells
-            int64 (n, 2), a legal path from the cell of the start to that of the goal.
-        endpoints
-            Start and goal, float64 (3,): metres and radians, map frame.
-        closed
-            Cells that may not be entered; None for none.
-        spent_s
-            Seconds of the budget that are spent already.
-        least_m
-            A proved bound on the length of all paths.
-        along
-            The answer of the method, whose path the cells are; None if it has no line.
-        tells_search
-            Whether to return the states and trees of the search too.
+        `cells`: int64 (n, 2), a legal path from the cell of the start to that of the goal;
+        `endpoints`: start and goal, float64 (3,): metres and radians, map frame; `closed`: cells
+        that may not be entered; None for none; `spent_s`: seconds of the budget that are spent
+        already; `least_m`: a proved bound on the length of all paths; `along`: the answer of the
+        method, whose path the cells are; None if it has no line; `tells_search`: whether to return
+        the states and trees of the search too.
         """
         began = time.monotonic() - spent_s
         refused = self._refused(endpoints, closed)

@@ -29,10 +29,8 @@ def own_method(known: KnownMap, settings: PlannerSettings) -> Method:
     `settings`. It needs `metric` and `find`; `prepare`, if it has one, is called once, before the
     first query.
 
-    Raises
-    ------
-    PresetError
-        When the module cannot be imported, has no such class, or the class makes no method.
+    Raises `PresetError` when the module cannot be imported, has no such class, or the class makes
+    no method.
     """
     own = class_of(settings.method, "planner.method")
     keywords = {"costs": known.costs, "allow_unexplored": settings.allow_unexplored}
@@ -75,10 +73,8 @@ class OwnMethod(Method):
     def find(self, query: Query) -> Found:
         """Find a path, and time it if the method does not; see `Method`.
 
-        Raises
-        ------
-        PresetError
-            When the answer is no `Found`, or its path does not lead from start to goal.
+        Raises `PresetError` when the answer is no `Found`, or its path does not lead from start to
+        goal.
         """
         if not self._is_prepared:
             self.prepare()

@@ -28,18 +28,9 @@ _MAX_SHOWN = 120
 def own_refiner(grid: OccupancyGrid, settings: PlannerSettings) -> Refiner | None:
     """Import the class that settings name, and return a refiner of it whose paths are checked.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    settings
-        Their `refine` is `module:Class`, else there is none. The class is called with the grid and
-        the keyword `allow_unexplored`.
-
-    Raises
-    ------
-    PresetError
-        When the module cannot be imported, has no such class, or the class makes no refiner.
+    `settings`: their `refine` is `module:Class`, else there is none. The class is called with the
+    grid and the keyword `allow_unexplored`. Raises `PresetError` when the module cannot be
+    imported, has no such class, or the class makes no refiner.
     """
     name, allow_unexplored = settings.own_refiner, settings.allow_unexplored
     if name is None:
@@ -90,11 +81,8 @@ class CheckedRefiner:
     ) -> tuple[LongArray | None, int]:
         """Find a path; see `Refiner`.
 
-        Raises
-        ------
-        PresetError
-            When the refiner returns something else than legal moves from start to goal inside the
-            corridor, and a number of expansions.
+        Raises `PresetError` when the refiner returns something else than legal moves from start to
+        goal inside the corridor, and a number of expansions.
         """
         returned: Any = self._own.refine(start, goal, corridor)
         try:
@@ -133,8 +121,7 @@ class CheckedRefiner:
     def _moves(self) -> ByteArray:
         """uint8 (rows, cols), masks of the legal moves."""
         enterable = np.ascontiguousarray(self._enterable)
-        moves: ByteArray = legal_moves(enterable, self._grid.corner_cutting)
-        return moves
+        return legal_moves(enterable, self._grid.corner_cutting)
 
     def _wrong(self, what: str) -> PresetError:
         return refused(

@@ -35,12 +35,8 @@ class MaxDistance(Method):
     If corners may be cut, a path can pass between fields that no arc joins, so that a missing route
     proves nothing: then the whole map is searched.
 
-    Parameters
-    ----------
-    known
-        The map with its places, and its costs.
-    settings
-        Whether unexplored cells may be entered, the corridor, and the refiner.
+    `known`: the map with its places, and its costs; `settings`: whether unexplored cells may be
+    entered, the corridor, and the refiner.
     """
 
     def __init__(self, known: KnownMap, settings: PaperSettings) -> None:

@@ -50,18 +50,9 @@ _KEPT = 8
 class OverMesh(Method):
     """Shortest any-angle paths; the mesh is built when the first query needs it.
 
-    Parameters
-    ----------
-    known
-        The map, without corner cutting, and the search of its mesh, if it is built already.
-    settings
-        Whether unexplored cells may be entered, the accepted distance from the optimum, and the
-        time of a query.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map allows corner cutting.
+    `known`: the map, without corner cutting, and the search of its mesh, if it is built already;
+    `settings`: whether unexplored cells may be entered, the accepted distance from the optimum, and
+    the time of a query. Raises `InvalidValueError` when the map allows corner cutting.
     """
 
     metric: Metric = "any-angle"
@@ -332,8 +323,7 @@ class OverMesh(Method):
         free = self._free[low[0] : high[0], low[1] : high[1]].copy()
         at = np.stack(np.divmod(closed.flat, self._free.shape[1]), axis=1) - low
         free[tuple(at[((at >= 0) & (at < free.shape)).all(axis=1)].T)] = False
-        passed: LongArray = cells_of_line(free, positions - low) + low
-        return passed
+        return cells_of_line(free, positions - low) + low
 
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
         """Return the search round closed cells, which is cached."""

@@ -126,16 +126,9 @@ class FiledPart:
     def read(self) -> Part:
         """Map the arrays into memory and compare them with their checksums.
 
-        Returns
-        -------
-        Part
-            The part; its arrays share private pages of the file, so that writes do not reach the
-            file; deflated ones are inflated.
-
-        Raises
-        ------
-        ModelError
-            When an array has changed since it was written.
+        Returns the part; its arrays share private pages of the file, so that writes do not reach
+        the file; deflated ones are inflated. Raises `ModelError` when an array has changed since it
+        was written.
         """
         arrays = {name: self._array(name, at) for name, at in self.part.arrays.items()}
         part = self.part
@@ -144,10 +137,7 @@ class FiledPart:
     def stored(self, name: str) -> memoryview:
         """Return the bytes of an array in the file, for contents with checksums of their own.
 
-        Raises
-        ------
-        ModelError
-            When it is missing, or deflated.
+        Raises `ModelError` when it is missing, or deflated.
         """
         at = self.part.arrays.get(name)
         if at is None or at.deflated:
@@ -188,19 +178,8 @@ class FiledPart:
 def write_parts(path: Path, parts: Iterable[Part], *, compress: bool) -> None:
     """Write a model, whole or not at all.
 
-    Parameters
-    ----------
-    path
-        The file; an existing one is replaced, and processes that have it mapped keep the old one.
-    parts
-        The parts of the model.
-    compress
-        Whether arrays are deflated.
-
-    Raises
-    ------
-    OSError
-        When it cannot be written.
+    `path`: the file; an existing one is replaced, and processes that have it mapped keep the old
+    one; `compress`: whether arrays are deflated. Raises `OSError` when it cannot be written.
     """
     replace_file(path, buffers_of(parts, compress=compress))
 
@@ -208,10 +187,7 @@ def write_parts(path: Path, parts: Iterable[Part], *, compress: bool) -> None:
 def buffers_of(parts: Iterable[Part], *, compress: bool) -> list[bytes | memoryview]:
     """Return the content of the file of a model, in parts; see `write_parts`.
 
-    Raises
-    ------
-    ModelError
-        When rooms and doors have names that are too long together.
+    Raises `ModelError` when rooms and doors have names that are too long together.
     """
     described: list[dict[str, Any]] = []
     buffers: list[bytes | memoryview] = []
@@ -256,22 +232,9 @@ def buffers_of(parts: Iterable[Part], *, compress: bool) -> list[bytes | memoryv
 def read_parts(path: PathLike) -> list[FiledPart]:
     """Open a model: read its header, and map the rest.
 
-    Parameters
-    ----------
-    path
-        The file.
-
-    Returns
-    -------
-    list of FiledPart
-        The parts; every array lies inside the file and overlaps no other one.
-
-    Raises
-    ------
-    MapNotFoundError
-        When the file does not exist.
-    ModelError
-        When the file is no model, was made by a newer version, or is not whole.
+    Returns the parts; every array lies inside the file and overlaps no other one. Raises
+    `MapNotFoundError` when the file does not exist. Raises `ModelError` when the file is no model,
+    was made by a newer version, or is not whole.
     """
     where = f"model {printable(path)}"
     if Path(path).exists() and not Path(path).is_file():  # opening a pipe could take forever
@@ -292,17 +255,8 @@ def read_parts(path: PathLike) -> list[FiledPart]:
 def parts_within(content: memoryview, where: str) -> list[FiledPart]:
     """Return the parts of a model in memory; see `read_parts`.
 
-    Parameters
-    ----------
-    content
-        The bytes of its file, at a multiple of 64.
-    where
-        What messages begin with.
-
-    Raises
-    ------
-    ModelError
-        As by `read_parts`.
+    `content`: the bytes of its file, at a multiple of 64; `where`: what messages begin with. Raises
+    `ModelError` as by `read_parts`.
     """
     length, checksum = _read_head(bytes(content[: _HEAD.size]), where)
     end, begin = _HEAD.size + length, _aligned(_HEAD.size + length)

@@ -93,8 +93,7 @@ class Model:
     @property
     def grid(self) -> OccupancyGrid:
         """The map."""
-        grid: OccupancyGrid = self._once("grid", self._read_grid)
-        return grid
+        return self._once("grid", self._read_grid)
 
     @property
     def presets(self) -> tuple[Preset, ...]:
@@ -104,15 +103,13 @@ class Model:
     @property
     def rooms(self) -> RoomLabels | None:
         """The rooms that its places were grown with, None without rooms."""
-        rooms: RoomLabels | None = self._once("rooms", self._read_rooms)
-        return rooms
+        return self._once("rooms", self._read_rooms)
 
     @property
     def topology(self) -> TopologicalMap:
         """The topological map: the saved one, else one grown by the first preset, or by
         `shortest`."""
-        topology: TopologicalMap = self._once("topology", self._read_topology)
-        return topology
+        return self._once("topology", self._read_topology)
 
     def _once(self, name: str, read: Callable[[], Any]) -> Any:
         """Return an object that is read once for all threads: planners must share one grid."""
@@ -363,10 +360,7 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
 def model_of(filed: Sequence[FiledPart], where: str, max_cells: int) -> Model:
     """Return the model of the parts of a file.
 
-    Raises
-    ------
-    ModelError
-        When they are not those of one map.
+    Raises `ModelError` when they are not those of one map.
     """
     for part in filed:
         if part.kind in GONE:

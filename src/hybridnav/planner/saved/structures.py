@@ -57,10 +57,7 @@ class ArraySpec:
     def check_shape(self, part: FiledPart, sizes: Mapping[str, int]) -> None:
         """Refuse another shape, or another type of numbers.
 
-        Raises
-        ------
-        ModelError
-            When the header describes the array differently, or not at all.
+        Raises `ModelError` when the header describes the array differently, or not at all.
         """
         at = part.part.arrays.get(self.name)
         if at is None:
@@ -74,10 +71,7 @@ class ArraySpec:
     def check_values(self, part: FiledPart, sizes: Mapping[str, int], array: AnyArray) -> None:
         """Refuse values that would lead kernels out of their arrays.
 
-        Raises
-        ------
-        ModelError
-            When a value is out of range.
+        Raises `ModelError` when a value is out of range.
         """
         if not array.size:
             return
@@ -107,12 +101,8 @@ class Structure:
     def part(self, thing: Any, sizes: dict[str, int], values: dict[str, Any] | None = None) -> Part:
         """Describe an object of the class.
 
-        Parameters
-        ----------
-        thing
-            Object with an attribute, or an item, for each array.
-        sizes, values
-            Numbers that shapes consist of, and others.
+        `thing`: object with an attribute, or an item, for each array; `sizes`, `values`: numbers
+        that shapes consist of, and others.
         """
         read = thing.__getitem__ if isinstance(thing, dict) else lambda name: getattr(thing, name)
         arrays = {spec.name: read(spec.name) for spec in self.arrays}
@@ -123,17 +113,8 @@ class Structure:
 
         Shapes are checked before anything is read, then checksums, then values.
 
-        Parameters
-        ----------
-        filed
-            The part.
-        known
-            Sizes of the map: `rows`, `cols` and `cells`.
-
-        Raises
-        ------
-        ModelError
-            When the part is of another version, or an array does not match the description.
+        `known`: sizes of the map: `rows`, `cols` and `cells`. Raises `ModelError` when the part is
+        of another version, or an array does not match the description.
         """
         self.check_version(filed)
         sizes = self._checked_sizes(filed, known)
@@ -155,10 +136,7 @@ class Structure:
     def check_version(self, filed: FiledPart) -> None:
         """Refuse a part that another version has written.
 
-        Raises
-        ------
-        ModelError
-            When it is of another version.
+        Raises `ModelError` when it is of another version.
         """
         version = filed.part.version
         if version != self.version:

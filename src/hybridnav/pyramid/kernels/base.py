@@ -237,17 +237,10 @@ _POSITION = np.uint64(0x3FFFFFFF)
 def select_joins(origin, base_edge, joins, level, parent, kernel_dart):
     """Add stars of the edges that join up to a level; return the number of their leaves.
 
-    Parameters
-    ----------
-    origin, base_edge
-        See `decimation.contractible`.
-    joins
-        uint8 by base edge, the level at which its two cells join, 0 for never.
-    level
-        Number of the level.
-    parent, kernel_dart
-        int32 (n_vertices,), changed; see `decimation.select_stars`, whose stars have no vertex in
-        common with these. A centre has a kernel dart of its own only while this runs.
+    `origin`, `base_edge`: see `decimation.contractible`; `joins`: uint8 by base edge, the level at
+    which its two cells join, 0 for never; `parent`, `kernel_dart`: int32 (n_vertices,), changed;
+    see `decimation.select_stars`, whose stars have no vertex in common with these. A centre has a
+    kernel dart of its own only while this runs.
     """
     leaves = 0
     for e in range(base_edge.size):
@@ -274,16 +267,9 @@ def select_joins(origin, base_edge, joins, level, parent, kernel_dart):
 def let_survive(origin, keys, cells, cols, survivors, survivors_of_edge):
     """Let certain cells survive whatever they merge with.
 
-    Parameters
-    ----------
-    origin, keys, survivors_of_edge
-        See `decimation.contractible`; the last is changed.
-    cells
-        int32 (n_vertices, 2), the surviving cells of the level.
-    cols
-        Columns of the grid.
-    survivors
-        bool by flat cell, the cells that survive; no edge has two of them.
+    `origin`, `keys`, `survivors_of_edge`: see `decimation.contractible`; the last is changed;
+    `cells`: int32 (n_vertices, 2), the surviving cells of the level; `cols`: columns of the grid;
+    `survivors`: bool by flat cell, the cells that survive; no edge has two of them.
     """
     for i in range(keys.size):
         edge = np.int64(keys[i] & _POSITION)

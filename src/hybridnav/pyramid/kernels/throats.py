@@ -83,27 +83,12 @@ def divide(classes, clearance, most, small, slight, depth):
     the part that reached it, or begins one. Where two parts meet, the clearance of that square is
     half the width of the widest passage between them, and what they have so far is wider than it.
 
-    Parameters
-    ----------
-    classes
-        uint8 (rows, cols), `CellClass`.
-    clearance
-        uint16, see `clearances`.
-    most
-        The greatest one: passages as wide as that are no throats.
-    small, slight
-        Two parts become one where they meet if either has had fewer squares than `small` (a fine
-        part) or `slight` (a part).
-    depth
-        Both kinds become one where the greatest clearance of either is less than that of the
-        passage and this.
-
-    Returns
-    -------
-    int32, as `clearance`
-        The fine part of each square, -1 where no cell of it is free.
-    int32 (n_fine,)
-        The part that each fine part lies in.
+    `classes`: uint8 (rows, cols), `CellClass`; `clearance`: uint16, see `clearances`; `most`: the
+    greatest one: passages as wide as that are no throats; `small`, `slight`: two parts become one
+    where they meet if either has had fewer squares than `small` (a fine part) or `slight` (a part);
+    `depth`: both kinds become one where the greatest clearance of either is less than that of the
+    passage and this. Returns the fine part of each square, -1 where no cell of it is free. The part
+    that each fine part lies in.
     """
     shape = clearance.shape
     away = clearance.ravel()

@@ -53,14 +53,8 @@ def arc_cost(free, factors, a, bend, c):
     enters a blocked cell, and some that pass one closely are refused. Costs are those of the
     chords, times the length of the arc over theirs.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols).
-    a, bend, c
-        Positions, float64 (2,); a and c are equally far from the bend.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols); `a`,
+    `bend`, `c`: positions, float64 (2,); a and c are equally far from the bend.
     """
     in_row, in_col = bend[0] - a[0], bend[1] - a[1]
     out_row, out_col = c[0] - bend[0], c[1] - bend[1]
@@ -181,12 +175,8 @@ def _merged(free, factors, line, n, i, spare):
 def _thinned(free, factors, line, radius, spare):
     """Return a line with fewer points, where two bends are too close for arcs, and what is spare.
 
-    Parameters
-    ----------
-    free, factors, line, radius
-        See `round_bends`.
-    spare
-        Most that the new line may cost above the old one, in cells.
+    `free`, `factors`, `line`, `radius`: see `round_bends`; `spare`: most that the new line may cost
+    above the old one, in cells.
     """
     line, n = line.copy(), line.shape[0]
     for _ in range(_ROUNDS):
@@ -216,18 +206,10 @@ def round_bends(free, factors, line, radius, spare):
     direction. An arc has at least the radius, and at most four times that. Bends too close to each
     other for that are merged first.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols).
-    line
-        float64 (n, 2), n >= 2, positions, no two in a row equal, joined by legal segments.
-    radius
-        Least radius of an arc, in cells, > 0.
-    spare
-        Most that the result may cost above the line, in cells, >= 0.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols);
+    `line`: float64 (n, 2), n >= 2, positions, no two in a row equal, joined by legal segments;
+    `radius`: least radius of an arc, in cells, > 0; `spare`: most that the result may cost above
+    the line, in cells, >= 0.
     """
     line, spare = _thinned(free, factors, line, radius, spare)
     n = line.shape[0]

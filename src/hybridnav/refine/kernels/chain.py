@@ -114,16 +114,9 @@ def slopes_of(factors, chain, stride, aside, slope, bend, link):
 def solve(slope, bend, link, held, farthest, step):
     """Solve for the step of the inner points that makes the slope 0, by elimination.
 
-    Parameters
-    ----------
-    slope, bend, link
-        See `slopes_of`.
-    held
-        float64 (n,), the steps of points that are held, NaN for others.
-    farthest
-        float64 (n,), the farthest that points may go.
-    step
-        float64 (n,), changed; the first and the last stay 0.
+    `slope`, `bend`, `link`: see `slopes_of`; `held`: float64 (n,), the steps of points that are
+    held, NaN for others; `farthest`: float64 (n,), the farthest that points may go; `step`: float64
+    (n,), changed; the first and the last stay 0.
     """
     n = slope.shape[0]
     above = np.zeros(n)
@@ -155,12 +148,7 @@ def polish(free, factors, line):
     """Move the points of a line, one at a time, to where it costs less, by compass search: what a
     chain that was held by an obstacle leaves undone. Return the line, no two points in a row equal.
 
-    Parameters
-    ----------
-    free, factors
-        See `settle`.
-    line
-        float64 (n, 2), changed.
+    `free`, `factors`: see `settle`; `line`: float64 (n, 2), changed.
     """
     n, rows, cols = line.shape[0], free.shape[0] + 0.0, free.shape[1] + 0.0
     # How far away each point is tried, what the segment before it costs, and whether it is done.

@@ -51,15 +51,9 @@ _FLAT = 0.02
 def line_of_cells(cells, endpoints, corner_cutting):
     """Return the positions of a path of cells between two points, no two in a row equal.
 
-    Parameters
-    ----------
-    cells
-        int64 (n, 2), legal moves.
-    endpoints
-        float64 (2, 2), start and goal as (row, col), in the first and the last cell but for
-        rounding.
-    corner_cutting
-        Whether the line passes the centres of the first and the last cell too.
+    `cells`: int64 (n, 2), legal moves; `endpoints`: float64 (2, 2), start and goal as (row, col),
+    in the first and the last cell but for rounding; `corner_cutting`: whether the line passes the
+    centres of the first and the last cell too.
     """
     n = cells.shape[0]
     first, last = (0, n) if corner_cutting else (1, max(n - 1, 1))
@@ -210,16 +204,7 @@ def _face_aside(chain, aside):
 def _settled(free, factors, chain, stride, steps):
     """Return a chain whose inner points have moved to their sides until it costs least there.
 
-    Parameters
-    ----------
-    free, factors
-        See `settle`.
-    chain
-        float64 (n, 2), positions.
-    stride
-        See `slopes_of`.
-    steps
-        Most steps.
+    `free`, `factors`: see `settle`; `chain`: float64 (n, 2), positions; `stride`: see `slopes_of`.
     """
     n = chain.shape[0]
     chain, moved, best, least = chain.copy(), chain.copy(), chain.copy(), np.inf
@@ -310,14 +295,8 @@ def settle(free, factors, path):
 
     The line is never dearer than the path, and its segments are legal if those of the path are.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols), >= 1.
-    path
-        float64 (n, 2), n >= 1, positions, no two in a row equal.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols), >=
+    1; `path`: float64 (n, 2), n >= 1, positions, no two in a row equal.
     """
     whole = cost_of(factors, path)
     if path.shape[0] < 3:
@@ -349,18 +328,9 @@ def rest_of(free, factors, line, start, most):
     """Return the rest of a line from a position beside it; without rows where it has a segment that
     is not legal, or costs more than some cost.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols), >= 1.
-    line
-        float64 (n, 2), n >= 2, positions on the map.
-    start
-        float64 (2,), the position.
-    most
-        The cost, in cells.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols), >=
+    1; `line`: float64 (n, 2), n >= 2, positions on the map; `start`: float64 (2,), the position;
+    `most`: the cost, in cells.
     """
     row, col = start
     nearest, ahead = np.inf, 1

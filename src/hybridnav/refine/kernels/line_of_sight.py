@@ -29,18 +29,9 @@ def clear_segments(marks, tails, heads):
 def apart(marks, candidates, n_taken, spacing, most):
     """Choose candidates one by one that see no chosen one within a distance, bool (n,).
 
-    Parameters
-    ----------
-    marks
-        See `clear_segments`.
-    candidates
-        float64 (n, 2), positions (row, col), those that are tried first first.
-    n_taken
-        The first so many are chosen in any case.
-    spacing
-        The distance, in cells.
-    most
-        Number of chosen ones, with those in any case, at which to stop.
+    `marks`: see `clear_segments`; `candidates`: float64 (n, 2), positions (row, col), those that
+    are tried first first; `n_taken`: the first so many are chosen in any case; `spacing`: the
+    distance, in cells; `most`: number of chosen ones, with those in any case, at which to stop.
     """
     side = max(spacing, 1.0)
     rows, cols = int(marks.shape[0] / side) + 3, int(marks.shape[1] / side) + 3
@@ -75,14 +66,8 @@ def apart(marks, candidates, n_taken, spacing, most):
 def reaches(marks, corners, steps, farthest):
     """Return how far rays run from lattice corners before they enter a blocked cell, in cells.
 
-    Parameters
-    ----------
-    marks
-        See `clear_segments`.
-    corners, steps
-        float64 (n, 2), where rays begin, and steps of length 1 along them, (row, col).
-    farthest
-        Distance at which rays end.
+    `marks`: see `clear_segments`; `corners`, `steps`: float64 (n, 2), where rays begin, and steps
+    of length 1 along them, (row, col); `farthest`: distance at which rays end.
     """
     found = np.empty(len(corners))
     rows, cols = marks.shape[0], marks.shape[1]
@@ -102,16 +87,8 @@ def reaches(marks, corners, steps, farthest):
 def shared(marks, starts, goals, limits, positions):
     """Return which pairs see a common position over which the way is short enough, bool (n,).
 
-    Parameters
-    ----------
-    marks
-        See `clear_segments`.
-    starts, goals
-        float64 (n, 2).
-    limits
-        float64 (n,), lengths up to which a way is short enough, in cells.
-    positions
-        float64 (k, 2).
+    `marks`: see `clear_segments`; `starts`, `goals`: float64 (n, 2); `limits`: float64 (n,),
+    lengths up to which a way is short enough, in cells; `positions`: float64 (k, 2).
     """
     rows, cols = int(marks.shape[0] / _SIDE) + 2, int(marks.shape[1] / _SIDE) + 2
     first = np.full((rows, cols), -1, np.int32)

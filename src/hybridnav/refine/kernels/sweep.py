@@ -1,9 +1,8 @@
 """Kernels of bodies in motion: the areas swept by convex polygons and points, against cells.
 
-Positions are those of `taut`; angles are counter-clockwise from the axis of the columns to
-that of the rows. A motion moves the base along a straight line while the heading turns evenly
-(`radius` 0), or along an arc about a fixed centre, to the left where its signed `radius` in cells
-is positive.
+Positions are those of `taut`; angles are counter-clockwise from the axis of the columns to that of
+the rows. A motion moves the base along a straight line while the heading turns evenly (`radius` 0),
+or along an arc about a fixed centre, to the left where its signed `radius` in cells is positive.
 
 A body is `(ahead, clearance, corners, offsets, radii)`: columns to the next occupied cell of each
 row, cells from each centre to the nearest occupied one, corners (n, 2) in cells along the heading

@@ -47,21 +47,8 @@ _LEAST_GAIN = 2e-4
 def attempt(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float) -> bool:
     """Solve leg after leg, join and simplify them, and improve windows of the path; return success.
 
-    Parameters
-    ----------
-    attempts
-        The query.
-    corridor
-        The corridor to search.
-    whole
-        State space of the whole corridor.
-    part
-        Share of the time left that the legs may take.
-
-    Returns
-    -------
-    bool
-        Whether there is a path.
+    `whole`: state space of the whole corridor; `part`: share of the time left that the legs may
+    take. Returns whether there is a path.
     """
     points = _legs(attempts, corridor, whole, part=part)
     if points is None:
@@ -260,14 +247,8 @@ class Poses:
     The endpoints are those of the query. The others head along the path, turned or moved aside if
     that is not valid.
 
-    Parameters
-    ----------
-    query
-        OmplQuery with the path of cells.
-    corridor
-        Corridor that states must lie in.
-    whole
-        State space of the corridor.
+    `query`: OmplQuery with the path of cells; `corridor`: corridor that states must lie in;
+    `whole`: state space of the corridor.
     """
 
     def __init__(self, query: OmplQuery, corridor: SearchArea, whole: StateSpace) -> None:
@@ -323,14 +304,7 @@ _ENOUGH = 1 + 1e-4
 def answer(base: Base, query: OmplQuery, send: Callable[[Reply], None]) -> Reply:
     """Try the corridors of a query in turn and return the last reply.
 
-    Parameters
-    ----------
-    base
-        The map, and the worker's tables of it.
-    query
-        The problem.
-    send
-        Called with each better path.
+    `base`: the map, and the worker's tables of it; `send`: called with each better path.
     """
     attempts = Attempts(base, query, send)
     last = len(query.corridors) - 1

@@ -28,14 +28,7 @@ _KEPT = 0.03
 class Attempts:
     """The state of one query: budget, best path so far, attempts.
 
-    Parameters
-    ----------
-    base
-        The map, and the worker's tables of it.
-    query
-        The problem.
-    send
-        Called with each better path.
+    `base`: the map, and the worker's tables of it; `send`: called with each better path.
     """
 
     def __init__(self, base: Base, query: OmplQuery, send: Callable[[Reply], None]) -> None:
@@ -152,16 +145,8 @@ def simplify(
 ) -> FloatArray:
     """Shorten a path by rounds of PathSimplifier, until they gain nothing or the time is up.
 
-    Parameters
-    ----------
-    space
-        State space with the checks of the whole corridor.
-    points
-        float64 (n, 3), a valid path.
-    budget
-        The budget of the query.
-    on_better
-        Called with each better path and its cost.
+    `space`: state space with the checks of the whole corridor; `points`: float64 (n, 3), a valid
+    path; `on_better`: called with each better path and its cost.
     """
     simplifier = Simplifier(space)
     cost, fruitless, shift = space.length(points), 0, 0
@@ -194,10 +179,7 @@ class Simplifier:
     OMPL assumes that parts of valid motions are valid, but a point between two others can be
     rounded to the wrong side of a corner that their line grazes.
 
-    Parameters
-    ----------
-    space
-        State space with the checks.
+    `space`: state space with the checks.
     """
 
     def __init__(self, space: StateSpace) -> None:
@@ -267,12 +249,7 @@ class Budget:
 
     Only a budget in iterations is repeatable from a seed.
 
-    Parameters
-    ----------
-    began_s, deadline_s
-        Times of `time.monotonic`.
-    iterations
-        None to count seconds.
+    `began_s`, `deadline_s`: times of `time.monotonic`; `iterations`: None to count seconds.
     """
 
     def __init__(self, began_s: float, deadline_s: float, iterations: int | None) -> None:
@@ -301,12 +278,7 @@ class Budget:
 
         Planners call it once an iteration.
 
-        Parameters
-        ----------
-        part
-            Share of the budget left now, in (0, 1].
-        most
-            Most iterations; None for no limit.
+        `part`: share of the budget left now, in (0, 1]; `most`: most iterations; None for no limit.
         """
         until = sys.maxsize if most is None else self.iterations + most
         if self._most is not None:

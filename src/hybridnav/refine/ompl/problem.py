@@ -79,13 +79,7 @@ class Corridors:
 
 
 class Base:
-    """Tables of the map that the worker makes once.
-
-    Parameters
-    ----------
-    setup
-        The setup of the worker.
-    """
+    """Tables of the map that the worker makes once."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup

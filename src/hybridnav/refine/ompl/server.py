@@ -132,10 +132,7 @@ def _last_reply(
 def _replied(replies: Connection, connection: Connection, until_s: float) -> bool:
     """Wait until the fork replies or dies, or the time is up; return whether it did.
 
-    Raises
-    ------
-    EOFError
-        When the planner's process is gone, however much time the search has left.
+    Raises `EOFError` when the planner's process is gone, however much time the search has left.
     """
     waiting = select.poll()
     waiting.register(replies, select.POLLIN)

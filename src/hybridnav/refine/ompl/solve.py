@@ -37,16 +37,9 @@ class StateSpace:
     It keeps all objects that it passes to OMPL alive: the bindings hold no references to Python
     objects. `state_valid` checks a state of OMPL.
 
-    Parameters
-    ----------
-    settings
-        Space and turning radius.
-    check
-        Check of states and motions.
-    low, high
-        float64 (2,), bounds of x and y in metres, map frame.
-    note
-        Called with x and y of each valid state; None for no call.
+    `settings`: space and turning radius; `check`: check of states and motions; `low`, `high`:
+    float64 (2,), bounds of x and y in metres, map frame; `note`: called with x and y of each valid
+    state; None for no call.
     """
 
     def __init__(
@@ -260,18 +253,9 @@ def solve(
 ) -> Searched:
     """Solve a problem by the planner of the settings.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    settings
-        Planner and parameters.
-    is_spent
-        Called once an iteration; True ends the search.
-    on_path
-        Called with each better path of a planner that continues, float64 (n, 3).
-    search
-        Receives the motions of tree or roadmap.
+    `settings`: planner and parameters; `is_spent`: called once an iteration; True ends the search;
+    `on_path`: called with each better path of a planner that continues, float64 (n, 3); `search`:
+    receives the motions of tree or roadmap.
     """
     space = problem.space
     problem.objective.setCostThreshold(base.Cost(min(problem.enough, 1e300)))
@@ -295,10 +279,7 @@ def solve(
 def make(settings: OmplSettings, information: Any) -> Any:
     """Return a planner with its parameters.
 
-    Raises
-    ------
-    OmplError
-        When OMPL refuses one of them together with the others.
+    Raises `OmplError` when OMPL refuses one of them together with the others.
     """
     planner = getattr(geometric, settings.planner)(information)
     setters = PARAMETERS[settings.planner]

@@ -72,15 +72,9 @@ def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
 def joined_to(arcs, weight, least):
     """Return the vertices that enough arcs join to those of a walk, bool (n_vertices,).
 
-    Parameters
-    ----------
-    arcs
-        int32 or int64 (n_arcs, 2).
-    weight
-        int8 (n_vertices,): 2 at the ends of the walk, 1 at its other vertices, else 0: for how many
-        arcs an arc to the vertex counts.
-    least
-        How many arcs a vertex needs.
+    `arcs`: int32 or int64 (n_arcs, 2); `weight`: int8 (n_vertices,): 2 at the ends of the walk, 1
+    at its other vertices, else 0: for how many arcs an arc to the vertex counts; `least`: how many
+    arcs a vertex needs.
     """
     joined = np.zeros(weight.size, np.int64)
     for i in range(len(arcs)):

@@ -43,10 +43,7 @@ def pack(head, near, far):
 def have_reverses(first, heads):
     """Return whether each arc of a graph occurs once, and once in the other direction.
 
-    Parameters
-    ----------
-    first, heads
-        Offsets of the arcs of each corner, and the corner at which each arc ends.
+    `first`, `heads`: offsets of the arcs of each corner, and the corner at which each arc ends.
     """
     n = first.size - 1
     begin = np.zeros(n + 1, np.int64)
@@ -152,22 +149,9 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
 def _shortcuts(graph, node, stamp, work, pairs):
     """Find the shortcuts that the removal of a corner needs.
 
-    Parameters
-    ----------
-    graph, work
-        See `_search`.
-    node
-        The corner.
-    stamp
-        Number of the last search.
-    pairs
-        int64 (n, 2), room for all pairs of arcs from the corner; filled with the pairs that a
-        shortcut joins.
-
-    Returns
-    -------
-    tuple
-        Number of shortcuts, number of legs in them, stamp of the last search.
+    `graph`, `work`: see `_search`; `stamp`: number of the last search; `pairs`: int64 (n, 2), room
+    for all pairs of arcs from the corner; filled with the pairs that a shortcut joins. Result:
+    number of shortcuts, number of legs in them, stamp of the last search.
     """
     begin, size, pool, kinds, follow = graph
     records = work[0]
@@ -271,30 +255,18 @@ def _packed_arcs(begin, size, pool):
 def contract(kinds, first, arcs, follow, effort):
     """Contract all corners of a graph, first those that leave few and short shortcuts.
 
-    Parameters
-    ----------
-    kinds
-        uint8 (n,), kinds of corners.
-    first, arcs
-        The graph: offsets of the arcs of each corner; int64 (m, 2), the cost of each, and the
-        result of `pack`. Each arc comes with its reverse; a graph with one that does not is given
-        up at once.
-    follow
-        int64 (kinds, classes): bit c is set where a shortest path that passes a corner of this kind
-        along an arc of the one class may continue along one of class c. If the bit is not set, the
-        two must cost more than another path, by more than the rounding of costs.
-    effort
-        Most corners that a witness search settles; most arcs to examine before contraction is given
-        up, as it also is for a corner with more than `_MOST_ARCS` arcs.
-
-    Returns
-    -------
-    tuple
-        int32 (n + 1,), where the arcs of each corner to those contracted after it begin; int64 (u,
-        2), these arcs; int64 (u,), the corner that each leads past, in the high half, and the
-        positions among its arcs of those to the tail and to the head, 16 bits each, -1 for an arc
-        of the graph; int32 (n,), the corners in the order of their removal. If contraction is given
-        up, there are no arcs.
+    `kinds`: uint8 (n,), kinds of corners; `first`, `arcs`: the graph: offsets of the arcs of each
+    corner; int64 (m, 2), the cost of each, and the result of `pack`. Each arc comes with its
+    reverse; a graph with one that does not is given up at once. `follow`: int64 (kinds, classes):
+    bit c is set where a shortest path that passes a corner of this kind along an arc of the one
+    class may continue along one of class c. If the bit is not set, the two must cost more than
+    another path, by more than the rounding of costs. `effort`: most corners that a witness search
+    settles; most arcs to examine before contraction is given up, as it also is for a corner with
+    more than `_MOST_ARCS` arcs. Returns int32 (n + 1,), where the arcs of each corner to those
+    contracted after it begin; int64 (u, 2), these arcs; int64 (u,), the corner that each leads
+    past, in the high half, and the positions among its arcs of those to the tail and to the head,
+    16 bits each, -1 for an arc of the graph; int32 (n,), the corners in the order of their removal.
+    If contraction is given up, there are no arcs.
     """
     n = first.size - 1
     most_settled, most_looked = effort
@@ -385,17 +357,8 @@ def renumbered(first, arcs, middles, order):
     Every search climbs to the corners that were removed last: if these have the first numbers, so
     that their arcs are adjacent, they stay in the processor's cache.
 
-    Parameters
-    ----------
-    first, arcs, middles
-        Results of `contract`.
-    order
-        int32 (n,), the new number of each corner.
-
-    Returns
-    -------
-    tuple
-        The three arrays in the new order.
+    `first`, `arcs`, `middles`: results of `contract`; `order`: int32 (n,), the new number of each
+    corner. Returns the three arrays in the new order.
     """
     n = order.size
     new_first = np.zeros(n + 1, np.int32)

@@ -20,23 +20,12 @@ from hybridnav._base.moves import FAR
 def climb(hierarchy, seeds, work, nodes, costs, n):
     """Append the label of an end: search upwards from its corners until nothing is left.
 
-    Parameters
-    ----------
-    hierarchy
-        uint8 kinds of corners, offsets of their arcs, the arcs, and the classes that may follow;
-        see `contract`.
-    seeds
-        int32 corners that the end sees, each once or more; int64 costs to them; int64 classes of
-        arcs that may follow there, as bits.
-    work
-        int64 (n_corners, 2), costs (`FAR`) and classes that may follow; int64 heap.
-    nodes, costs, n
-        int32 and int64, the labels so far, and how many entries they have.
-
-    Returns
-    -------
-    tuple
-        The labels, in larger arrays if there was no room; how many entries they have; the heap.
+    `hierarchy`: uint8 kinds of corners, offsets of their arcs, the arcs, and the classes that may
+    follow; see `contract`; `seeds`: int32 corners that the end sees, each once or more; int64 costs
+    to them; int64 classes of arcs that may follow there, as bits; `work`: int64 (n_corners, 2),
+    costs (`FAR`) and classes that may follow; int64 heap; `nodes`, `costs`, `n`: int32 and int64,
+    the labels so far, and how many entries they have. Returns the labels, in larger arrays if there
+    was no room; how many entries they have; the heap.
     """
     kinds, first, arcs, follow = hierarchy
     seen, at_cost, may_follow = seeds
@@ -94,18 +83,10 @@ def grow_rows(rows):
 def costs_to_cells(grid, start, goals, left, best):
     """Find the least costs of cells from one cell, by Dijkstra's algorithm.
 
-    Parameters
-    ----------
-    grid
-        uint8 (n_cells,), the legal moves of each flat cell; int32 (n_cells,), the factors of the
-        cells in units; and the columns of the grid.
-    start
-        A flat cell.
-    goals, left
-        bool (n_cells,), and how many of them are to be settled.
-    best
-        int64 (n_cells,), filled with the costs; `FAR` where there is no path, and no less than the
-        least cost of cells that are no goals.
+    `grid`: uint8 (n_cells,), the legal moves of each flat cell; int32 (n_cells,), the factors of
+    the cells in units; and the columns of the grid; `goals`, `left`: bool (n_cells,), and how many
+    of them are to be settled; `best`: int64 (n_cells,), filled with the costs; `FAR` where there is
+    no path, and no less than the least cost of cells that are no goals.
     """
     moves, units, cols = grid
     heap, size = np.empty((4096, 2), np.int64), 1
@@ -141,14 +122,9 @@ def costs_to_cells(grid, start, goals, left, best):
 def meet(labels, buckets, table):
     """Lower the entries of a table to the least cost by which two labels meet.
 
-    Parameters
-    ----------
-    labels
-        int64 (n + 1,) offsets of the labels of the starts, int32 corners, int64 costs.
-    buckets
-        The same of the goals, by corner: int64 (n_corners + 1,) offsets, int32 goals, int64 costs.
-    table
-        int64 (n, m); changed.
+    `labels`: int64 (n + 1,) offsets of the labels of the starts, int32 corners, int64 costs;
+    `buckets`: the same of the goals, by corner: int64 (n_corners + 1,) offsets, int32 goals, int64
+    costs; `table`: int64 (n, m); changed.
     """
     offset, nodes, costs = labels
     begin, goals, further = buckets
@@ -180,19 +156,10 @@ def reach_next(graph, edges, here, work, size, n_touched):
 
     A search overloads it for its kind of graph, as numba tells them apart.
 
-    Parameters
-    ----------
-    graph
-        A tuple of arrays, the first of them with an element for each corner.
-    edges
-        Where those of each corner begin, and their heads.
-    here
-        The corner.
-    work
-        Cost of corners (infinite), corner before, corners touched; float64 heap of costs and
-        corners.
-    size, n_touched
-        Sizes of the heap and of the list of corners touched; returned.
+    `graph`: a tuple of arrays, the first of them with an element for each corner; `edges`: where
+    those of each corner begin, and their heads; `work`: cost of corners (infinite), corner before,
+    corners touched; float64 heap of costs and corners; `size`, `n_touched`: sizes of the heap and
+    of the list of corners touched; returned.
     """
     raise NotImplementedError
 
@@ -236,20 +203,10 @@ def uses_of_corners(graph, edges, sources):
 def labels_of_corners(graph, edges, ranked, most):
     """Label corners with hubs: search from each, and stop where labels so far say as much.
 
-    Parameters
-    ----------
-    graph, edges
-        See `reach_next`.
-    ranked
-        int32, the corners at which paths bend, those on most paths first.
-    most
-        Most entries.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32 the next corner on the
-        path to the hub, without the corner itself as its own hub; whether there was room for all.
+    `graph`, `edges`: see `reach_next`; `ranked`: int32, the corners at which paths bend, those on
+    most paths first. Returns int64 (n + 1,) offsets; int32 ranks of hubs, float64 distances, int32
+    the next corner on the path to the hub, without the corner itself as its own hub; whether there
+    was room for all.
     """
     n = len(graph[0])
     work = _room_for(n, len(edges[1]))

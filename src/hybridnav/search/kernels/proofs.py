@@ -39,23 +39,12 @@ def tree_of(costs, start, goal, limit, moves):
     """Return the tree of cheapest paths from a node of a grid, over the nodes over which a path to
     the goal may be cheaper than a limit, as far as the way on an empty grid tells.
 
-    Parameters
-    ----------
-    costs
-        int64 (4, rows, cols), the costs of moves in the first four directions, 0 where there is
-        none. Moves stay in the grid.
-    start, goal
-        (row, col).
-    limit
-        Cost of a path that is not of interest.
-    moves
-        The least cost of a straight move and of a diagonal one, in halves of `ONE`.
-
-    Returns
-    -------
-    tuple
-        uint8 (rows, cols), the direction from each node to the one before it, `ROOT` at the start
-        and `OUTSIDE` elsewhere; and int64 (rows, cols), the least cost of each node of the tree.
+    `costs`: int64 (4, rows, cols), the costs of moves in the first four directions, 0 where there
+    is none. Moves stay in the grid. `start`, `goal`: (row, col); `limit`: cost of a path that is
+    not of interest; `moves`: the least cost of a straight move and of a diagonal one, in halves of
+    `ONE`. Returns uint8 (rows, cols), the direction from each node to the one before it, `ROOT` at
+    the start and `OUTSIDE` elsewhere; and int64 (rows, cols), the least cost of each node of the
+    tree.
     """
     # The least known cost of each node, its way back, and the open list by cost and way ahead.
     rows, cols = costs.shape[1:]
@@ -112,19 +101,10 @@ def tree_of(costs, start, goal, limit, moves):
 def walls_round(area, row, col):
     """Return the cells along the border of an area, (row, col) of a closed chain of 8-neighbours.
 
-    Parameters
-    ----------
-    area
-        bool (rows, cols), a 4-connected set none of which lies on the rim; the cells round it that
-        hang together by sides and corners are the other side.
-    row, col
-        A cell of the area whose neighbour at row - 1 lies on the other side.
-
-    Returns
-    -------
-    NDArray
-        int64 (n, 2); from each cell to the next one, and from the last to the first, is a move to
-        an 8-neighbour or none.
+    `area`: bool (rows, cols), a 4-connected set none of which lies on the rim; the cells round it
+    that hang together by sides and corners are the other side; `row`, `col`: a cell of the area
+    whose neighbour at row - 1 lies on the other side. Returns int64 (n, 2); from each cell to the
+    next one, and from the last to the first, is a move to an 8-neighbour or none.
     """
     chain = np.empty((1024, 2), np.int64)
     n = 0
@@ -216,23 +196,10 @@ def strings_of(walls, grain, ends, points, limit):
     The search is A*. What a corner sees is swept row by row of cells: shafts of light, each with
     two directions, fall through runs of free cells.
 
-    Parameters
-    ----------
-    walls
-        bool (rows, cols), with a rim of walls.
-    grain
-        Parts of a cell in which coordinates are counted.
-    ends
-        float64 (2, 2), (row, col) of the points, where cell (0, 0) is the first of the rim.
-    points
-        int64 (2, 2), the same in parts of a cell.
-    limit
-        Length in cells.
-
-    Returns
-    -------
-    NDArray
-        float64 (n, 3), (row, col) of each corner, and the length of the string to it.
+    `walls`: bool (rows, cols), with a rim of walls; `grain`: parts of a cell in which coordinates
+    are counted; `ends`: float64 (2, 2), (row, col) of the points, where cell (0, 0) is the first of
+    the rim; `points`: int64 (2, 2), the same in parts of a cell; `limit`: length in cells. Returns
+    float64 (n, 3), (row, col) of each corner, and the length of the string to it.
     """
     rows, cols = walls.shape
     # By corner: the string's length and the corner before it; those found, in a heap.

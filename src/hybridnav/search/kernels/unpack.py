@@ -54,21 +54,11 @@ def _unpack(arcs, entry, nodes, count):
 def corners_between(arcs, meeting, records):
     """Return the corners that a path passes, from the start to the goal.
 
-    Parameters
-    ----------
-    arcs
-        Offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
-        graph that is not contracted. The patches of `repair`, empty without any.
-    meeting
-        The corner where the searches from both endpoints meet.
-    records
-        int64 (n, 4): columns 2 and 3 hold the tail (in the high half) and arc by which each corner
-        was reached from the start and from the goal, or `NO_ARC`.
-
-    Returns
-    -------
-    numpy.ndarray
-        int64 (k,).
+    `arcs`: offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
+    graph that is not contracted. The patches of `repair`, empty without any. `meeting`: the corner
+    where the searches from both endpoints meet; `records`: int64 (n, 4): columns 2 and 3 hold the
+    tail (in the high half) and arc by which each corner was reached from the start and from the
+    goal, or `NO_ARC`. Returns int64 (k,).
     """
     chain = np.empty(64, np.int64)
     n_chain = 0

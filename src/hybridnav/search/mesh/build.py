@@ -143,18 +143,9 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
 def triangulate(corners: IntArray, walls: IntArray) -> tuple[AnyArray, AnyArray]:
     """Triangulate corners so that walls are sides of triangles.
 
-    Parameters
-    ----------
-    corners
-        int32 (n, 2), (row, col).
-    walls
-        int (m, 2), pairs of corners; none passes a third.
-
-    Returns
-    -------
-    tuple
-        (t, 3) corners counter-clockwise; (t, 3) the triangle across the side from corner k to
-        k + 1, at least t for none.
+    `corners`: int32 (n, 2), (row, col); `walls`: int (m, 2), pairs of corners; none passes a third.
+    Result: (t, 3) corners counter-clockwise; (t, 3) the triangle across the side from corner k to k
+    + 1, at least t for none.
     """
     if len(corners) == 0:
         return np.empty((0, 3), np.uint32), np.empty((0, 3), np.uint32)
@@ -178,18 +169,10 @@ def select_triangles(
 ) -> tuple[IntArray, IntArray]:
     """Select some triangles, in the order of their first corners.
 
-    Parameters
-    ----------
-    vertices, neighbours
-        (m, 3) corners of all triangles, and the triangle across the side from corner k to k + 1, at
-        least m for none.
-    is_kept
-        bool (m,); a wall separates kept triangles from the others.
-
-    Returns
-    -------
-    tuple
-        int32 (f, 3) corners, int32 (f, 3) the triangle across each side, `WALL` for none.
+    `vertices`, `neighbours`: (m, 3) corners of all triangles, and the triangle across the side from
+    corner k to k + 1, at least m for none; `is_kept`: bool (m,); a wall separates kept triangles
+    from the others. Returns int32 (f, 3) corners, int32 (f, 3) the triangle across each side,
+    `WALL` for none.
     """
     kept = np.flatnonzero(is_kept)
     kept = kept[np.argsort(vertices[kept, 0], kind="stable")]
@@ -206,28 +189,15 @@ def merge_triangles(
 
     Two parts merge as long as their union is convex (S. Hertel, K. Mehlhorn, 1983).
 
-    Parameters
-    ----------
-    corners
-        int32 (n, 2).
-    triangles
-        int32 (n, 3), corners counter-clockwise.
-    neighbours
-        int32 (n, 3), the triangle across the side from corner k to k + 1, -1 for a wall.
-
-    Returns
-    -------
-    tuple
-        int32 (p + 1,) first slot of each polygon; int32 (s,) corner at which each slot's side
-        begins; int32 (s,) twin slot, -1 for a wall; int32 (s,) polygon of each slot.
+    `corners`: int32 (n, 2); `triangles`: int32 (n, 3), corners counter-clockwise; `neighbours`:
+    int32 (n, 3), the triangle across the side from corner k to k + 1, -1 for a wall. Returns int32
+    (p + 1,) first slot of each polygon; int32 (s,) corner at which each slot's side begins; int32
+    (s,) twin slot, -1 for a wall; int32 (s,) polygon of each slot.
     """
     *sides, squared = sides_of_triangles(corners, triangles, neighbours)
     common = np.flatnonzero(squared)
     order = common[np.argsort(-squared[common], kind="stable")]
-    polygons: tuple[IntArray, IntArray, IntArray, IntArray] = merge_across(
-        corners, triangles.ravel(), tuple(sides), order
-    )
-    return polygons
+    return merge_across(corners, triangles.ravel(), tuple(sides), order)
 
 
 # --- the graph of its corners ---------------------------------------------------------------------

@@ -331,8 +331,7 @@ class DetourSearch:
     def are_met_by(self, paths: MeshPaths) -> BoolArray:
         """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
         along = paths.positions, paths.path_start
-        met: BoolArray = kernels.paths_cross(self._closure, self._free, *along)
-        return met
+        return kernels.paths_cross(self._closure, self._free, *along)
 
     def path(
         self,

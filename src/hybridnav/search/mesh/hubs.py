@@ -120,23 +120,10 @@ def label_corners(
 ) -> HubLabels | None:
     """Label the corners of a mesh with hubs, within some memory.
 
-    Parameters
-    ----------
-    mesh
-        The mesh.
-    arrays
-        Arrays for the kernel `successors`.
-    edges
-        Edges of `find_edges`.
-    most_mb
-        Most memory of the labels, in 10^6 bytes.
-    progress
-        Called after each step with the number of steps done and of all steps.
-
-    Returns
-    -------
-    HubLabels or None
-        None if they need more memory: the work ends as soon as that is known.
+    `arrays`: arrays for the kernel `successors`; `edges`: edges of `find_edges`; `most_mb`: most
+    memory of the labels, in 10^6 bytes; `progress`: called after each step with the number of steps
+    done and of all steps. Returns None if they need more memory: the work ends as soon as that is
+    known.
     """
     most = int(most_mb * 1e6)
     if len(mesh.corners) > _MOST_CORNERS:
@@ -168,12 +155,9 @@ def _parted(
 ) -> tuple[LongArray, IntArray, IntArray, IntArray, FloatArray, tuple[float, float]]:
     """Part labels of `labels_of_corners` by the next corner.
 
-    Returns
-    -------
-    tuple
-        The arrays `entries`, `first`, `offset` and `heads` of `HubLabels`; float32 (p, 2), the
-        direction to the next corner, along the wall and away from it; bits of a distance, and the
-        unit in cells.
+    Returns the arrays `entries`, `first`, `offset` and `heads` of `HubLabels`; float32 (p, 2), the
+    direction to the next corner, along the wall and away from it; bits of a distance, and the unit
+    in cells.
     """
     offset, hubs, lengths, onward = labels
     n = len(mesh.corners)

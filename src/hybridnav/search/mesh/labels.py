@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 class MeshLabels:
     """Labels of points in a hierarchy of corners: shortest paths at any angle.
 
-    Parameters
-    ----------
-    search
-        A search that is prepared.
-    graph
-        Its graph.
+    `search`: a search that is prepared.
     """
 
     most = BLOCK
@@ -56,8 +51,7 @@ class MeshLabels:
     def labels(self, ends: Placed) -> Labels:
         """Return the labels of ends."""
         work = climbing_room(self.n_corners)
-        found: Labels = labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
-        return found
+        return labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
 
     goal_labels = labels
 
@@ -77,12 +71,7 @@ class ViewLabels(MeshLabels):
     """The same on a graph of corners that is not contracted, as those of raw scans are: a start
     holds all corners, a goal those that it sees.
 
-    Parameters
-    ----------
-    search
-        A search that is prepared.
-    edges
-        The edges between corners.
+    `search`: a search that is prepared; `edges`: the edges between corners.
     """
 
     most = 16
@@ -111,19 +100,13 @@ class ViewLabels(MeshLabels):
 
     def goal_labels(self, ends: Placed) -> Labels:
         """Return the corners that each goal sees."""
-        found: Labels = views_of_points(self._mesh, ends, _view_room())
-        return found
+        return views_of_points(self._mesh, ends, _view_room())
 
 
 class HubTables(MeshLabels):
     """The same by hub labels, where there is no hierarchy.
 
-    Parameters
-    ----------
-    search
-        A search with labels.
-    labels
-        Its labels.
+    `search`: a search with labels.
     """
 
     def __init__(self, search: MeshSearch, labels: HubLabels) -> None:
@@ -140,10 +123,9 @@ class HubTables(MeshLabels):
         """Return the labels of ends."""
         seen = np.empty(ROOM, np.int8), np.empty(ROOM, np.int32), np.empty(ROOM, np.int64)
         room = *seen, np.full(self.n_corners, hubs.FAR)
-        found: Labels = hub_labels_of_points(
+        return hub_labels_of_points(
             self._mesh, self._labels, self._place[1], (ends[3], ends[0]), room
         )
-        return found
 
     goal_labels = labels
 

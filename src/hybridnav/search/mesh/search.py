@@ -275,8 +275,7 @@ class MeshSearch:
     def footing(self) -> tuple[Any, ...]:
         """What repairs need of the hierarchy; see `kernels.repairs`."""
         assert isinstance(self._graph, CornerHierarchy)  # noqa: S101 - the caller has looked
-        footing: tuple[Any, ...] = footing_of(self.arrays, self._graph.arrays[:4])
-        return footing
+        return footing_of(self.arrays, self._graph.arrays[:4])
 
     def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
         """Build hub labels of the corners, which answer later queries in microseconds.
@@ -421,5 +420,4 @@ def round_into(cell: Cell, position: Position) -> Position:
 def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
     """Round positions, and move each into the closed square of its cell; float64 (n, 2)."""
     rounded = np.round(positions * GRAIN) / GRAIN
-    clipped: FloatArray = np.clip(rounded, cells, cells + 1.0)
-    return clipped
+    return np.clip(rounded, cells, cells + 1.0)

@@ -120,8 +120,7 @@ def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
     """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
     first."""
     endpoints = np.stack([mesh.begins, mesh.finishes], axis=1)[slots]
-    pairs: FloatArray = mesh.corners[endpoints].astype(np.float64)
-    return pairs
+    return mesh.corners[endpoints].astype(np.float64)
 
 
 def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArray) -> FloatArray:
@@ -140,8 +139,7 @@ def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArra
 
 
 def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    found: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    return found
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
 # Shortest any-angle paths between many pairs, on all cores.

@@ -36,8 +36,7 @@ class JumpHubs:
     @cached_property
     def ranges(self) -> LongArray:
         """See `ranges_of_legs`."""
-        found: LongArray = kernels.ranges_of_legs(legs_that_follow())
-        return found
+        return kernels.ranges_of_legs(legs_that_follow())
 
     @property
     def arrays(self) -> tuple[AnyArray, ...]:
@@ -75,24 +74,11 @@ def label_corner_cells(
 ) -> JumpHubs | None:
     """Label the corner cells of a graph with hubs, within some memory.
 
-    Parameters
-    ----------
-    tables
-        See the kernel `join`; their order numbers the corner cells of the graph.
-    places
-        The places of the corner cells of the graph.
-    plain
-        Places, offsets of arcs, and arcs of the graph before it was contracted; int32 (n,), its
-        corner cells, those on most paths first.
-    is_free
-        bool (rows, cols), the free cells of the framed rectangle.
-    most_mb
-        Most memory of the labels, in 10^6 bytes.
-
-    Returns
-    -------
-    JumpHubs or None
-        None if they need more memory.
+    `tables`: see the kernel `join`; their order numbers the corner cells of the graph; `places`:
+    the places of the corner cells of the graph; `plain`: places, offsets of arcs, and arcs of the
+    graph before it was contracted; int32 (n,), its corner cells, those on most paths first;
+    `is_free`: bool (rows, cols), the free cells of the framed rectangle; `most_mb`: most memory of
+    the labels, in 10^6 bytes. Returns None if they need more memory.
     """
     order, (at_places, first, arcs, ranked) = tables[2], plain
     most, n = int(most_mb * 1e6), len(places)

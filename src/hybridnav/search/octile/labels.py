@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 class JumpLabels:
     """Labels of cells in a contracted jump-point graph: shortest octile paths.
 
-    Parameters
-    ----------
-    search
-        A search on a contracted graph.
+    `search`: a search on a contracted graph.
     """
 
     most = BLOCK
@@ -36,14 +33,12 @@ class JumpLabels:
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells in the framed rectangle."""
-        flat: LongArray = (ends[0] - np.array(self._origin)) @ np.array([self._tables[3], 1])
-        return flat
+        return (ends[0] - np.array(self._origin)) @ np.array([self._tables[3], 1])
 
     def labels(self, ends: LongArray) -> Labels:
         """Return the labels of ends."""
         work = climbing_room(self.n_corners)
-        found: Labels = labels_of_cells(self._tables, self._places, self._hierarchy, ends, work)
-        return found
+        return labels_of_cells(self._tables, self._places, self._hierarchy, ends, work)
 
     goal_labels = labels
 

@@ -69,12 +69,8 @@ class Ground:
         On a scan of single rays, the unexplored cells between them count as free, and what is
         unexplored beyond as wall.
 
-        Parameters
-        ----------
-        grid
-            The map; the robot's radius changes nothing.
-        outside
-            bool (rows, cols), free cells outside of the building, which count as none.
+        `grid`: the map; the robot's radius changes nothing; `outside`: bool (rows, cols), free
+        cells outside of the building, which count as none.
         """
         measured = grid.measured == CellClass.FREE
         occupied = grid.measured == CellClass.OCCUPIED
@@ -101,16 +97,8 @@ class Ground:
 def fine_segments(ground: Ground) -> IntArray:
     """Cut free space so finely that hardly any segment lies in two rooms.
 
-    Parameters
-    ----------
-    ground
-        What counts as free and as wall.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere and for specks below 0.1 m2
-        that touch no other free cell.
+    `ground`: what counts as free and as wall. Returns int32 (rows, cols), a segment for each free
+    cell, -1 elsewhere and for specks below 0.1 m2 that touch no other free cell.
     """
     free = ground.free
     cut = np.zeros_like(free)
@@ -143,18 +131,9 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
     A direction is the angle at which the projection of the wall cells is sharpest; a window has up
     to two, 8 degrees apart or more, the map up to four.
 
-    Parameters
-    ----------
-    wall
-        bool (rows, cols).
-    resolution_m
-        Side of a cell in metres.
-
-    Returns
-    -------
-    list of tuple
-        An angle from -pi/4 to pi/4 that turns the rows of the grid into it, and bool (rows, cols),
-        the windows in which walls have it; the most frequent first.
+    `wall`: bool (rows, cols); `resolution_m`: side of a cell in metres. Returns an angle from -pi/4
+    to pi/4 that turns the rows of the grid into it, and bool (rows, cols), the windows in which
+    walls have it; the most frequent first.
     """
     side = max(8, round(_WINDOW_M / resolution_m))
     votes: list[tuple[float, float, int, int]] = []
@@ -206,8 +185,7 @@ def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tupl
 
 def _wrapped(angle_rad: FloatArray) -> FloatArray:
     """Return angles of crosses, from -pi/4 to pi/4."""
-    wrapped: FloatArray = (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
-    return wrapped
+    return (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
 
 
 def _apart(angle_rad: FloatArray, other_rad: float) -> FloatArray:
@@ -250,5 +228,4 @@ def closed_by_disc(free: BoolArray, occupied: BoolArray, reach: float) -> BoolAr
 
 
 def _rim(free: BoolArray) -> BoolArray:
-    rim: BoolArray = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
-    return rim
+    return ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free

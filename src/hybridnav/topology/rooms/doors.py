@@ -84,14 +84,8 @@ class RoomBoundaries:
     def of(cls, rooms: RoomLabels, grid: OccupancyGrid, clearance_m: FloatArray) -> RoomBoundaries:
         """Find the boundaries of rooms.
 
-        Parameters
-        ----------
-        rooms
-            The rooms.
-        grid
-            The map; the robot's radius changes nothing.
-        clearance_m
-            As `measured_clearance_m` returns it.
+        `grid`: the map; the robot's radius changes nothing; `clearance_m`: as
+        `measured_clearance_m` returns it.
         """
         rows, cols = grid.shape
         kinds = kinds_of(grid.measured, rooms.label_of).astype(np.int32).ravel() - np.int32(1)
@@ -137,17 +131,10 @@ class RoomBoundaries:
     def numbers(self, known: Mapping[int, Point]) -> LongArray:
         """Number the boundaries.
 
-        Parameters
-        ----------
-        known
-            A point in metres of each boundary that has a number.
-
-        Returns
-        -------
-        LongArray
-            int64 (n_boundaries,). A boundary keeps a known number whose point lies within a metre
-            of it, the nearest first. The others follow above the known ones: doors, then gaps, in
-            the order of their first edges.
+        `known`: a point in metres of each boundary that has a number. Returns int64
+        (n_boundaries,). A boundary keeps a known number whose point lies within a metre of it, the
+        nearest first. The others follow above the known ones: doors, then gaps, in the order of
+        their first edges.
         """
         numbers = np.zeros(self.n_boundaries, dtype=np.int64)
         for number, boundary in self._nearest(known):
@@ -203,8 +190,7 @@ def _widths(
     endpoints = np.full(len(extents), np.inf)
     np.minimum.at(endpoints, boundary_of[middle], clearance[middle])
     inner = _extents(edges[middle], cols, boundary_of[middle])
-    widths: FloatArray = np.minimum(extents, inner + 2 * np.maximum(endpoints - 0.5, 0.0))
-    return widths
+    return np.minimum(extents, inner + 2 * np.maximum(endpoints - 0.5, 0.0))
 
 
 def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
@@ -229,25 +215,15 @@ def farthest_ends(edges: LongArray, cols: int) -> FloatArray:
     """Return the two corners of sides that lie farthest apart, of those that are outermost in any
     of 36 directions.
 
-    Parameters
-    ----------
-    edges
-        int64 (n,), base edges that cross the sides, one or more.
-    cols
-        Columns of the map.
-
-    Returns
-    -------
-    FloatArray
-        float64 (2, 2), (row, col) in grid units.
+    `edges`: int64 (n,), base edges that cross the sides, one or more; `cols`: columns of the map.
+    Returns float64 (2, 2), (row, col) in grid units.
     """
     corners = _corners(edges, cols).astype(np.float64)
     sines, cosines = sines_and_cosines(np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS))
     along = corners[:, :1] * cosines + corners[:, 1:] * sines
     pairs = corners[np.stack([along.argmin(axis=0), along.argmax(axis=0)], axis=1)]
     lengths = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T)
-    found: FloatArray = pairs[int(lengths.argmax())]
-    return found
+    return pairs[int(lengths.argmax())]
 
 
 def _corners(edges: LongArray, cols: int) -> LongArray:
@@ -273,8 +249,7 @@ def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> Lon
     )
     one, other = boundary_of[thin[near]].T
     joined = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    row_of: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
-    return row_of
+    return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
 def _jambs(
@@ -290,24 +265,14 @@ def _jambs(
     found = unique_rows(np.column_stack([of, corners]))
     ends = found.first[found.n_times == 1]
     has_jamb = ~blocks[tuple(corners[ends].T)] | is_near[ends // 2]
-    jambs: LongArray = np.bincount(
-        of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1
-    )
-    return jambs
+    return np.bincount(of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1)
 
 
 def measured_clearance_m(grid: OccupancyGrid) -> FloatArray:
     """Return the distance from the centre of each cell to the next occupied cell's nearest side.
 
-    Parameters
-    ----------
-    grid
-        The map; cells count as measured.
-
-    Returns
-    -------
-    FloatArray
-        float64 (rows, cols), in metres; infinite where no cell is occupied.
+    `grid`: the map; cells count as measured. Returns float64 (rows, cols), in metres; infinite
+    where no cell is occupied.
     """
     cells = clearance_cells(grid.measured == CellClass.OCCUPIED)
     return np.maximum(cells - 0.5, 0.0) * grid.resolution_m
@@ -316,19 +281,9 @@ def measured_clearance_m(grid: OccupancyGrid) -> FloatArray:
 def numbered(rooms: RoomLabels, grid: OccupancyGrid) -> dict[int, Point]:
     """Return the doors of rooms with their numbers, as a file of rooms lists them.
 
-    Parameters
-    ----------
-    rooms
-        The rooms.
-    grid
-        The map.
-
-    Returns
-    -------
-    dict
-        Number and middle of each door. Numbers that are known and that no boundary has any more
-        stay in it, so that no other door takes one. Gaps without a known number are left out: they
-        are many, and lists and pictures leave them out too.
+    Result: number and middle of each door. Numbers that are known and that no boundary has any more
+    stay in it, so that no other door takes one. Gaps without a known number are left out: they are
+    many, and lists and pictures leave them out too.
     """
     found = RoomBoundaries.of(rooms, grid, measured_clearance_m(grid))
     is_door = found.passages_m >= LEAST_DOOR_M

@@ -96,15 +96,8 @@ def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels
 def contract(segments: JudgedSegments, rules: Sequence[Rule]) -> DualGraphPyramid:
     """Contract segments until every boundary between them resists.
 
-    Parameters
-    ----------
-    segments, rules
-        As of `Growth`; the segments merge as the fields do.
-
-    Returns
-    -------
-    DualGraphPyramid
-        Its places are the segments as they were, the fields of its apex those that are left.
+    `segments`, `rules`: as of `Growth`; the segments merge as the fields do. Result: its places are
+    the segments as they were, the fields of its apex those that are left.
     """
     free = segments.label_of >= 0
     grid = OccupancyGrid(
@@ -128,18 +121,10 @@ def check_least_area(least_area_m2: float) -> None:
 def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
     """Divide rooms among the seeds that lie in them: each cell goes to the nearest by walking.
 
-    Parameters
-    ----------
-    room_of
-        int32 (rows, cols), -1 for cells of no room.
-    seeds
-        A label >= 0 and the cell (row, col) that it spreads from, inside a room.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), the labels; -1 where none spreads to: outside the rooms with seeds.
-        Distances are counted in steps along sides, ties go to the lower cell's label.
+    `room_of`: int32 (rows, cols), -1 for cells of no room; `seeds`: a label >= 0 and the cell (row,
+    col) that it spreads from, inside a room. Returns int32 (rows, cols), the labels; -1 where none
+    spreads to: outside the rooms with seeds. Distances are counted in steps along sides, ties go to
+    the lower cell's label.
     """
     divided = np.full(room_of.shape, NO_ROOM, dtype=np.int32)
     for label, cell in seeds.items():
@@ -151,19 +136,8 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
 def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> IntArray:
     """Cut free space finely, and merge the segments by a judge of their boundaries.
 
-    Parameters
-    ----------
-    grid
-        The map; cells count as they were measured.
-    forest
-        The judge.
-    least_area_m2
-        As of `find_rooms`.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), rooms in reading order, -1 elsewhere.
+    `grid`: the map; cells count as they were measured; `least_area_m2`: see `find_rooms`. Returns
+    int32 (rows, cols), rooms in reading order, -1 elsewhere.
     """
     outside = outside_of(grid)
     ground = Ground.of(grid, outside)
@@ -212,8 +186,7 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
     inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
     around &= inside >= _LEAST_INSIDE * areas
-    found: BoolArray = around[part_of]
-    return found
+    return around[part_of]
 
 
 def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
@@ -229,8 +202,7 @@ def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
     order = found[large][np.argsort(first[large], kind="stable")]
     new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
     new[order] = np.arange(len(order))
-    renumbered: IntArray = new[label_of]
-    return renumbered
+    return new[label_of]
 
 
 LEFT_OUT = -2
@@ -244,12 +216,7 @@ a log in cells of 0.1 m, 0.9 % of the cells change their number in an update, 5.
 class _Apart:
     """A rule by which segments merge as by another one, but no two rooms that stay.
 
-    Parameters
-    ----------
-    rule
-        The other rule.
-    stays
-        int64 (n,), segments that are rooms that stay.
+    `stays`: int64 (n,), segments that are rooms that stay.
     """
 
     def __init__(self, rule: Rule, stays: LongArray) -> None:
@@ -269,12 +236,8 @@ class _Lasting:
     """The judge of boundaries, who holds on to the rooms before: rooms near the threshold would
     change with every scan.
 
-    Parameters
-    ----------
-    segments
-        The segments, before any of them merge.
-    before
-        int32 (rows, cols), the room of each cell before, -1 for none.
+    `segments`: the segments, before any of them merge; `before`: int32 (rows, cols), the room of
+    each cell before, -1 for none.
     """
 
     def __init__(self, segments: JudgedSegments, before: IntArray) -> None:
@@ -295,8 +258,7 @@ class _Lasting:
         one, other = had[self._segments.state.endpoints[pairs].T]
         both = (one >= 0) & (other >= 0)
         odds = np.where(both, np.where(one == other, _ODDS, 1 / _ODDS), 1.0)
-        lasting: FloatArray = probability * odds / (probability * odds + 1 - probability)
-        return lasting
+        return probability * odds / (probability * odds + 1 - probability)
 
 
 def renewed_rooms(
@@ -308,29 +270,16 @@ def renewed_rooms(
 ) -> IntArray:
     """Find the rooms of some free cells, with the rooms beside them as they are.
 
-    The method is that of `find_rooms`. Each room that stays is one segment from the
-    start. Others may merge with it, so that it grows; two of them never merge.
+    The method is that of `find_rooms`. Each room that stays is one segment from the start. Others
+    may merge with it, so that it grows; two of them never merge.
 
-    Parameters
-    ----------
-    grid
-        The map, or a window of it; cells count as they were measured.
-    outside
-        bool (rows, cols), free cells outside of the building.
-    room_of
-        int32 (rows, cols): the room of free cells that stays, at least 0; -1 for free cells whose
-        room is to be found; `LEFT_OUT` elsewhere.
-    before
-        int32 (rows, cols), the room of each cell before, -1 for none. What was one room tends to
-        stay one, what was two rooms to stay two.
-    least_area_m2
-        As in `find_rooms`.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols). Where rooms were to be found: a room that stays, a new label above all
-        of them, or -1 for segments that are too small. -1 elsewhere.
+    `grid`: the map, or a window of it; cells count as they were measured; `outside`: bool (rows,
+    cols), free cells outside of the building; `room_of`: int32 (rows, cols): the room of free cells
+    that stays, at least 0; -1 for free cells whose room is to be found; `LEFT_OUT` elsewhere;
+    `before`: int32 (rows, cols), the room of each cell before, -1 for none. What was one room tends
+    to stay one, what was two rooms to stay two. `least_area_m2`: see `find_rooms`. Returns int32
+    (rows, cols). Where rooms were to be found: a room that stays, a new label above all of them, or
+    -1 for segments that are too small. -1 elsewhere.
     """
     to_find = room_of == NO_ROOM
     ground = Ground.of(grid, outside)

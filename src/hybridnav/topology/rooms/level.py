@@ -131,14 +131,12 @@ class Rooms:
     @cached_property
     def label_of_vertex(self) -> IntArray:
         """int32 (n_vertices,), index of the name of each vertex of the room level, -1 for none."""
-        labels: IntArray = self.labels.label_of[tuple(self.level.cells.T)]
-        return labels
+        return self.labels.label_of[tuple(self.level.cells.T)]
 
     @cached_property
     def is_free(self) -> BoolArray:
         """bool (n_vertices,), vertices of free cells."""
-        free: BoolArray = self.level.classes == CellClass.FREE
-        return free
+        return self.level.classes == CellClass.FREE
 
     def name_of(self, label: int) -> str | None:
         """Return the name of a label, None for -1."""
@@ -175,8 +173,7 @@ class Rooms:
     def fits(self) -> BoolArray:
         """bool (n_rooms,), rooms in which the map's robot radius leaves a free cell."""
         named = self.label_of_vertex[self.is_free & (self.label_of_vertex >= 0)]
-        found: BoolArray = np.bincount(named, minlength=len(self.names)) > 0
-        return found
+        return np.bincount(named, minlength=len(self.names)) > 0
 
     @cached_property
     def clearance_m(self) -> FloatArray:
@@ -416,8 +413,7 @@ class Rooms:
     def _measured(self, name: str) -> LongArray:
         """Return the cells (row, col) of a room that were measured as free."""
         inside = self.labels.label_of == self.labels.index(name)
-        cells: LongArray = np.argwhere(inside & (self.grid.measured == CellClass.FREE))
-        return cells
+        return np.argwhere(inside & (self.grid.measured == CellClass.FREE))
 
 
 def _counted(things: str, usable: list[bool], why_not: str) -> str:
@@ -432,8 +428,7 @@ def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:
     metres."""
     free = labels.label_of[grid.measured == CellClass.FREE]
     cells = np.bincount(free[free >= 0], minlength=len(labels.names))
-    areas: FloatArray = cells * np.float64(grid.cell_area_m2)
-    return areas
+    return cells * np.float64(grid.cell_area_m2)
 
 
 def _in_runs(numbers: list[int]) -> str:

@@ -39,16 +39,11 @@ class Listing:
         """Find what is listed.
 
         A room is left out if it is narrower than 1 m in the mean and the robot cannot enter it:
-        such rooms are rays of a laser through glass. One with a name of its own is always listed.
-        A space without a name has to be wide enough and enterable, so that pockets between
-        outlines make no doors.
+        such rooms are rays of a laser through glass. One with a name of its own is always listed. A
+        space without a name has to be wide enough and enterable, so that pockets between outlines
+        make no doors.
 
-        Parameters
-        ----------
-        labels
-            The rooms.
-        level
-            The room level of a pyramid that was built with them.
+        `level`: the room level of a pyramid that was built with them.
         """
         from scipy import ndimage  # noqa: PLC0415 - most imports of the package need no rooms
 
@@ -82,28 +77,20 @@ def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
     inside = space_of >= 0
     depths = clearance_cells(is_rim)[inside] + 0.5
     total = np.bincount(space_of[inside], weights=depths, minlength=len(areas))
-    widths: FloatArray = 4 * total / np.maximum(areas, 1)
-    return widths
+    return 4 * total / np.maximum(areas, 1)
 
 
 def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
     """Return the spaces that free cells join with one in which a robot is, at the robot's radius.
 
-    Parameters
-    ----------
-    space_of
-        int32 (n_vertices,), the space of each vertex.
-    level
-        The room level.
-    begins
-        bool (n_spaces,), spaces in which a robot may begin: wide ones, and the largest.
+    `space_of`: int32 (n_vertices,), the space of each vertex; `begins`: bool (n_spaces,), spaces in
+    which a robot may begin: wide ones, and the largest.
     """
     is_free = level.classes == CellClass.FREE
     parts = free_components(level)[is_free]
     spaces = space_of[is_free]
     joined = np.bincount(parts, weights=begins[spaces], minlength=1) > 0
-    found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
-    return found
+    return np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
 
 
 def free_components(level: Level) -> IntArray:
@@ -115,8 +102,7 @@ def free_components(level: Level) -> IntArray:
     arcs = level.arcs[(level.classes == CellClass.FREE)[level.arcs].all(axis=1)]
     shape = (level.n_vertices, level.n_vertices)
     graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
-    found: IntArray = connected_components(graph, directed=False)[1]
-    return found
+    return connected_components(graph, directed=False)[1]
 
 
 # Kinds of rooms by their shapes: corridors and halls.
@@ -160,14 +146,8 @@ def kinds_of(
     Holes of a room are filled first, for furniture makes nothing narrow. The breadth is that of the
     widest tenth of a room, since alcoves and crossings widen a corridor at a few points.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), the room of each cell, -1 for none.
-    is_free
-        bool (rows, cols), free cells as measured.
-    resolution_m
-        Side of a cell in metres.
+    `label_of`: int32 (rows, cols), the room of each cell, -1 for none; `is_free`: bool (rows,
+    cols), free cells as measured; `resolution_m`: side of a cell in metres.
     """
     from scipy import ndimage  # noqa: PLC0415 - most imports of the package need no rooms
 

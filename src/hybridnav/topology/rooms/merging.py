@@ -92,21 +92,16 @@ class Forest:
 
     def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
         """Return the probability that two segments belong to one room, float64 (n,)."""
-        found: FloatArray = _evidence_kernels.probabilities(
+        return _evidence_kernels.probabilities(
             evidence, self.features, self.thresholds, self.leaves, self.base
         )
-        return found
 
 
 class JudgedSegments:
     """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
-    ground
-        What counts as free and as wall.
+    `label_of`: int32 (rows, cols), a segment for each free cell, -1 elsewhere; `ground`: what
+    counts as free and as wall.
     """
 
     def __init__(self, label_of: IntArray, ground: Ground) -> None:
@@ -122,8 +117,7 @@ class JudgedSegments:
     @property
     def label_of(self) -> IntArray:
         """int32 (rows, cols), the segments as they are now; numbers have gaps."""
-        labels: IntArray = np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
-        return labels
+        return np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
 
     def evidence(self, pairs: LongArray) -> FloatArray:
         """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
@@ -244,25 +238,16 @@ class Rule(Protocol):
     def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
         """Return the rating of each pair, float64 (n_pairs,), above 0 where it may merge.
 
-        Parameters
-        ----------
-        segments
-            The segments as they are now.
-        grown
-            int64 (n,), segments that have grown since the last call.
+        `segments`: the segments as they are now; `grown`: int64 (n,), segments that have grown
+        since the last call.
         """
 
 
 class Likely:
     """The rule that two segments merge where a judge finds it likely that both are one room.
 
-    Parameters
-    ----------
-    judge
-        Returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
-        (n, len(EVIDENCE)).
-    least
-        Probability from which on a pair may merge, in (0, 1].
+    `judge`: returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
+    (n, len(EVIDENCE)); `least`: probability from which on a pair may merge, in (0, 1].
     """
 
     def __init__(self, judge: Judge, least: float) -> None:
@@ -281,17 +266,13 @@ class Likely:
         pairs = pairs[state.open_sides[pairs] > 0]
         if len(pairs):
             self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
-        ratings: FloatArray = np.where(self._likely >= self._least, self._likely, 0.0)
-        return ratings
+        return np.where(self._likely >= self._least, self._likely, 0.0)
 
 
 class Small:
     """The rule that a small segment merges with the neighbour of the longest open border.
 
-    Parameters
-    ----------
-    least_cells
-        Free cells from which on a segment is not small. Those without a neighbour stay.
+    `least_cells`: free cells from which on a segment is not small. Those without a neighbour stay.
     """
 
     def __init__(self, least_cells: float) -> None:
@@ -315,12 +296,8 @@ class Small:
 class Growth:
     """The resistance of boundaries between segments by rules, one after the other; see `Resists`.
 
-    Parameters
-    ----------
-    segments
-        The segments; they merge as the fields do.
-    rules
-        When no arc may be contracted by one of them, the next one decides.
+    `segments`: the segments; they merge as the fields do; `rules`: when no arc may be contracted by
+    one of them, the next one decides.
     """
 
     def __init__(self, segments: JudgedSegments, rules: Sequence[Rule]) -> None:
@@ -344,12 +321,8 @@ class GrowingSegments:
     order of one contraction at a time, and boundaries of a merged segment are rated anew before the
     next level.
 
-    Parameters
-    ----------
-    segments, rules
-        As of `Growth`.
-    segment_of
-        int64 (n_vertices,), the segment of each vertex of the level to start from, -1 for none.
+    `segments`, `rules`: see `Growth`; `segment_of`: int64 (n_vertices,), the segment of each vertex
+    of the level to start from, -1 for none.
     """
 
     def __init__(

@@ -320,8 +320,7 @@ def _rotations(old: FloatArray, new: FloatArray, side_m: float) -> list[float]:
 
 def _blurred(array: AnyArray, axis: int, mode: Literal["constant", "wrap"]) -> AnyArray:
     """Return an array blurred over a pixel or so, by binomial weights along one axis."""
-    found: AnyArray = ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
-    return found
+    return ndimage.correlate1d(array, _BINOMIAL, axis=axis, mode=mode)
 
 
 def _spectrum(points: FloatArray, side_m: float) -> FloatArray:
@@ -333,8 +332,7 @@ def _spectrum(points: FloatArray, side_m: float) -> FloatArray:
         steps = np.diff(np.bincount((along / side_m).astype(np.int64)).astype(np.float64))
         sharp[at] = (steps * steps).sum()
     spread = float(sharp.std())
-    standard: FloatArray = (sharp - sharp.mean()) / (spread or 1.0)
-    return standard
+    return (sharp - sharp.mean()) / (spread or 1.0)
 
 
 def _candidates(one: Surface, other: Surface) -> list[Candidate]:
@@ -394,14 +392,9 @@ def refine(
 ) -> Candidate:
     """Return a candidate after steps towards the nearest walls, the nearer the heavier.
 
-    Parameters
-    ----------
-    start, points, field
-        The candidate, walls of the old map, and distances to those of the new one.
-    reaches_m
-        Distances beyond which a wall has no partner, one after the other.
-    turns
-        Whether to turn, too.
+    `start`, `points`, `field`: the candidate, walls of the old map, and distances to those of the
+    new one; `reaches_m`: distances beyond which a wall has no partner, one after the other;
+    `turns`: whether to turn, too.
     """
     angle, shift = start.angle_rad, start.shift_m
     for reach in reaches_m:

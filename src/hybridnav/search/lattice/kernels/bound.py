@@ -91,19 +91,10 @@ def costs_over_corners(free, factors, start, goal, most, known):
     A* whose open list is emptied up to a limit. Costs are exact where they and the cost left add up
     to the limit or less; elsewhere they are exact or too high.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    factors
-        float32 (rows, cols), >= 1.
-    start, goal
-        Numbers of the corners, see `corner_of`.
-    most
-        The limit, in units.
-    known
-        int64 (corners,), such costs from the goal to the same limit, which are the cost left; empty
-        for the octile distance.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols), >=
+    1; `start`, `goal`: numbers of the corners, see `corner_of`; `most`: the limit, in units;
+    `known`: int64 (corners,), such costs from the goal to the same limit, which are the cost left;
+    empty for the octile distance.
     """
     cols = free.shape[1] + 1
     cost = np.full(2 * (free.shape[0] + 1) * cols, _FAR, np.int64)
@@ -140,20 +131,10 @@ def costs_over_corners(free, factors, start, goal, most, known):
 def band_of(free, forth, back, most):
     """Return the free cells with a corner over which a path may cost less than a limit.
 
-    Parameters
-    ----------
-    free
-        uint8 (rows, cols), 1 where a cell may be entered.
-    forth, back
-        int64 (corners,), costs over corners from start and goal, exact up to the limit.
-    most
-        The limit, in the units of the costs.
-
-    Returns
-    -------
-    tuple
-        int64 (n,), the flat cells, ascending; int64 (n, 4), their corners, numbered from 0; and
-        int64 (n_corners,), the flat corner of each number.
+    `free`: uint8 (rows, cols), 1 where a cell may be entered; `forth`, `back`: int64 (corners,),
+    costs over corners from start and goal, exact up to the limit; `most`: the limit, in the units
+    of the costs. Returns int64 (n,), the flat cells, ascending; int64 (n, 4), their corners,
+    numbered from 0; and int64 (n_corners,), the flat corner of each number.
     """
     rows, cols = free.shape
     number = np.full(forth.size, -1, np.int64)
@@ -188,17 +169,9 @@ def band_of(free, forth, back, most):
 def march(corners, factors, order, costs):
     """Find the costs of corners from one end, about: the upwind scheme of fast marching.
 
-    Parameters
-    ----------
-    corners
-        int64 (n, 4), corners of the cells.
-    factors
-        float64 (n,), factors of the cells.
-    order
-        int64 (n,), the cells as a wave from the end reaches them.
-    costs
-        float64 (n_corners,), those of the corners of the cell of the end, infinite elsewhere;
-        written.
+    `corners`: int64 (n, 4), corners of the cells; `factors`: float64 (n,), factors of the cells;
+    `order`: int64 (n,), the cells as a wave from the end reaches them; `costs`: float64
+    (n_corners,), those of the corners of the cell of the end, infinite elsewhere; written.
     """
     for _ in range(_SWEEPS):
         for cell in order:

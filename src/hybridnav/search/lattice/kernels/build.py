@@ -101,14 +101,8 @@ def lay_nodes(free, factors, side, blocks, nodes_of, parts, cells, n):
 def _meet(parts, side, a, b, a_part, b_part):
     """Return whether two parts of blocks with a common side, or of one block, touch each other.
 
-    Parameters
-    ----------
-    parts, side
-        See `lay_nodes`.
-    a, b
-        Top left cells (row, col) of the blocks; b lies right of a, or below it, or is a.
-    a_part, b_part
-        The parts.
+    `parts`, `side`: see `lay_nodes`; `a`, `b`: top left cells (row, col) of the blocks; b lies
+    right of a, or below it, or is a.
     """
     if a == b:
         return a_part == b_part
@@ -298,12 +292,7 @@ def costs_from(edges_of, to, costs, source):
     """Find the least cost from a node to each other one, by Dijkstra's algorithm; float32 (nodes,),
     infinite where there is no path.
 
-    Parameters
-    ----------
-    edges_of, to, costs
-        See `build.lay_edges`.
-    source
-        The node.
+    `edges_of`, `to`, `costs`: see `build.lay_edges`.
     """
     reached = np.full(edges_of.shape[0], np.inf)
     reached[source] = 0.0
@@ -359,21 +348,12 @@ def choose_landmarks(edges_of, to, cells, cols, order, n):
     """Choose nodes far from each other, int64 (k,), k <= n: as the crow flies, so that each is
     chosen without a search.
 
-    They lie in the largest connected part of the map. The first one is the farthest from the
-    middle of its nodes, each next one the farthest from those chosen.
+    They lie in the largest connected part of the map. The first one is the farthest from the middle
+    of its nodes, each next one the farthest from those chosen.
 
-    Parameters
-    ----------
-    edges_of, to
-        See `build.lay_edges`.
-    cells
-        int32 (nodes,), flat cells.
-    cols
-        Columns of the map.
-    order
-        int64 (m,), the nodes that blocks have, in the order of their cells.
-    n
-        Most landmarks.
+    `edges_of`, `to`: see `build.lay_edges`; `cells`: int32 (nodes,), flat cells; `cols`: columns of
+    the map; `order`: int64 (m,), the nodes that blocks have, in the order of their cells; `n`: most
+    landmarks.
     """
     part = _largest_part(edges_of, to, order)
     n = min(n, part.size)

@@ -33,16 +33,9 @@ def _nodes_near(lattice, at, cell, nodes, costs):
 
     Return how many there are, and whether the only one is not seen.
 
-    Parameters
-    ----------
-    lattice
-        See `find_line`.
-    at
-        float64 (2,), position.
-    cell
-        int64 (2,), (row, col) of the free cell that holds it: on a side, which one.
-    nodes, costs
-        int64 and float64, with room for the nodes of nine blocks.
+    `lattice`: see `find_line`; `at`: float64 (2,), position; `cell`: int64 (2,), (row, col) of the
+    free cell that holds it: on a side, which one; `nodes`, `costs`: int64 and float64, with room
+    for the nodes of nine blocks.
     """
     free, factors, nodes_of, parts, cells = lattice[:5]
     side = lattice[9]
@@ -109,19 +102,9 @@ def _search(lattice, start, starts, goals, most, work):
     bounds what is left, because no factor is below 1. Bounds differ from each other by roundings,
     so a node may be expanded again.
 
-    Parameters
-    ----------
-    lattice
-        See `find_line`.
-    start
-        float64 (2,), the position to reach.
-    starts, goals
-        Nodes from which the start is reached, and those from which the search begins, with their
-        costs.
-    most
-        Cost of a path that is known, infinite for none.
-    work
-        See `find_line`.
+    `lattice`, `work`: see `find_line`; `start`: float64 (2,), the position to reach; `starts`,
+    `goals`: nodes from which the start is reached, and those from which the search begins, with
+    their costs; `most`: cost of a path that is known, infinite for none.
     """
     cells, edges_of, to, edge_costs, landmarks = lattice[4:9]
     cols = lattice[0].shape[1]
@@ -242,19 +225,12 @@ def find_line(lattice, ends, ends_in, work):
     The line has no positions if there is no path. `FULL` in place of the number of nodes asks for
     more room in the open list.
 
-    Parameters
-    ----------
-    lattice
-        `free`, `factors`, `nodes_of`, `parts`, `cells`, `edges_of`, `to`, `costs`,
-        `landmarks` and `side`, see `Lattice`.
-    ends
-        float64 (2, 2), start and goal.
-    ends_in
-        int64 (2, 2), (row, col) of the free cells that hold them.
-    work
-        Arrays of one query: float64 (nodes,) costs, int32 (nodes,) nodes before, int64 (nodes,)
-        marks, float64 (nodes,) that are infinite, int64 (entries, 2) the open list; and a number
-        above those of earlier queries with these arrays, > 0.
+    `lattice`: `free`, `factors`, `nodes_of`, `parts`, `cells`, `edges_of`, `to`, `costs`,
+    `landmarks` and `side`, see `Lattice`; `ends`: float64 (2, 2), start and goal; `ends_in`: int64
+    (2, 2), (row, col) of the free cells that hold them; `work`: arrays of one query: float64
+    (nodes,) costs, int32 (nodes,) nodes before, int64 (nodes,) marks, float64 (nodes,) that are
+    infinite, int64 (entries, 2) the open list; and a number above those of earlier queries with
+    these arrays, > 0.
     """
     free, factors = lattice[:2]
     nodes, costs = np.empty((2, 9 * _MOST_NODES), np.int64), np.empty((2, 9 * _MOST_NODES))

@@ -16,13 +16,10 @@ def blocks_of(first, twins, polygon_of):
 
     J. Hopcroft, R. Tarjan: Algorithm 447, efficient algorithms for graph manipulation, 1973.
 
-    Returns
-    -------
-    tuple
-        int32 (s,) block of each slot, -1 for walls; int32 (b,) the polygon of each block that is
-        nearest to the root; int32 (p,) the block through which a polygon is reached from the root,
-        -1 for a root; int32 (p,) the component of each polygon; int32 (p,) steps from the root in
-        the tree of blocks.
+    Returns int32 (s,) block of each slot, -1 for walls; int32 (b,) the polygon of each block that
+    is nearest to the root; int32 (p,) the block through which a polygon is reached from the root,
+    -1 for a root; int32 (p,) the component of each polygon; int32 (p,) steps from the root in the
+    tree of blocks.
     """
     n = len(first) - 1
     block_of = np.full(len(twins), -1, np.int32)
@@ -172,20 +169,10 @@ def are_free(corners, vertices, free):
 def sides_of_triangles(corners, triangles, neighbours):
     """Link the sides of triangles, side 3 t + k from corner k of triangle t to the next one.
 
-    Parameters
-    ----------
-    corners
-        int32 (n, 2).
-    triangles
-        int32 (n, 3), corners counter-clockwise.
-    neighbours
-        int32 (n, 3), the triangle across the side from corner k to k + 1, -1 for a wall.
-
-    Returns
-    -------
-    tuple
-        int32 (3 n,) twin of each side, the side after it and the one before it; int64 (3 n,) the
-        squared length of a common side at one of its two twins, else 0.
+    `corners`: int32 (n, 2); `triangles`: int32 (n, 3), corners counter-clockwise; `neighbours`:
+    int32 (n, 3), the triangle across the side from corner k to k + 1, -1 for a wall. Returns int32
+    (3 n,) twin of each side, the side after it and the one before it; int64 (3 n,) the squared
+    length of a common side at one of its two twins, else 0.
     """
     n = len(triangles)
     twin = np.empty(3 * n, np.int32)
@@ -216,21 +203,9 @@ def sides_of_triangles(corners, triangles, neighbours):
 def merge_across(corners, tail, sides, order):
     """Merge triangles across some sides, in their order, if the union is convex.
 
-    Parameters
-    ----------
-    corners
-        int32 (n, 2).
-    tail
-        int32 (s,), the corner at which each side begins.
-    sides
-        Arrays of `sides_of_triangles`; the sides after and before each side are changed.
-    order
-        int64, the sides.
-
-    Returns
-    -------
-    tuple
-        See `merge_triangles`.
+    `corners`: int32 (n, 2); `tail`: int32 (s,), the corner at which each side begins; `sides`:
+    arrays of `sides_of_triangles`; the sides after and before each side are changed; `order`:
+    int64, the sides. Result: see `merge_triangles`.
     """
     twin, following, before = sides
     is_gone = np.zeros(len(tail), np.bool_)

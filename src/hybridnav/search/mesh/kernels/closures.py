@@ -36,18 +36,9 @@ _MARGIN = 1e-6
 def closure_of(flat, n_cols):
     """Sort closed cells into rows.
 
-    Parameters
-    ----------
-    flat
-        int64 (m,), flat cells that were free, sorted, each once.
-    n_cols
-        Columns of the map.
-
-    Returns
-    -------
-    tuple
-        int64 (4,) first and last row, first and last column of the closed cells; int64 offsets of
-        the cells of each of these rows; int64 their columns.
+    `flat`: int64 (m,), flat cells that were free, sorted, each once; `n_cols`: columns of the map.
+    Returns int64 (4,) first and last row, first and last column of the closed cells; int64 offsets
+    of the cells of each of these rows; int64 their columns.
     """
     cols = flat % n_cols
     if len(flat) == 0:
@@ -171,13 +162,8 @@ def is_beside(box, ax, ay, bx, by):
 def crosses(closure, free, ax, ay, bx, by):
     """Return whether a segment that is legal in free space is illegal with cells closed.
 
-    Parameters
-    ----------
-    closure, free
-        See `closure_of`.
-    ax, ay, bx, by
-        The segment. Its endpoints are not tested: a path that goes on in another direction must be
-        tested there.
+    `closure`, `free`: see `closure_of`; `ax`, `ay`, `bx`, `by`: the segment. Its endpoints are not
+    tested: a path that goes on in another direction must be tested there.
     """
     box, starts, cols = closure
     if not is_beside(box, ax, ay, bx, by) or (ax == bx and ay == by):
@@ -205,13 +191,8 @@ def path_crosses(closure, free, path):
 
     An end at a corner of a closed cell counts, because the cell of the end decides.
 
-    Parameters
-    ----------
-    closure, free
-        See `closure_of`.
-    path
-        float64 (n, 2), (row, col) in grid units: the start, the corners at which it turns, the
-        goal.
+    `closure`, `free`: see `closure_of`; `path`: float64 (n, 2), (row, col) in grid units: the
+    start, the corners at which it turns, the goal.
     """
     for k in range(len(path)):
         y, x = path[k]
@@ -243,22 +224,10 @@ def paths_cross(closure, free, positions, starts):
 def corners_round(mesh, closure, closed, left, place):
     """Find the corners that closed cells have, and those at which paths bend no more.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    closure, closed
-        See `closure_of`; the flat cells.
-    left
-        bool (rows, cols), free cells that are not closed.
-    place
-        Component of polygons, and the polygon of each cell.
-
-    Returns
-    -------
-    tuple
-        x and y of all corners, new ones last; their kinds, with `CHANGED` and `DEAD`; int32
-        polygons that contain a new corner, sorted, and which.
+    `mesh`: see `successors`; `closure`, `closed`: see `closure_of`; the flat cells; `left`: bool
+    (rows, cols), free cells that are not closed; `place`: component of polygons, and the polygon of
+    each cell. Result: x and y of all corners, new ones last; their kinds, with `CHANGED` and
+    `DEAD`; int32 polygons that contain a new corner, sorted, and which.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     box = closure[0]
@@ -347,18 +316,10 @@ def _has_new_corners(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rul
 def see_round(mesh, around, place, goal, room, found):
     """Find the corners seen from a point, past closed cells; see `see_from_point`.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`, with the corners and kinds of `corners_round`.
-    around
-        Closure, free cells, polygons of new corners, and which; see `look_round`.
-    place
-        x and y of the point, and int32 polygons that contain it.
-    goal
-        x and y of another point, and int32 polygons that contain it.
-    room, found
-        See `see_from_point`.
+    `mesh`: see `successors`, with the corners and kinds of `corners_round`; `around`: closure, free
+    cells, polygons of new corners, and which; see `look_round`; `place`: x and y of the point, and
+    int32 polygons that contain it; `goal`: x and y of another point, and int32 polygons that
+    contain it; `room`, `found`: see `see_from_point`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     closure, free, polygons, members, n_old = around

@@ -37,26 +37,12 @@ _SLACK = 1e-9
 def query_corners(mesh, graph, where, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    graph
-        int64 (2 n + 1,) and int32 (m,) of `edges_of`, float64 (n, landmarks) of `landmarks_of`.
-    where
-        See `look_from_endpoints`.
-    work
-        Arrays of one query: room for the polygons of the endpoints; room of `see_from_point`; cost
-        of corners (infinite), estimate, corner before, length to the goal (infinite), corners
-        touched; keys and values of the heap; float64 (2, landmarks) bounds of the goal; counts and
-        bounds.
-    effort
-        See `query`.
-
-    Returns
-    -------
-    tuple
-        See `query`.
+    `mesh`, `endpoints`: see `successors`; `graph`: int64 (2 n + 1,) and int32 (m,) of `edges_of`,
+    float64 (n, landmarks) of `landmarks_of`; `where`: see `look_from_endpoints`; `work`: arrays of
+    one query: room for the polygons of the endpoints; room of `see_from_point`; cost of corners
+    (infinite), estimate, corner before, length to the goal (infinite), corners touched; keys and
+    values of the heap; float64 (2, landmarks) bounds of the goal; counts and bounds; `effort`: see
+    `query`. Result: see `query`.
     """
     starts, goals, room, corners, heap, _, counts, bounds = work
     costs, _, _, to_goal, touched = corners
@@ -242,23 +228,12 @@ APART, MET, SPLIT = -1, 1, 0
 def look_from_endpoints(mesh, where, endpoints, rooms, bounds):
     """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    where
-        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_endpoints`.
-    rooms
-        int32 room for the polygons of start and goal, room of `see_from_point`.
-    bounds
-        Receives the length and lower bound of the answer: infinite if the endpoints are not
-        connected, their distance if they see each other.
-
-    Returns
-    -------
-    tuple
-        `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the
-        goal sees and then those that the start sees; the indices at which both lists end.
+    `mesh`, `endpoints`: see `successors`; `where`: component of polygons, the polygon of each cell,
+    and `cells`; see `polygons_of_endpoints`; `rooms`: int32 room for the polygons of start and
+    goal, room of `see_from_point`; `bounds`: receives the length and lower bound of the answer:
+    infinite if the endpoints are not connected, their distance if they see each other. Result:
+    `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the goal
+    sees and then those that the start sees; the indices at which both lists end.
     """
     sx, sy, tx, ty = endpoints
     component, polygon_at, cells = where

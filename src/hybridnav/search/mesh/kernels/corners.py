@@ -47,19 +47,9 @@ def walls_of(free, kinds, n_corners):
 
     A wall is a straight run of sides between free and blocked cells, from a corner to the next.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-    kinds
-        Kinds of `kinds_of`.
-    n_corners
-        Number of corners among them.
-
-    Returns
-    -------
-    tuple
-        int32 (n, 2) corners (row, col) in the order of rows; int32 (m, 2) walls, as their indices.
+    `free`: bool (rows, cols); `kinds`: kinds of `kinds_of`; `n_corners`: number of corners among
+    them. Returns int32 (n, 2) corners (row, col) in the order of rows; int32 (m, 2) walls, as their
+    indices.
     """
     rows, cols = free.shape
     corners = np.empty((n_corners, 2), np.int32)
@@ -134,22 +124,11 @@ def _touches_cell(corners, begins, low, high, row, col):
 def touched_polygons(corners, sides, place, cells):
     """Return the polygons that share a point with a cell, reached from inside it.
 
-    Parameters
-    ----------
-    corners
-        int32 (n, 2).
-    sides
-        Arrays first, begins, twins, polygon_of of the mesh.
-    place
-        int32 (rows, cols), the polygon at the centre of each cell before the mesh was renewed, -1
-        for none; int32 (p,), component of each polygon, -1 for removed ones.
-    cells
-        int64 (m,), flat cells; those that were not free touch nothing.
-
-    Returns
-    -------
-    tuple
-        bool (p,) whether each polygon is touched, int32 their numbers.
+    `corners`: int32 (n, 2); `sides`: arrays first, begins, twins, polygon_of of the mesh; `place`:
+    int32 (rows, cols), the polygon at the centre of each cell before the mesh was renewed, -1 for
+    none; int32 (p,), component of each polygon, -1 for removed ones; `cells`: int64 (m,), flat
+    cells; those that were not free touch nothing. Returns bool (p,) whether each polygon is
+    touched, int32 their numbers.
     """
     first, begins, twins, polygon_of = sides
     polygon_at, component = place
@@ -302,17 +281,8 @@ def corners_of_cells(free, closed):
 def walls_between(free, points):
     """Return the walls from one of some corners to the next corner, if that is one of them too.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), the free cells now.
-    points
-        int64 (n,), flat lattice points at which walls turn, sorted.
-
-    Returns
-    -------
-    IntArray
-        int64 (w, 2), indices of `points`.
+    `free`: bool (rows, cols), the free cells now; `points`: int64 (n,), flat lattice points at
+    which walls turn, sorted. Returns int64 (w, 2), indices of `points`.
     """
     rows, cols = free.shape
     wide = cols + 1
@@ -371,14 +341,8 @@ def doors_of(sides, is_touched, touched):
 def are_inside(corners, first, begins, touched, triples):
     """Return whether the middle of each triangle lies in one of some polygons.
 
-    Parameters
-    ----------
-    corners, first, begins
-        Arrays of the mesh.
-    touched
-        int32, numbers of the polygons.
-    triples
-        int64 (t, 2), the sum of the three corners of each triangle.
+    `corners`, `first`, `begins`: arrays of the mesh; `touched`: int32, numbers of the polygons;
+    `triples`: int64 (t, 2), the sum of the three corners of each triangle.
     """
     inside = np.zeros(len(triples), np.bool_)
     for k in range(len(triples)):

@@ -17,14 +17,8 @@ from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, lobe_o
 def polygons_of_points(mesh, place, ends):
     """Return the polygons that contain each point: int64 (n + 1,) offsets and int32.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    place
-        Component of polygons, and the polygon of each cell.
-    ends
-        int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
+    `mesh`: see `successors`; `place`: component of polygons, and the polygon of each cell; `ends`:
+    int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
     """
     component, polygon_at = place
     cells, points = ends
@@ -61,19 +55,9 @@ def _seen(mesh, ends, k, target, room):
 def views_of_points(mesh, ends, room):
     """Return the corners that points see, with the costs to them, as labels.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    ends
-        float64 (n, 2) points, (row, col); the polygons that contain them, see `polygons_of_points`.
-    room
-        See `see_from_point`.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets; int32 corners, int64 costs in `UNITS`.
+    `mesh`: see `successors`; `ends`: float64 (n, 2) points, (row, col); the polygons that contain
+    them, see `polygons_of_points`; `room`: see `see_from_point`. Returns int64 (n + 1,) offsets;
+    int32 corners, int64 costs in `UNITS`.
     """
     cx, cy = mesh[0], mesh[1]
     points, _, listed = ends
@@ -96,12 +80,7 @@ def views_of_points(mesh, ends, room):
 def labels_of_points(mesh, hierarchy, ends, room, work):
     """Return the labels of points, as `views_of_points` returns views.
 
-    Parameters
-    ----------
-    mesh, ends, room
-        See `views_of_points`.
-    hierarchy, work
-        See `climb`.
+    `mesh`, `ends`, `room`: see `views_of_points`; `hierarchy`, `work`: see `climb`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     points, _, listed = ends
@@ -131,18 +110,10 @@ def labels_of_points(mesh, hierarchy, ends, room, work):
 def hub_labels_of_points(mesh, hub_labels, polygon_at, ends, room):
     """Return the labels of points by hubs, as `views_of_points` returns views.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    hub_labels
-        The arrays of `HubLabels`.
-    polygon_at
-        int32 (rows, cols), -1 for cells that are not free.
-    ends
-        int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
-    room
-        Room for the corners of a square, int8, int32 and int64; int64 (hubs,) least distances.
+    `mesh`: see `successors`; `hub_labels`: the arrays of `HubLabels`; `polygon_at`: int32 (rows,
+    cols), -1 for cells that are not free; `ends`: int64 (n, 2) free cells, float64 (n, 2) points in
+    their closed squares, (row, col); `room`: room for the corners of a square, int8, int32 and
+    int64; int64 (hubs,) least distances.
     """
     entries, layout, _, views = hub_labels[:4]
     shift, units = int(layout[2]), layout[3] * UNITS
@@ -180,14 +151,8 @@ def hub_labels_of_points(mesh, hub_labels, polygon_at, ends, room):
 def straight_costs(mesh, starts, goals, room, table):
     """Set the entries of a table whose ends see each other to the costs of straight lines.
 
-    Parameters
-    ----------
-    mesh, starts, room
-        See `views_of_points`.
-    goals
-        float64 (m, 2) points; int64 (p + 1,) and int32, the goals in each polygon.
-    table
-        int64 (n, m) costs in `UNITS`; changed.
+    `mesh`, `starts`, `room`: see `views_of_points`; `goals`: float64 (m, 2) points; int64 (p + 1,)
+    and int32, the goals in each polygon; `table`: int64 (n, m) costs in `UNITS`; changed.
     """
     points, offset, listed = starts
     to_points, begin, members = goals
@@ -208,18 +173,9 @@ def straight_costs(mesh, starts, goals, room, table):
 def costs_to_corners(mesh, edges, point, view, work):
     """Search all corners from a point, on a graph that is not contracted; return the heap.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    edges
-        int64 (2 n + 1,) and int32 (m,) of `edges_of`.
-    point
-        float64 (2,), (row, col).
-    view
-        int32 corners that the point sees, int64 costs to them.
-    work
-        int64 (n,) costs (`FAR`), filled in; int32 (n,) corners before; int64 heap.
+    `mesh`: see `successors`; `edges`: int64 (2 n + 1,) and int32 (m,) of `edges_of`; `point`:
+    float64 (2,), (row, col); `view`: int32 corners that the point sees, int64 costs to them;
+    `work`: int64 (n,) costs (`FAR`), filled in; int32 (n,) corners before; int64 heap.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads = edges

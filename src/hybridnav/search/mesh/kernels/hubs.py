@@ -166,26 +166,13 @@ def is_hidden(mesh, polygon_at, cell, point, corner, sights, k):
 def query_hubs(mesh, labels, where, endpoints, work, effort):
     """Find a shortest path between two points by the labels of corners.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    labels
-        The arrays of `HubLabels`.
-    where
-        See `look_from_endpoints`.
-    work
-        Room for the corners of both ends: int8 (2, n) whether the end sees each (1), or not (-1),
-        or it is not known (0); int32 (2, n) their views; int64 (2, n) distances to them; int64
-        (n,) least distances by the corners of the goal. By hub, int64 the least distance from the
-        start, above the number of its corner (`FAR`); int32 hubs touched. Counts and bounds.
-    effort
-        See `query`; with a limit of 0 the length is found without the path.
-
-    Returns
-    -------
-    tuple
-        See `query`.
+    `mesh`, `endpoints`: see `successors`; `labels`: the arrays of `HubLabels`; `where`: see
+    `look_from_endpoints`; `work`: room for the corners of both ends: int8 (2, n) whether the end
+    sees each (1), or not (-1), or it is not known (0); int32 (2, n) their views; int64 (2, n)
+    distances to them; int64 (n,) least distances by the corners of the goal. By hub, int64 the
+    least distance from the start, above the number of its corner (`FAR`); int32 hubs touched.
+    Counts and bounds. `effort`: see `query`; with a limit of 0 the length is found without the
+    path. Result: see `query`.
     """
     component, polygon_at, cells = where
     sights, at, costs, totals, least, touched, counts, bounds = work

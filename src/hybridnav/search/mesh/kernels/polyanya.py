@@ -45,20 +45,10 @@ _SAME = 1e-9
 def seed(mesh, blocks, endpoints, starts, work):
     """Write the first nodes of a search, the sides of the start's polygons.
 
-    Parameters
-    ----------
-    mesh, blocks, endpoints
-        See `successors`.
-    starts
-        int32 polygons that contain the start.
-    work
-        Nodes as int32 (n, 4) and float64 (n, 5), keys and values of the heap, best cost of each
-        corner (infinite), int32 corners touched, counts and bounds.
-
-    Returns
-    -------
-    int
-        `DONE` or `WORK_FULL`.
+    `mesh`, `blocks`, `endpoints`: see `successors`; `starts`: int32 polygons that contain the
+    start; `work`: nodes as int32 (n, 4) and float64 (n, 5), keys and values of the heap, best cost
+    of each corner (infinite), int32 corners touched, counts and bounds. Result: `DONE` or
+    `WORK_FULL`.
     """
     cx, cy, kinds, first, begins, finishes, twins, _ = mesh
     block_of, is_open = blocks
@@ -207,14 +197,8 @@ def path_to(mesh, endpoints, whole, node):
 
     It holds the start, the corners at which it turns, and the goal.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    whole
-        Nodes, see `seed`.
-    node
-        The last node of the path, -1 if the path is one segment.
+    `mesh`, `endpoints`: see `successors`; `whole`: nodes, see `seed`; `node`: the last node of the
+    path, -1 if the path is one segment.
     """
     cx, cy = mesh[0], mesh[1]
     sx, sy, tx, ty = endpoints
@@ -307,21 +291,10 @@ def edges_of(mesh, component, limit):
     An edge joins two corners that see each other, and at both of which a path along the segment
     between them may bend.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    component
-        int32 (p,), below 0 for polygons that were cut out.
-    limit
-        Most edges.
-
-    Returns
-    -------
-    tuple
-        int64 (2 n + 1,) first edge of each corner and quadrant, see `lobe_of`; int32 (m,) the
-        corner at which each edge ends. Each edge occurs in both directions. If there are more edges
-        than the limit, the last entry of the first array is -1.
+    `mesh`: see `successors`; `component`: int32 (p,), below 0 for polygons that were cut out;
+    `limit`: most edges. Returns int64 (2 n + 1,) first edge of each corner and quadrant, see
+    `lobe_of`; int32 (m,) the corner at which each edge ends. Each edge occurs in both directions.
+    If there are more edges than the limit, the last entry of the first array is -1.
     """
     kinds, begins, twins, polygon_of = mesh[2], mesh[4], mesh[6], mesh[7]
     n = len(kinds)
@@ -358,16 +331,8 @@ def edges_of(mesh, component, limit):
 def distances_from(points, graph, source, distances):
     """Compute the distances of all corners from one in the graph, infinite if not reached.
 
-    Parameters
-    ----------
-    points
-        float64 x and y of corners.
-    graph
-        The graph of `edges_of`.
-    source
-        The corner.
-    distances
-        float64 (n,), filled in.
+    `points`: float64 x and y of corners; `graph`: the graph of `edges_of`; `distances`: float64
+    (n,), filled in.
     """
     cx, cy = points
     first, heads = graph
@@ -397,14 +362,8 @@ def landmarks_of(points, graph, source, table):
 
     The first landmark is a given corner, each other one the corner farthest from those before.
 
-    Parameters
-    ----------
-    points, graph
-        See `distances_from`.
-    source
-        The first landmark: the others are in the same part of the graph.
-    table
-        float64 (n, landmarks), filled in.
+    `points`, `graph`: see `distances_from`; `source`: the first landmark: the others are in the
+    same part of the graph; `table`: float64 (n, landmarks), filled in.
     """
     n, number = table.shape
     distances = np.empty(n)

@@ -139,22 +139,11 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
 def answer(mesh, graph, place, ends, work, effort):
     """Answer one query on any graph, or resume the search.
 
-    Parameters
-    ----------
-    mesh, graph, place
-        See `many`.
-    ends
-        Row and column of the cells of start and goal, and x and y of both, which are rounded and
-        moved into the closed squares of these cells.
-    work
-        Arrays of one query, see the kernel of one query on such a graph; its counts and bounds.
-    effort
-        See `query`.
-
-    Returns
-    -------
-    tuple
-        Status and path of `query`, the length and the lower bound, and what was expanded.
+    `mesh`, `graph`, `place`: see `many`; `ends`: row and column of the cells of start and goal, and
+    x and y of both, which are rounded and moved into the closed squares of these cells; `work`:
+    arrays of one query, see the kernel of one query on such a graph; its counts and bounds;
+    `effort`: see `query`. Result: status and path of `query`, the length and the lower bound, and
+    what was expanded.
     """
     (row, col, to_row, to_col), (x, y, to_x, to_y) = ends
     points = into_cell(col, x), into_cell(row, y), into_cell(to_col, to_x), into_cell(to_row, to_y)
@@ -263,26 +252,12 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
 def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    hierarchy
-        Results of `contract` and `classes_that_follow`; patches of `repair` with what `look_round`
-        needs, all empty if nothing is closed.
-    where
-        See `look_from_endpoints`.
-    work
-        Arrays of one query: room for the polygons of the endpoints; room of `see_from_point`;
-        records of corners, int64 (n, 4), costs from the start and from the goal (`FAR`), and the
-        tail and arc by which each was reached; corners touched; two heaps; counts and bounds.
-    effort
-        See `query`.
-
-    Returns
-    -------
-    tuple
-        See `query`.
+    `mesh`, `endpoints`: see `successors`; `hierarchy`: results of `contract` and
+    `classes_that_follow`; patches of `repair` with what `look_round` needs, all empty if nothing is
+    closed; `where`: see `look_from_endpoints`; `work`: arrays of one query: room for the polygons
+    of the endpoints; room of `see_from_point`; records of corners, int64 (n, 4), costs from the
+    start and from the goal (`FAR`), and the tail and arc by which each was reached; corners
+    touched; two heaps; counts and bounds; `effort`: see `query`. Result: see `query`.
     """
     starts, goals, room, records, touched, heaps, counts, bounds = work
     upper, factor, limit = effort

@@ -37,20 +37,10 @@ _ROOM = 4
 def footing_of(mesh, hierarchy):
     """Find what repairs need of a hierarchy.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    hierarchy
-        See `query_hierarchy`.
-
-    Returns
-    -------
-    tuple
-        int32 (n,), numbers of corners in an order in which all arcs lead upwards; int32 (n + 1,)
-        and (u,), the arcs that end at each corner; int32 (u,), where each begins; float32 (n, 4)
-        and (groups, 4), least x and y, greatest x and y of the edges that are arcs from a corner,
-        and from the corners of a group.
+    `mesh`: see `successors`; `hierarchy`: see `query_hierarchy`. Returns int32 (n,), numbers of
+    corners in an order in which all arcs lead upwards; int32 (n + 1,) and (u,), the arcs that end
+    at each corner; int32 (u,), where each begins; float32 (n, 4) and (groups, 4), least x and y,
+    greatest x and y of the edges that are arcs from a corner, and from the corners of a group.
     """
     cx, cy = mesh[0], mesh[1]
     first, arcs, middles = hierarchy[0], hierarchy[1], hierarchy[2]

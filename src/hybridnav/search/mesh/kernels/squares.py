@@ -45,19 +45,8 @@ def corner_of_square(square, side, n_across):
 def squares_of_polygons(mesh, side, n_across):
     """Return the squares that each polygon meets.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    side
-        Side of the squares in cells.
-    n_across
-        Number of squares in a row.
-
-    Returns
-    -------
-    tuple
-        int64 (p + 1,) offsets, int32 squares.
+    `mesh`: see `successors`; `side`: side of the squares in cells; `n_across`: number of squares in
+    a row. Returns int64 (p + 1,) offsets, int32 squares.
     """
     cx, cy, _, first, begins, finishes, _, _ = mesh
     offset = np.zeros(len(first), np.int64)
@@ -99,15 +88,11 @@ def squares_of_polygons(mesh, side, n_across):
 def _mark(target, polygon, x, y, rays):
     """Append the squares of a polygon that may meet the view between two rays, each once a stamp.
 
-    Parameters
-    ----------
-    target
-        Results of `squares_of_polygons`; side of the squares and number in a row; int32 (n, 2)
-        stamps of all squares, and how many polygons of each are seen as far as they lie in it;
-        int64 the stamp, and the number of squares found, which goes on where there is no room;
-        int32 room for them.
-    polygon, x, y, rays
-        The polygon, the corner, and points on the left and the right ray.
+    `target`: results of `squares_of_polygons`; side of the squares and number in a row; int32 (n,
+    2) stamps of all squares, and how many polygons of each are seen as far as they lie in it; int64
+    the stamp, and the number of squares found, which goes on where there is no room; int32 room for
+    them; `polygon`, `x`, `y`, `rays`: the polygon, the corner, and points on the left and the right
+    ray.
     """
     offset, squares, (side, n_across), stamps, state, found = target
     lx, ly, rx, ry = rays
@@ -148,24 +133,11 @@ def _has_squares(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
 def squares_of_views(mesh, walls, squares, layout, found):
     """Return the squares that each corner sees something of, where a path may bend at the corner.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    walls
-        int32 (n,), the wall that begins at each corner, -1 for none.
-    squares
-        Results of `squares_of_polygons`.
-    layout
-        Side of the squares, float; squares in a row, squares in all.
-    found
-        int32, room for the squares: twice their numbers, plus 1 if the corner sees all free space
-        in the square.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets in `found`, as if there was room for all.
+    `mesh`: see `successors`; `walls`: int32 (n,), the wall that begins at each corner, -1 for none;
+    `squares`: results of `squares_of_polygons`; `layout`: side of the squares, float; squares in a
+    row, squares in all; `found`: int32, room for the squares: twice their numbers, plus 1 if the
+    corner sees all free space in the square. Returns int64 (n + 1,) offsets in `found`, as if there
+    was room for all.
     """
     cx, cy, kinds, first, _, _, twins, polygon_of = mesh
     side, n_across, n_squares = layout
@@ -204,19 +176,9 @@ def squares_of_views(mesh, walls, squares, layout, found):
 def corners_by_square(offset, found, n_across, layout):
     """Join quarters into squares, and return the corners of each.
 
-    Parameters
-    ----------
-    offset, found
-        Results of `squares_of_views` for the quarters.
-    n_across
-        Number of quarters in a row.
-    layout
-        Number of squares in a row, and in all.
-
-    Returns
-    -------
-    tuple
-        int32 (squares + 1,) offsets; int32 corners with eight bits below, see `HubLabels.views`.
+    `offset`, `found`: results of `squares_of_views` for the quarters; `n_across`: number of
+    quarters in a row; `layout`: number of squares in a row, and in all. Returns int32 (squares +
+    1,) offsets; int32 corners with eight bits below, see `HubLabels.views`.
     """
     n_squares_across, n_squares = layout
     begin, last = np.zeros(n_squares + 1, np.int32), np.full(n_squares, -1, np.int32)
@@ -248,22 +210,10 @@ def corners_by_square(offset, found, n_across, layout):
 def views_of_squares(mesh, parts, layout, begin, corners):
     """Return the corners of squares with the entries of their labels that a path may go on to.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    parts
-        Offsets of the parts of labels by corner and lobe, and of the entries of each part; float32
-        (p, 2) the direction to the next corner, along the wall and away from it.
-    layout
-        Side of the squares in cells, number in a row.
-    begin, corners
-        Results of `corners_by_square`.
-
-    Returns
-    -------
-    tuple
-        int32 (squares + 1,) offsets; int32 (v, 3) see `HubLabels`.
+    `mesh`: see `successors`; `parts`: offsets of the parts of labels by corner and lobe, and of the
+    entries of each part; float32 (p, 2) the direction to the next corner, along the wall and away
+    from it; `layout`: side of the squares in cells, number in a row; `begin`, `corners`: results of
+    `corners_by_square`. Returns int32 (squares + 1,) offsets; int32 (v, 3) see `HubLabels`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, offset, turns = parts

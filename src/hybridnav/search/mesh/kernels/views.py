@@ -362,10 +362,7 @@ def classes_that_follow():
     bend away from that cell. Two neighbouring sectors always may follow each other: every excluded
     path is then longer than the shortest one by more than the rounding of costs.
 
-    Returns
-    -------
-    numpy.ndarray
-        int64 (4, 64).
+    Returns int64 (4, 64).
     """
     table = np.zeros((4, 2 * _SECTORS), np.int64)
     for one in range(_SECTORS):
@@ -380,17 +377,8 @@ def classes_that_follow():
 def arcs_of(mesh, first, heads):
     """Build the arcs of the graph of corners, as `contract` takes them.
 
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    first, heads
-        Results of `edges_of`.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,), offsets of the arcs of each corner; int64 (m, 2), these arcs.
+    `mesh`: see `successors`; `first`, `heads`: results of `edges_of`. Returns int64 (n + 1,),
+    offsets of the arcs of each corner; int64 (m, 2), these arcs.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     arcs = np.empty((len(heads), 2), np.int64)

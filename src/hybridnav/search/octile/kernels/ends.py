@@ -14,19 +14,9 @@ from hybridnav.search.octile.kernels.tables import corner_at, is_corner
 def labels_of_cells(tables, places, hierarchy, cells, work):
     """Return the labels of flat cells.
 
-    Parameters
-    ----------
-    tables, places
-        See `shortest`.
-    hierarchy, work
-        See `climb`.
-    cells
-        int64 (n,), flat free cells in the framed rectangle.
-
-    Returns
-    -------
-    tuple
-        int64 (n + 1,) offsets; int32 corner cells, int64 costs.
+    `tables`, `places`: see `shortest`; `hierarchy`, `work`: see `climb`; `cells`: int64 (n,), flat
+    free cells in the framed rectangle. Returns int64 (n + 1,) offsets; int32 corner cells, int64
+    costs.
     """
     index, _, order, width = tables
     follow = hierarchy[3]
@@ -61,14 +51,8 @@ def labels_of_cells(tables, places, hierarchy, cells, work):
 def direct_costs(tables, starts, goals, table):
     """Set the entries of a table with one free leg between their cells to its cost.
 
-    Parameters
-    ----------
-    tables
-        See `join`.
-    starts, goals
-        int64 (n,) and (m,), flat free cells.
-    table
-        int64 (n, m); changed.
+    `tables`: see `join`; `starts`, `goals`: int64 (n,) and (m,), flat free cells; `table`: int64
+    (n, m); changed.
     """
     width = tables[3]
     for k in range(len(starts)):

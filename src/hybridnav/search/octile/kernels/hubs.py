@@ -96,22 +96,10 @@ def parts_of(places, order, at, onward):
 def views_of_squares(tables, places, is_free, most):
     """Find the corner cells that the cells of each square are joined to.
 
-    Parameters
-    ----------
-    tables
-        See `join`.
-    places
-        int64 (n,), see `row_col_kind`.
-    is_free
-        bool (rows, cols), the free cells of the framed rectangle.
-    most
-        Most views.
-
-    Returns
-    -------
-    tuple
-        int32 (squares + 1,) offsets; int32 (v, 2), a corner cell, and a bit for each cell of the
-        square that is joined to it; whether there was room for all.
+    `tables`: see `join`; `places`: int64 (n,), see `row_col_kind`; `is_free`: bool (rows, cols),
+    the free cells of the framed rectangle. Returns int32 (squares + 1,) offsets; int32 (v, 2), a
+    corner cell, and a bit for each cell of the square that is joined to it; whether there was room
+    for all.
     """
     index, _, order, width = tables
     rows, cols = is_free.shape
@@ -181,19 +169,9 @@ def _look(width, corners, labels, cell, runs):
 def hub_cost(tables, corners, labels, endpoints, work):
     """Return the cost of a shortest path between two cells, `FAR` for none.
 
-    Parameters
-    ----------
-    tables
-        See `join`.
-    corners
-        Places and components of corner cells, `ranges_of_legs`.
-    labels
-        The arrays of `JumpHubs`.
-    endpoints
-        Flat cells of start and goal.
-    work
-        Room for the runs of both ends, int64 (2, n, 3); by hub int64 (n,) the least cost from the
-        start (`FAR`).
+    `tables`: see `join`; `corners`: places and components of corner cells, `ranges_of_legs`;
+    `labels`: the arrays of `JumpHubs`; `endpoints`: flat cells of start and goal; `work`: room for
+    the runs of both ends, int64 (2, n, 3); by hub int64 (n,) the least cost from the start (`FAR`).
     """
     start, goal = endpoints
     runs, least = work

@@ -47,11 +47,8 @@ def legs_that_follow():
     moves are legal because theirs are. So an excluded pair is never on a shortest path, even where
     there are several.
 
-    Returns
-    -------
-    numpy.ndarray
-        int64 (16, 16), by the blocked corners of the cell (see `number_cells`) and the class of the
-        leg that ends there, walked backwards: bit c is set where a leg of class c may follow.
+    Returns int64 (16, 16), by the blocked corners of the cell (see `number_cells`) and the class of
+    the leg that ends there, walked backwards: bit c is set where a leg of class c may follow.
     """
     table = np.zeros((16, 16), np.int64)
     for kind in range(16):
@@ -91,20 +88,10 @@ def join(tables, cell, found):
     They include every corner cell that can be the next one on a shortest path, with no other one
     before it. A corner cell does not find itself.
 
-    Parameters
-    ----------
-    tables
-        The index of cells (see `number_cells`), the distances ahead of them (see `look_ahead`), the
-        number of each corner cell in the graph, int32 (n,), and the width of the framed grid.
-    cell
-        Flat free cell.
-    found
-        int32, room for all corner cells; filled in.
-
-    Returns
-    -------
-    int
-        Number of corner cells found.
+    `tables`: the index of cells (see `number_cells`), the distances ahead of them (see
+    `look_ahead`), the number of each corner cell in the graph, int32 (n,), and the width of the
+    framed grid; `cell`: flat free cell; `found`: int32, room for all corner cells; filled in.
+    Result: number of corner cells found.
     """
     index, ahead, order, width = tables
     here = number_of(index, cell)
@@ -225,20 +212,9 @@ def _joined(tables, corners):
 def arcs_of(tables, corners, places):
     """Build the arcs between corner cells.
 
-    Parameters
-    ----------
-    tables
-        See `join`.
-    corners
-        int32 (n,), flat corner cells.
-    places
-        int64 (n,), see `row_col_kind`.
-
-    Returns
-    -------
-    tuple
-        int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2), the cost of each
-        arc, and its head and classes (see `pack`). Each arc comes with its reverse.
+    `tables`: see `join`; `corners`: int32 (n,), flat corner cells; `places`: int64 (n,), see
+    `row_col_kind`. Returns int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2),
+    the cost of each arc, and its head and classes (see `pack`). Each arc comes with its reverse.
     """
     begin, heads = _joined(tables, corners)
     # An arc that only one endpoint finds passes another corner cell: two arcs replace it.
@@ -339,26 +315,14 @@ def shortest(graph, endpoints, is_contracted, work):
     A corner cell that both directions reach completes a path, and entries that are not better are
     pruned.
 
-    Parameters
-    ----------
-    graph
-        Tables (see `join`), int64 (n,) places, int32 (n,) components, the legs that may follow (see
-        `legs_that_follow`), and arcs: where those of each corner cell begin, int64 (m, 2) cost and
-        head (see `arcs_of` and `contract`).
-    endpoints
-        Flat cells of start and goal.
-    is_contracted
-        Whether the arcs are those of a hierarchy.
-    work
-        Records, int64 (n, 4), the first two columns `FAR`: costs from the start and from the goal,
-        and the tail and arc by which each was reached; two heaps with room for n and m entries;
-        room for n corner cells, int64; the same, int32.
-
-    Returns
-    -------
-    tuple
-        Cost, `FAR` where there is no path; the corner cell where both directions meet, `FROM_START`
-        or `FROM_GOAL`; corner cells expanded; number of records to clear.
+    `graph`: tables (see `join`), int64 (n,) places, int32 (n,) components, the legs that may follow
+    (see `legs_that_follow`), and arcs: where those of each corner cell begin, int64 (m, 2) cost and
+    head (see `arcs_of` and `contract`); `endpoints`: flat cells of start and goal; `is_contracted`:
+    whether the arcs are those of a hierarchy; `work`: records, int64 (n, 4), the first two columns
+    `FAR`: costs from the start and from the goal, and the tail and arc by which each was reached;
+    two heaps with room for n and m entries; room for n corner cells, int64; the same, int32.
+    Result: cost, `FAR` where there is no path; the corner cell where both directions meet,
+    `FROM_START` or `FROM_GOAL`; corner cells expanded; number of records to clear.
     """
     tables, places, _, follow, (first, arcs) = graph
     records, heaps, touched, found = work

@@ -110,26 +110,12 @@ def _with_room(cells, n_cells, more):
 def paths(graph, middles, origin, endpoints, work):
     """Find shortest paths between pairs of cells.
 
-    Parameters
-    ----------
-    graph
-        See `shortest`.
-    middles
-        int64 (m,), the corner cells that the arcs of a contracted graph lead past; empty for a
-        graph that is not contracted.
-    origin
-        Row and column of the framed grid's first cell.
-    endpoints
-        int64 (k, 4), row and column of the start, then of the goal; free cells.
-    work
-        See `shortest`.
-
-    Returns
-    -------
-    tuple
-        int64 (k + 1,), where the cells of each path begin; int64 (c, 2), the cells (row, col);
-        int64 (k, 3), moves along sides, moves along diagonals, -1 for both where there is no path,
-        and corner cells expanded.
+    `graph`, `work`: see `shortest`; `middles`: int64 (m,), the corner cells that the arcs of a
+    contracted graph lead past; empty for a graph that is not contracted; `origin`: row and column
+    of the framed grid's first cell; `endpoints`: int64 (k, 4), row and column of the start, then of
+    the goal; free cells. Returns int64 (k + 1,), where the cells of each path begin; int64 (c, 2),
+    the cells (row, col); int64 (k, 3), moves along sides, moves along diagonals, -1 for both where
+    there is no path, and corner cells expanded.
     """
     width, first = graph[0][3], graph[4][0]
     records, _, touched, _ = work

@@ -49,19 +49,11 @@ def number_cells(free):
     A corner cell has a blocked cell at one of its corners, and both cells beside the blocked one
     are free: shortest paths turn there.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-
-    Returns
-    -------
-    tuple
-        int32 ((rows + 2) * (cols + 2),), the number of each cell of the framed grid, `BLOCKED` for
-        none; int32 (n,), flat corner cells; uint8 (n,), which of their corners are blocked, bit k
-        for direction 2 * k + 1; the index, int64 (words, 3), which keeps the numbers in 3 bits a
-        cell: for every 64 flat cells which are free, which are corner cells, and how many of each
-        come before, free ones in the high half.
+    `free`: bool (rows, cols). Returns int32 ((rows + 2) * (cols + 2),), the number of each cell of
+    the framed grid, `BLOCKED` for none; int32 (n,), flat corner cells; uint8 (n,), which of their
+    corners are blocked, bit k for direction 2 * k + 1; the index, int64 (words, 3), which keeps the
+    numbers in 3 bits a cell: for every 64 flat cells which are free, which are corner cells, and
+    how many of each come before, free ones in the high half.
     """
     rows, cols = free.shape
     width = cols + 2
@@ -114,17 +106,11 @@ def _kind(number, width, cell):
 def look_ahead(number, width, index, ahead):
     """Fill in the distances ahead of each free cell in the eight directions.
 
-    Parameters
-    ----------
-    number, index
-        Results of `number_cells`.
-    width
-        Columns of the framed grid.
-    ahead
-        int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell,
-        or 0 or less, minus the free cells before a blocked one. Along a diagonal: the distance to
-        the next cell that is a corner cell or sees one along either side of that diagonal, or minus
-        the number of legal moves.
+    `number`, `index`: results of `number_cells`; `width`: columns of the framed grid; `ahead`:
+    int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell, or 0
+    or less, minus the free cells before a blocked one. Along a diagonal: the distance to the next
+    cell that is a corner cell or sees one along either side of that diagonal, or minus the number
+    of legal moves.
     """
     # Sides come first, because they decide where a diagonal stops.
     for flip in (1, -1):

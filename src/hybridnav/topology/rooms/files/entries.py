@@ -67,16 +67,9 @@ def packed(
     """Return lines that hold the rooms of the cells that outlines miss, and which outlines these
     are.
 
-    Parameters
-    ----------
-    missed
-        bool (rows, cols), cells whose room is not the one that they would be read with.
-    label_of
-        int32 (rows, cols), -1 for no room.
-    outlines
-        The room and the fingerprint of each outline that is written.
-    grid
-        The map.
+    `missed`: bool (rows, cols), cells whose room is not the one that they would be read with;
+    `label_of`: int32 (rows, cols), -1 for no room; `outlines`: the room and the fingerprint of each
+    outline that is written.
     """
     cells = np.flatnonzero(missed)
     labels = label_of.ravel()[cells]
@@ -102,19 +95,9 @@ def packed(
 def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Missed:
     """Return the cells that belong to each outline beyond those that it would have.
 
-    Parameters
-    ----------
-    lines
-        As `packed` returned them.
-    where
-        The file, for messages.
-    grid
-        The map. If it is not the one that the lines were packed for, there are no cells.
-
-    Raises
-    ------
-    RoomsError
-        When the lines are damaged.
+    `lines`: as `packed` returned them; `where`: the file, for messages; `grid`: the map. If it is
+    not the one that the lines were packed for, there are no cells. Raises `RoomsError` when the
+    lines are damaged.
     """
     if not lines:
         return Missed({})
@@ -247,10 +230,7 @@ def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
 
     Entries of one name are one room, if their outlines lie beside each other.
 
-    Raises
-    ------
-    RoomsError
-        When an entry is wrong; the message names its line.
+    Raises `RoomsError` when an entry is wrong; the message names its line.
     """
     values, read = marked.values, Read(where)
     check_keys(values, FILE_KEYS, where)

@@ -36,14 +36,8 @@ class Outlines:
 
     Furniture, pillars, and narrow bays in walls belong to the rooms round them.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), -1 for no room. Every room has a free cell.
-    n_rooms
-        Number of rooms.
-    grid
-        The map.
+    `label_of`: int32 (rows, cols), -1 for no room. Every room has a free cell. `n_rooms`: number of
+    rooms.
     """
 
     def __init__(self, label_of: IntArray, n_rooms: int, grid: OccupancyGrid) -> None:
@@ -62,18 +56,10 @@ class Outlines:
         Neighbours share the corners of their common border. Free cells near an outline may lie on
         its other side.
 
-        Parameters
-        ----------
-        tolerance_m
-            How far an outline may lie from the steps of the cells, in metres, before its sides are
-            brought into line with walls.
-
-        Returns
-        -------
-        list
-            Rings of each room, outer ones and holes, float64 (n, 2), `(x, y)` in metres, map frame,
-            rounded to centimetres, or finer where cells are below 5 cm or a room is too thin.
-            Filled by the even-odd rule they form the room.
+        `tolerance_m`: how far an outline may lie from the steps of the cells, in metres, before its
+        sides are brought into line with walls. Result: rings of each room, outer ones and holes,
+        float64 (n, 2), `(x, y)` in metres, map frame, rounded to centimetres, or finer where cells
+        are below 5 cm or a room is too thin. Filled by the even-odd rule they form the room.
         """
         side_m = self._grid.resolution_m
         simple = _simplified(self._borders.lines, _SLACK * tolerance_m / side_m)
@@ -98,8 +84,7 @@ def _rim(region_of: IntArray) -> BoolArray:
     """Return the cells of rooms with another room, or none, above or to the right of them."""
     padded = np.pad(region_of, ((0, 1), (0, 1)), constant_values=-1)
     inner = padded[:-1, :-1]
-    rim: BoolArray = (inner != padded[1:, :-1]) | (inner != padded[:-1, 1:])
-    return rim
+    return (inner != padded[1:, :-1]) | (inner != padded[:-1, 1:])
 
 
 def _simplified(lines: BaseGeometry, tolerance: float) -> BaseGeometry:
@@ -140,12 +125,7 @@ _LEAST_NAMELESS_M2 = 1.0
 def regions_of(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Return rooms grown over furniture, pillars, and narrow bays in walls, int32 (rows, cols).
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), -1 for no room. Every room has a free cell.
-    grid
-        The map.
+    `label_of`: int32 (rows, cols), -1 for no room. Every room has a free cell.
     """
     is_kept = _kept_cells(label_of, grid)
     return _without_bays(_without_islands(label_of, is_kept, grid), is_kept, grid)
@@ -158,8 +138,7 @@ def _kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:
     part_of, _ = ndimage.label(is_free & (label_of == NO_ROOM))
     is_many = np.bincount(part_of.ravel()) * grid.cell_area_m2 >= _LEAST_NAMELESS_M2
     is_many[0] = False
-    kept: BoolArray = (is_free & (label_of != NO_ROOM)) | is_many[part_of]
-    return kept
+    return (is_free & (label_of != NO_ROOM)) | is_many[part_of]
 
 
 def _without_islands(label_of: IntArray, is_kept: BoolArray, grid: OccupancyGrid) -> IntArray:
@@ -238,12 +217,8 @@ class Borders:
     def of(cls, region_of: IntArray, n_rooms: int) -> Borders:
         """Return the borders of the rooms on a grid.
 
-        Parameters
-        ----------
-        region_of
-            int32 (rows, cols), the room of each cell, -1 for none.
-        n_rooms
-            Number of rooms.
+        `region_of`: int32 (rows, cols), the room of each cell, -1 for none; `n_rooms`: number of
+        rooms.
         """
         padded = np.pad(region_of, 1, constant_values=-1)
         sides = [_sides(padded), _sides(padded.T)[..., ::-1]]
@@ -256,12 +231,7 @@ class Borders:
     def area(self, room: int, lines: BaseGeometry) -> BaseGeometry:
         """Return the area of a room, whose chains may have been simplified or moved.
 
-        Parameters
-        ----------
-        room
-            Its number.
-        lines
-            The chains in the same order.
+        `lines`: the chains in the same order.
         """
         chains = shapely.get_parts(lines)[self.chains_of[room]]
         return shapely.build_area(shapely.MultiLineString(list(chains[shapely.length(chains) > 0])))
@@ -272,10 +242,7 @@ class Borders:
         All corners where chains meet that short chains join become one, in their middle. If borders
         would then cross, or a part of a room would go, the result is these borders.
 
-        Parameters
-        ----------
-        at_most
-            Length in cells.
+        `at_most`: length in cells.
         """
         chains = shapely.get_parts(self.lines)
         if not len(chains):
@@ -331,8 +298,7 @@ def _joined(count: int, begin: LongArray, end: LongArray) -> LongArray:
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
     edges = coo_array((np.ones(len(begin), dtype=np.int8), (begin, end)), (count, count))
-    group: LongArray = connected_components(edges, directed=False)[1].astype(np.int64)
-    return group
+    return connected_components(edges, directed=False)[1].astype(np.int64)
 
 
 def _from_corner(chain: LineString) -> LineString:

@@ -33,24 +33,10 @@ def painted(read: Read, missed: Missed, grid: OccupancyGrid) -> IntArray:
     then the outlines that a person has drawn or changed, in the order of the file: each takes the
     cells that it contains from those before.
 
-    Parameters
-    ----------
-    read
-        The outlines, which may cross themselves and others.
-    missed
-        The cells that outlines miss; an outline whose fingerprint it lacks was drawn by hand.
-    grid
-        The map.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), -1 for no room.
-
-    Raises
-    ------
-    RoomsError
-        When the outlines have too many sides, or cover too much, for rooms.
+    `read`: the outlines, which may cross themselves and others; `missed`: the cells that outlines
+    miss; an outline whose fingerprint it lacks was drawn by hand. Returns int32 (rows, cols), -1
+    for no room. Raises `RoomsError` when the outlines have too many sides, or cover too much, for
+    rooms.
     """
     written, by_hand = outlined(read, missed.runs_of, grid)
     outlines = [each for each in read.outlines if each.fingerprint in missed.runs_of]
@@ -67,22 +53,8 @@ def outlined(
 ) -> tuple[IntArray, IntArray]:
     """Paint the outlines alone: those that were written, and those drawn by hand.
 
-    Parameters
-    ----------
-    read, grid
-        As of `painted`.
-    written
-        Fingerprints of outlines that were written.
-
-    Returns
-    -------
-    tuple of IntArray
-        int32 (rows, cols) each, -1 for no room.
-
-    Raises
-    ------
-    RoomsError
-        As by `painted`.
+    `read`, `grid`: see `painted`; `written`: fingerprints of outlines that were written. Returns
+    int32 (rows, cols) each, -1 for no room. Raises `RoomsError` as by `painted`.
     """
     n_crossings = sum(_n_crossings(ring) for outline in read.outlines for ring in outline.rings)
     if n_crossings > _MOST_CROSSINGS:
@@ -114,8 +86,7 @@ def apart(grid: OccupancyGrid) -> BoolArray:
     part_of, _ = ndimage.label(grid.measured == CellClass.FREE)
     small = np.bincount(part_of.ravel()) * grid.resolution_m**2 < _LEAST_NAMELESS_M2
     small[0] = False
-    found: BoolArray = small[part_of]
-    return found
+    return small[part_of]
 
 
 def by_rule(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -144,20 +115,10 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
     Outlines have few corners where the rim of the free cells has many, and people leave strips
     between rooms: each would be nameless space with its own doors.
 
-    Parameters
-    ----------
-    label_of
-        int32 (rows, cols), -1 for no room.
-    grid
-        The map.
-    rooms
-        Rooms that a person has drawn: only slivers beside one of them are assigned.
-
-    Returns
-    -------
-    IntArray
-        Labels in which connected cells of no room, measured as free and together below one square
-        metre, have the room with which they have the longest border.
+    `label_of`: int32 (rows, cols), -1 for no room; `rooms`: rooms that a person has drawn: only
+    slivers beside one of them are assigned. Result: labels in which connected cells of no room,
+    measured as free and together below one square metre, have the room with which they have the
+    longest border.
     """
     if not rooms:
         return label_of
@@ -189,18 +150,10 @@ def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArr
     """Return the cells whose centres lie inside rings by the even-odd rule, a scan line for each
     row.
 
-    Parameters
-    ----------
-    rings
-        float64 (n, 2) each, in cells, x along columns and y along rows; closed by themselves.
-    shape
-        Rows and columns of the grid.
-
-    Returns
-    -------
-    LongArray
-        int64 (n,), flat cells, ascending. A centre on a side counts as inside on the left and
-        lower sides alone, so that rooms with a common side share no cell.
+    `rings`: float64 (n, 2) each, in cells, x along columns and y along rows; closed by themselves;
+    `shape`: rows and columns of the grid. Returns int64 (n,), flat cells, ascending. A centre on a
+    side counts as inside on the left and lower sides alone, so that rooms with a common side share
+    no cell.
     """
     crossed = [_crossings(ring) for ring in rings]
     row = np.concatenate([rows for rows, _ in crossed])

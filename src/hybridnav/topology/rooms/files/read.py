@@ -102,10 +102,7 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
 def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
     """Return the rooms that a file describes.
 
-    Raises
-    ------
-    RoomsError
-        As by `load_rooms`.
+    Raises `RoomsError` as by `load_rooms`.
     """
     try:
         check_names(tuple(read.names))

@@ -37,19 +37,10 @@ def straightened(
     The corners at both ends of a side along a direction of the walls come to lie on one line, as
     long as no corner moves far and no chain crosses another.
 
-    Parameters
-    ----------
-    lines
-        MultiLineString in cells, x along columns and y along rows; chains meet at common ends.
-    directions
-        Angles of walls against the rows, and bool (rows, cols), where walls have them.
-    resolution_m
-        Side of a cell in metres.
-
-    Returns
-    -------
-    BaseGeometry
-        The chains in the same order; the same object if no corner has moved.
+    `lines`: MultiLineString in cells, x along columns and y along rows; chains meet at common ends;
+    `directions`: angles of walls against the rows, and bool (rows, cols), where walls have them;
+    `resolution_m`: side of a cell in metres. Returns the chains in the same order; the same object
+    if no corner has moved.
     """
     flat, chain = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
     points, _, of_corner, _ = unique_rows(flat)

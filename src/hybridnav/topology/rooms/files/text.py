@@ -335,12 +335,7 @@ class RoomMeasures:
 def measures_of(rooms: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
     """Return place and size of each room, in the order of the names.
 
-    Parameters
-    ----------
-    rooms
-        The rooms; each has a free cell.
-    grid
-        Their map, as measured.
+    `rooms`: the rooms; each has a free cell; `grid`: their map, as measured.
     """
     cells = np.argwhere((grid.measured == CellClass.FREE) & (rooms.label_of >= 0))
     labels = rooms.label_of[tuple(cells.T)]
