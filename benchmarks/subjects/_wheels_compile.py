@@ -10,7 +10,9 @@ import pickle
 import sys
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
+import hybridnav
 from hybridnav._base import jit
 
 
@@ -19,6 +21,9 @@ def main(listed: Path, folder: Path) -> None:
     jit.SHIPPED = folder
     jit.LEVELS.clear()  # what another level has does not count
     level = os.environ["NUMBA_CPU_NAME"]
+    for each in walk_packages(hybridnav.__path__, "hybridnav."):
+        if ".kernels." in each.name:  # some say what stands for a function of another module
+            import_module(each.name)
     kernels = pickle.loads(listed.read_bytes())  # noqa: S301 - our own
     for (module, name), signatures in kernels.items():
         kernel = getattr(import_module(module), name)
