@@ -287,10 +287,7 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
 
 @pytest.mark.parametrize("endpoints", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
 def test_json_has_the_same_keys_however_ends_are_given(
-    cli: Any,
-    query: Any,
-    tmp_path: Any,
-    endpoints: Any,
+    cli: Any, query: Any, tmp_path: Any, endpoints: Any
 ) -> None:
     closed = ("--blocked", tmp_path / "line.geojson")
     far = [text.replace("7.5,5.5", "99,99") for text in endpoints]
@@ -305,9 +302,7 @@ def test_json_has_the_same_keys_however_ends_are_given(
 
 
 def test_a_comparison_closes_the_same_for_the_whole_grid(
-    cli: Any,
-    query: Any,
-    tmp_path: Any,
+    cli: Any, query: Any, tmp_path: Any
 ) -> None:
     closed = ("--preset", "octile", "--blocked", tmp_path / "mask.png")
     done = cli(*query, *POINTS, "--compare", *closed, "--json").answer
@@ -338,13 +333,7 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     ],
 )
 def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
-    cli: Any,
-    query: Any,
-    tmp_path: Any,
-    endpoints: Any,
-    closed: str,
-    code: int,
-    words: list[str],
+    cli: Any, query: Any, tmp_path: Any, endpoints: Any, closed: str, code: int, words: list[str]
 ) -> None:
     closed = {"BAD": str(tmp_path / "bad.geojson")}.get(closed, closed)
     assert cli(*query, *endpoints, "--blocked", closed).refuses(code, *words)

@@ -28,23 +28,11 @@ if TYPE_CHECKING:
 
 MAPS = Path(__file__).parents[2] / "maps"
 OPEN = drawn(*["." * 9] * 6)
-SEALED = drawn(
-    ".........",
-    "..####...",
-    "..#..#...",
-    "..####...",
-    ".........",
-)
+SEALED = drawn(".........", "..####...", "..#..#...", "..####...", ".........")
 MIXED = drawn("..??..", "..??#.", "..??..")
 # Two rooms that nothing can merge, one free and one unexplored, with a door near either end.
 TWO_DOORS = drawn(
-    "....#????",
-    "....?????",
-    "....#????",
-    "....#????",
-    "....#????",
-    "....#????",
-    ".....????",
+    "....#????", "....?????", "....#????", "....#????", "....#????", "....#????", ".....????"
 )
 WITH_UNEXPLORED = hn.load_preset("paper", overrides=["planner.allow_unexplored=true"])
 

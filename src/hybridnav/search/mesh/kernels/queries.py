@@ -407,16 +407,11 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1
-                records[other, direction], records[other, 2 + direction] = (
-                    further,
-                    node << 32 | behind + arc,
-                )
+                by = node << 32 | behind + arc
+                records[other, direction], records[other, 2 + direction] = further, by
                 push(heap, size, estimate, other)
                 size += 1
-        if direction:
-            to_goal = size
-        else:
-            to_start = size
+        to_start, to_goal = (to_start, size) if direction else (size, to_goal)
     counts[SIZE], counts[MARKED], counts[TOUCHED] = to_start, to_goal, n_touched
     # A path that is not found yet passes a corner in one of the heaps.
     if counts[LAST] >= 0:
