@@ -60,7 +60,7 @@ class NamedMethod:
     Examples
     --------
     >>> from hybridnav.harness import NamedMethod
-    >>> NamedMethod("baseline", "HPA*", settings={"cluster_cells": 20}).kind
+    >>> NamedMethod("baseline", "weighted A*", settings={"weight": 2.0}).kind
     'baseline'
     """
 
@@ -113,8 +113,10 @@ def class_of(path: str) -> Any:
     try:
         return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # a module of others may fail in any way
-        reason = f"{type(error).__name__}: {error}"
-        raise InvalidValueError(f"baseline {path}: {' '.join(reason.split())}") from error
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        if module.startswith("benchmarks.") and "benchmarks" not in sys.modules:
+            reason += "; it is in a checkout alone: set PYTHONPATH to its folder"
+        raise InvalidValueError(f"baseline {path}: {reason}") from error
 
 
 def source_hash(path: str) -> str:
