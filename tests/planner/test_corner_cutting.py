@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
+from benchmarks.baselines.hpa import HpaStar
+from benchmarks.baselines.thrun import ThrunMap
 from hybridnav.harness.baselines.grid import GridAstar
-from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
-from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.maps import CellClass
 from tests.strategies import MAX_SIDE, drawn, examples
 

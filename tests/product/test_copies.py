@@ -19,11 +19,11 @@ from numba.core.registry import CPUDispatcher
 from shapely import box
 
 import hybridnav as hn
+from benchmarks.baselines.hpa import HpaStar
+from benchmarks.baselines.thrun import ThrunMap
 from hybridnav._base.threads import Pool
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
-from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
-from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.planner.batch import PlanBatch
 from hybridnav.search.grid_search import GridSearch
 from tests.strategies import Scene, examples, scenes

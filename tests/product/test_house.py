@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 60_566,
-    "lines": 98_921,
-    "files": 393,
-    "code outside ext": 42_852,
+    "code": 59_914,
+    "lines": 97_939,
+    "files": 387,
+    "code outside ext": 42_200,
     "lines of a file, median": 279,
     "lines of a file, most": 450,
     "packages": 12,

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from benchmarks.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.grid import WeightedAstar
-from hybridnav.harness.baselines.hpa import HpaStar
 from tests.interrupts import Struck, lines_of, timer
 from tests.product.test_threads import OVER_CELLS, grid_with_rooms, told
 from tests.strategies import examples, occupancy_grid

@@ -12,10 +12,10 @@ from numba.core.dispatcher import Dispatcher
 
 import hybridnav
 import hybridnav as hn
+from benchmarks.baselines.hpa import HpaStar
+from benchmarks.baselines.thrun import ThrunMap
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
-from hybridnav.harness.baselines.hpa import HpaStar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
-from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planner import load_preset
 from tests.strategies import occupancy_grid

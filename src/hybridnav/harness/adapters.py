@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner, PlanStatus
@@ -208,29 +207,6 @@ def _nbytes(thing: Any, seen: set[int]) -> int:
     if not module.startswith("hybridnav.") or module.startswith("hybridnav.maps"):
         return 0
     return _nbytes(getattr(thing, "__dict__", {}), seen)
-
-
-_MOST_RADIUS_M = 1e3
-
-
-def checked_grid(given: Any) -> dict[str, Any]:
-    """Return the settings of a grid of its own as a file of methods states them.
-
-    Raises `InvalidValueError` when a key or a value is not known.
-    """
-    if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
-        raise InvalidValueError(
-            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {brief(given)}"
-        )
-    radius = given.get("robot_radius_m", 0)
-    is_number = isinstance(radius, (int, float)) and not isinstance(radius, bool)
-    if not is_number or not 0 <= radius <= _MOST_RADIUS_M:
-        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {brief(radius)}")
-    if not isinstance(given.get("corner_cutting", False), bool):
-        raise InvalidValueError(
-            f"grid: corner_cutting is true or false, got {brief(given['corner_cutting'])}"
-        )
-    return dict(given)
 
 
 class OnOwnGrid:

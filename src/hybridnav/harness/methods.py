@@ -39,15 +39,15 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "grid-astar": ("hybridnav.harness.baselines.grid:GridAstar", {}),
     "grid-dijkstra": ("hybridnav.harness.baselines.grid:GridDijkstra", {}),
     "weighted-astar": ("hybridnav.harness.baselines.grid:WeightedAstar", {}),
-    "hpa-star": ("hybridnav.harness.baselines.hpa:HpaStar", {}),
-    "hpa-star-raw": ("hybridnav.harness.baselines.hpa:HpaStar", {"smooth": False}),
-    "hpa-star-lines": ("hybridnav.harness.baselines.hpa:HpaStar", {"line_cells": 1000}),
+    "hpa-star": ("benchmarks.baselines.hpa:HpaStar", {}),
+    "hpa-star-raw": ("benchmarks.baselines.hpa:HpaStar", {"smooth": False}),
+    "hpa-star-lines": ("benchmarks.baselines.hpa:HpaStar", {"line_cells": 1000}),
     "simple-graph": ("hybridnav.harness.baselines.regions:SimpleGraphPyramid", {}),
-    "thrun": ("hybridnav.harness.baselines.thrun:ThrunMap", {}),
+    "thrun": ("benchmarks.baselines.thrun:ThrunMap", {}),
 }
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a
-`TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
-as `module:class`."""
+`TopologicalMap`, the others from an `OccupancyGrid`. Those in `benchmarks` are in a checkout alone.
+Work outside this package names its own class as `module:class`."""
 
 ON_PLACES = frozenset({"simple-graph"})
 

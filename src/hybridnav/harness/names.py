@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.adapters import checked_grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,6 +50,7 @@ _KEYS = ("name", "baseline", "class", "preset", "graph", "settings", "grid")
 _SOURCES = _KEYS[1:5]
 _HASH_DIGITS = 12
 _MOST_LETTERS, _MOST_LETTERS_OF_SETTINGS = 60, 200
+_MOST_RADIUS_M = 1e3
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class NamedMethod:
     Examples
     --------
     >>> from hybridnav.harness import NamedMethod
-    >>> NamedMethod("baseline", "HPA*", settings={"cluster_cells": 20}).kind
+    >>> NamedMethod("baseline", "weighted A*", settings={"weight": 2.0}).kind
     'baseline'
     """
 
@@ -107,8 +107,10 @@ def class_of(path: str) -> Any:
     try:
         return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # a module of others may fail in any way
-        reason = f"{type(error).__name__}: {error}"
-        raise InvalidValueError(f"baseline {path}: {' '.join(reason.split())}") from error
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        if module.startswith("benchmarks.") and "benchmarks" not in sys.modules:
+            reason += "; it is in a checkout alone: set PYTHONPATH to its folder"
+        raise InvalidValueError(f"baseline {path}: {reason}") from error
 
 
 def source_hash(path: str) -> str:
@@ -236,7 +238,30 @@ def _entry(entry: Any, where: str) -> NamedMethod:
     except TypeError as error:
         raise InvalidValueError(f"{where}: settings must be numbers and texts: {error}") from None
     try:
-        grid = checked_grid(entry.get("grid") or {})
+        grid = _checked_grid(entry.get("grid") or {})
     except InvalidValueError as error:
         raise InvalidValueError(f"{where}: {error}") from None
     return NamedMethod(kinds[0], source, " ".join(name.split())[:_MOST_LETTERS], settings, grid)
+
+
+def _checked_grid(given: Any) -> dict[str, Any]:
+    """Return the settings of a grid of its own as a file of methods states them.
+
+    Raises
+    ------
+    InvalidValueError
+        When a key or a value is not known.
+    """
+    if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
+        raise InvalidValueError(
+            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {brief(given)}"
+        )
+    radius = given.get("robot_radius_m", 0)
+    is_number = isinstance(radius, (int, float)) and not isinstance(radius, bool)
+    if not is_number or not 0 <= radius <= _MOST_RADIUS_M:
+        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {brief(radius)}")
+    if not isinstance(given.get("corner_cutting", False), bool):
+        raise InvalidValueError(
+            f"grid: corner_cutting is true or false, got {brief(given['corner_cutting'])}"
+        )
+    return dict(given)

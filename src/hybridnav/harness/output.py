@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.files import replace_file, without_controls
+from hybridnav.harness import columns, tables
 from hybridnav.harness.analysis import Study, load_study, pairs_in_common
-from hybridnav.harness.columns import (
-    CONSISTENCY_COLUMNS,
-    DEFINITION,
-    EFFICIENCY_COLUMNS,
-    MEANINGS,
-    loss_columns,
-    rows_of_map,
-    rows_of_study,
-)
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
@@ -28,16 +20,6 @@ from hybridnav.harness.report import (
     counter_examples,
     render_report,
 )
-from hybridnav.harness.tables import (
-    METHOD_COLUMNS,
-    Table,
-    ahead_of_presets,
-    markdown_of,
-    rows_of_methods,
-    table_of,
-    to_csv,
-    with_values,
-)
 from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
 
 if TYPE_CHECKING:
@@ -46,7 +28,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.harness.report import CaseKey
-    from hybridnav.harness.tables import Row
     from hybridnav.harness.yardstick import Optimum, Yardstick
 
 _EFFICIENCY = "Efficiency"
@@ -86,18 +67,18 @@ def write_outputs(
     []
     """
     study = load_study(folder, root=root, metric=metric)
-    overall = rows_of_study(study)
-    by_map = {name: rows_of_map(study, name) for name in study.maps}
-    replace_file(folder / "summary.csv", to_csv(overall).encode())
+    overall = columns.rows_of_study(study)
+    by_map = {name: columns.rows_of_map(study, name) for name in study.maps}
+    replace_file(folder / "summary.csv", tables.to_csv(overall).encode())
     every = [row for rows in by_map.values() for row in rows]
-    replace_file(folder / "maps.csv", to_csv(every).encode())
+    replace_file(folder / "maps.csv", tables.to_csv(every).encode())
     replace_file(folder / "summary.md", markdown(overall, study).encode())
     report = report_of(study, title, overall, by_map)
     replace_file(folder / "report.html", render_report(report).encode())
     return study
 
 
-def markdown(overall: Sequence[Row], study: Study) -> str:
+def markdown(overall: Sequence[tables.Row], study: Study) -> str:
     """Return the tables of all maps together, one for consistency, one for the losses over each
     optimum, one for efficiency."""
     checked = study.any_angle_checked
@@ -106,10 +87,10 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
         f"## Consistency\n\n{study.checks:,} answers checked, {len(study.faults)} "
         f"counter-examples, {study.failures} queries without an answer."
         f"{f' Checked any-angle: {checked}.' if checked else ''}\n\n"
-        f"{markdown_of(consistency.columns, consistency.rows)}\n"
+        f"{tables.markdown_of(consistency.columns, consistency.rows)}\n"
     )
     methods = _methods(study)
-    text += f"## Methods\n\n{markdown_of(methods.columns, methods.rows)}\n"
+    text += f"## Methods\n\n{tables.markdown_of(methods.columns, methods.rows)}\n"
     failures = failures_of(study)
     if failures:
         text += "## Methods without answers\n\n"
@@ -119,7 +100,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
     for table in others:
         # Warnings are about times, so they stand in front of the table that has them.
         text += warnings if table.caption == _EFFICIENCY else ""
-        text += f"## {table.caption}\n\n{markdown_of(table.columns, table.rows)}\n"
+        text += f"## {table.caption}\n\n{tables.markdown_of(table.columns, table.rows)}\n"
         text += f"{table.note}\n\n" if table.note else ""
     text += "" if any(table.caption == _EFFICIENCY for table in others) else warnings
     return without_controls(text.rstrip("\n") + "\n")
@@ -128,8 +109,8 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
 def report_of(
     study: Study,
     title: str,
-    overall: Sequence[Row],
-    by_map: dict[str, list[Row]],
+    overall: Sequence[tables.Row],
+    by_map: dict[str, list[tables.Row]],
     *,
     first: int = 1,
 ) -> ReportData:
@@ -175,8 +156,10 @@ def report_of(
         maps=maps,
         failures=failures_of(study),
         warnings=study.warnings,
-        definition=DEFINITION,
-        meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
+        definition=columns.DEFINITION,
+        meanings=[
+            (column, columns.MEANINGS[column]) for column in used if column in columns.MEANINGS
+        ],
         overall_losses={label: _losses(study.of_method(label), study) for label in several},
         overall_times_ms={label: _median_ms(study.of_method(label), study) for label in several},
         metric_of={
@@ -185,7 +168,7 @@ def report_of(
     )
 
 
-def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
+def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[tables.Row]:
     """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
     for each method on a map, over the pairs that all methods solved."""
     outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
@@ -194,7 +177,7 @@ def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
     for outcome in outcomes:
         buckets = distance_buckets(outcome.optima_m)
         losses = np.where(outcome.among(common), outcome.losses_over(optimum), math.nan)
-        row: Row = {"method": outcome.label}
+        row: tables.Row = {"method": outcome.label}
         for at, label in enumerate(buckets.labels):
             inside = losses[(buckets.indices == at) & np.isfinite(losses)]
             if len(inside):
@@ -244,42 +227,44 @@ def _machines(study: Study) -> dict[str, str]:
     return {key: ", ".join(values) for key, values in found.items()}
 
 
-def _methods(study: Study) -> Table:
-    return table_of(rows_of_methods(study), METHOD_COLUMNS, "Versions and settings")
+def _methods(study: Study) -> tables.Table:
+    return tables.table_of(
+        tables.rows_of_methods(study), tables.METHOD_COLUMNS, "Versions and settings"
+    )
 
 
-def _tables(study: Study, rows: Sequence[Row]) -> list[Table]:
+def _tables(study: Study, rows: Sequence[tables.Row]) -> list[tables.Table]:
     """Return the tables of Thrun's three criteria: one of losses over each optimum."""
     presets = study.presets
-    tables = [table_of(rows, CONSISTENCY_COLUMNS, "Consistency")]
+    found = [tables.table_of(rows, columns.CONSISTENCY_COLUMNS, "Consistency")]
     for optimum in YARDSTICKS[study.metric]:
-        known = with_values(rows, f"{optimum} loss mean %")
+        known = tables.with_values(rows, f"{optimum} loss mean %")
         if known:
-            columns = loss_columns(optimum)
-            note = ahead_of_presets(known, columns, presets)
-            tables.append(table_of(known, columns, f"Loss over {OPTIMA[optimum]}", note))
-    timed = any(with_values(rows, column) for column in EFFICIENCY_COLUMNS)
+            chosen = columns.loss_columns(optimum)
+            note = tables.ahead_of_presets(known, chosen, presets)
+            found.append(tables.table_of(known, chosen, f"Loss over {OPTIMA[optimum]}", note))
+    timed = any(tables.with_values(rows, column) for column in columns.EFFICIENCY_COLUMNS)
     if timed:
-        note = ahead_of_presets(rows, EFFICIENCY_COLUMNS, presets)
-        tables.append(table_of(rows, EFFICIENCY_COLUMNS, _EFFICIENCY, note))
-    return tables
+        note = tables.ahead_of_presets(rows, columns.EFFICIENCY_COLUMNS, presets)
+        found.append(tables.table_of(rows, columns.EFFICIENCY_COLUMNS, _EFFICIENCY, note))
+    return found
 
 
 def _section(
-    study: Study, name: str, rows: list[Row], number: int, drawn: dict[CaseKey, str]
+    study: Study, name: str, rows: list[tables.Row], number: int, drawn: dict[CaseKey, str]
 ) -> MapSection:
     """Return the section of a map; the anchors of its pictures are added to `drawn`."""
     outcomes = study.of_map(name)
     charted = [outcome for outcome in _drawn(study, outcomes) if outcome.is_asked]
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
-    tables = _tables(study, rows)
+    found = _tables(study, rows)
     for optimum in YARDSTICKS[study.metric]:
         distance = _rows_by_distance(study, name, optimum)
-        columns = [key for row in distance for key in row if key != "method"]
-        if columns:
+        chosen = [key for row in distance for key in row if key != "method"]
+        if chosen:
             caption = _BY_DISTANCE.format(OPTIMA[optimum])
-            tables.append(table_of(distance, list(dict.fromkeys(columns)), caption))
+            found.append(tables.table_of(distance, list(dict.fromkeys(chosen)), caption))
     cases = [case for outcome in outcomes for case in cases_of(outcome)]
     for at, (key, _) in enumerate(cases, start=1):
         drawn.setdefault(key, f"case-{number}-{at}")
@@ -291,7 +276,7 @@ def _section(
             ("robot radius", f"{first.get('robot_radius_m', 0):g} m"),
             ("SHA-256", str(first["map_sha"])[:16]),
         ],
-        tables=tables,
+        tables=found,
         losses={outcome.label: _losses([outcome], study) for outcome in charted},
         times_ms={outcome.label: _median_ms([outcome], study) for outcome in charted},
         worst=[case for _, case in cases],

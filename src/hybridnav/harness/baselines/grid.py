@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav._base.moves import legal_moves, length_in_cells, path_length_in_cells, trace
 from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines.kernels import weighted as _weighted_kernels
+from hybridnav.harness.baselines import kernels as _kernels
 from hybridnav.harness.baselines.regions import Cell, CostClaim, MethodResult, array_bytes
 from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch
@@ -82,7 +82,7 @@ class GridDijkstra:
         """Find a shortest path between two free cells; the bound is 1."""
         began = time.perf_counter()
         with self._works.lent() as work:
-            found, expanded = work.search(_weighted_kernels.dijkstra, start, goal)
+            found, expanded = work.search(_kernels.dijkstra, start, goal)
             cells = work.path(start, goal) if found else None
         seconds = {"refine": time.perf_counter() - began}
         bound = 1.0 if found else math.inf
@@ -119,9 +119,7 @@ class WeightedAstar:
         shortest."""
         began = time.perf_counter()
         with self._works.lent() as work:
-            lower, expanded = work.search(
-                _weighted_kernels.weighted_astar, start, goal, self._weight
-            )
+            lower, expanded = work.search(_kernels.weighted_astar, start, goal, self._weight)
             cells = work.path(start, goal) if lower >= 0 else None
         bound = math.inf if cells is None else self._bound(cells, lower)
         seconds = {"refine": time.perf_counter() - began}

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.baselines.kernels import hpa as _hpa_kernels
+from benchmarks.baselines.kernels.hpa import AbstractGraph
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import STRAIGHT, legal_moves
 from hybridnav._base.threads import Pool
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines.kernels import hpa as _hpa_kernels
-from hybridnav.harness.baselines.kernels.hpa import AbstractGraph
 from hybridnav.harness.baselines.regions import CUT_CORNERS, Cell, MethodResult, array_bytes
 from hybridnav.maps import CellClass
 
@@ -57,7 +57,7 @@ class HpaStar:
         smooth: bool = True,
         line_cells: int | None = None,
     ) -> None:
-        if cluster_cells < 2:  # noqa: PLR2004 - the least square that is no single cell
+        if cluster_cells < 2:
             raise InvalidValueError(f"clusters must be at least 2 cells wide, got {cluster_cells}")
         if line_cells is not None and line_cells < 1:
             raise InvalidValueError(f"lines must be at least 1 move long, got {line_cells}")

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
+from benchmarks.baselines.hpa import HpaStar
+from benchmarks.baselines.thrun import ThrunMap
 from hybridnav._base.moves import length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines import MethodResult
-from hybridnav.harness.baselines.hpa import HpaStar
-from hybridnav.harness.baselines.thrun import ThrunMap
 from hybridnav.maps import CellClass
 from hybridnav.maps.files.movingai import load_movingai_map, load_scenarios
 from hybridnav.search.grid_search import GridSearch

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.baselines.kernels import thrun as kernels
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines.kernels import thrun as kernels
 from hybridnav.harness.baselines.regions import RegionPlanner, joined_regions
 from hybridnav.maps import CellClass
 from hybridnav.route.coarse import ArcSearch
@@ -186,7 +186,7 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
     run = runs[candidates].astype(np.int64) - 1
     diagram = clearance > 0
     n_around = ndimage.convolve(diagram.astype(np.int8), _AROUND.astype(np.int8), mode="constant")
-    exits = diagram & ~candidates & (n_around > 2)  # noqa: PLR2004 - no end: itself and one more
+    exits = diagram & ~candidates & (n_around > 2)
     around = cells[:, None, :] + _STEPS
     rows, cols = around[..., 0], around[..., 1]
     leads_out = exits[rows, cols] & (clearance[rows, cols] >= clearance[candidates][:, None])
@@ -199,7 +199,7 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
     order = np.lexsort((squared, run))
     nearest = cells[order[np.searchsorted(run[order], np.arange(n_runs))]]
     chosen = np.zeros_like(candidates)
-    chosen[tuple(nearest[n_exits >= 2].T)] = True  # noqa: PLR2004 - in and out
+    chosen[tuple(nearest[n_exits >= 2].T)] = True
     return chosen
 
 

@@ -1,0 +1,1 @@
+"""Baselines of the study alone: HPA* on clusters of cells, and Thrun's regions."""
