@@ -173,7 +173,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     labels
         The arrays of `HubLabels`.
     where
-        See `look_from_endpoints`.
+        See `look_round`.
     work
         Room for the corners of both ends: int8 (2, n) whether the end sees each (1), or not (-1),
         or it is not known (0); int32 (2, n) their views; int64 (2, n) distances to them; int64
