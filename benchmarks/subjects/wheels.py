@@ -2,10 +2,9 @@
 
 For each Python `EXERCISE` runs with a wheel in an environment of its own. What it compiles is
 compiled for the levels of x86-64 in `hybridnav._base.jit.LEVELS` and packed, until it compiles
-nothing; it begins with the kernels that this checkout has compiled, the next Python with those of
-the one before. Then, in a home that cannot be written, the answers of `tests.answers` must be those
-of a run that compiles for this processor, bit for bit, with nothing compiled. Exits with 1 where
-one fails.
+nothing; the next Python begins with the kernels of the one before. Then, in a home that cannot be
+written, the answers of `tests.answers` must be those of a run that compiles for this processor, bit
+for bit, with nothing compiled. Exits with 1 where one fails.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ PACKAGES = ("hypothesis", "pytest", "nbclient", "nbformat", "ipykernel", "rosbag
 TIMED = ("shortest", "paper", "robot", "ompl")
 """Presets whose first plan is timed."""
 ROUNDS = 3
-"""Times that what was compiled is packed: the second wheel should do."""
+"""Times that what was compiled is packed: the first wheel has nothing, the second should do."""
 TAG = f"manylinux_2_28_{platform.machine()}"
 """llvmlite's own wheels need as much."""
 COUNTED = """
@@ -215,7 +214,6 @@ def main(given: Namespace) -> int:
         raise Refused("the tree is not clean: commit first, kernels are built from commits")
     given.out.mkdir(parents=True, exist_ok=True)
     kernels: Kernels = {}
-    take_kernels(ROOT / "src", kernels)
     is_fine = []
     for python in given.python:
         with tempfile.TemporaryDirectory() as scratch:
