@@ -221,6 +221,22 @@ def test_a_path_may_turn_at_a_corner_and_follow_walls() -> None:
         assert found.length_cells == pytest.approx(2 * math.hypot(0.5, 2) / 2 + 3.5)
 
 
+def test_intervals_lead_round_the_end_of_a_side_on_whose_line_the_start_lies() -> None:
+    rows = (
+        "...#......#.....#",
+        "...#.......#.....",
+        ".................",
+        "....##...........",
+        ".......#..##.....",
+        "..#..............",
+    )
+    free = np.array([[cell == "." for cell in row] for row in rows])
+    path = MeshSearch(build_mesh(free)).path(((0, 11), (0, 1)), ((1.0, 11.5), (0.0, 2.0)))
+    bends = np.array([(1, 11.5), (1, 12), (2, 12), (2, 3), (0, 2)])
+    np.testing.assert_array_equal(path.positions, bends)
+    assert path.lower_bound_cells == path.length_cells == pytest.approx(1.5 + 9 + math.sqrt(5))
+
+
 def test_maps_of_one_kind_of_cell() -> None:
     assert build_mesh(np.zeros((3, 4), np.bool_)).n_polygons == 0
     for search in searches(build_mesh(np.ones((3, 4), np.bool_))):

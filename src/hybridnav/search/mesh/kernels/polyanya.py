@@ -73,7 +73,9 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = math.hypot(x - sx, y - sy)
-            key = g + estimate(x, y, wx, wy, ux, uy, tx, ty)
+            # From an end of the side the way to the goal need not lead through the rest of the side.
+            straight = math.hypot(tx - x, ty - y)
+            key = g + (estimate(x, y, wx, wy, ux, uy, tx, ty) if root < 0 else straight)
             if key < bounds[UPPER]:
                 put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
                 size = push((keys, values), size, key, n)
