@@ -16,16 +16,8 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_points
 from hybridnav.planner.blocked import as_blocked
 from hybridnav.topology import TopologicalMap
-from hybridnav.viz import style
+from hybridnav.viz import layout, style
 from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
-from hybridnav.viz.layout import (
-    LABELS,
-    add_legend,
-    add_title,
-    finish_with_axes,
-    fit_height,
-    label_axes,
-)
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
 if TYPE_CHECKING:
@@ -88,7 +80,7 @@ def plot_map(
     entries += ground_entries(grid)
     rows, cols = grid.shape
     words = [grid.name, f"{cols} x {rows} cells of {grid.resolution_m:g} m"]
-    finish_with_axes(canvas, entries, words if title is None else [title])
+    layout.finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
 
 
@@ -142,7 +134,7 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
         entries.insert(0, _draw_arcs(canvas, drawn, self_loops=self_loops))
     n_free = int(drawn.free.sum())
     words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
-    finish_with_axes(canvas, entries, words if title is None else [title])
+    layout.finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
 
 
@@ -177,7 +169,7 @@ def plot_level(
     if level.n_vertices <= MAX_VERTICES_WITH_ARCS:
         entries.insert(0, _draw_arcs(canvas, drawn))
     sizes = f"{level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
-    finish_with_axes(canvas, entries, [f"{level.grid.name}, level {level.index}: {sizes}"])
+    layout.finish_with_axes(canvas, entries, [f"{level.grid.name}, level {level.index}: {sizes}"])
     return canvas.ax
 
 
@@ -392,13 +384,15 @@ def _draw_paths(canvas: Canvas, paths: Mapping[str, ArrayLike]) -> list[Entry]:
 def _finish(canvas: Canvas, entries: list[Entry], words: list[str], shown: ScalarMappable) -> None:
     """Add the title, axes in metres, legend and colour bar."""
     ax, font = canvas.ax, canvas.sizes.font
-    label_axes(canvas)
-    add_title(canvas, words)
-    fit_height(canvas, add_legend(canvas, entries, bar=0, below=(LABELS + _BAR) * font))
+    layout.label_axes(canvas)
+    layout.add_title(canvas, words)
+    layout.fit_height(
+        canvas, layout.add_legend(canvas, entries, bar=0, below=(layout.LABELS + _BAR) * font)
+    )
     points = float(ax.get_window_extent().height) * 72 / ax.figure.dpi
     place = (
         _BAR_LEFT,
-        -(LABELS + _BAR_HEIGHT) * font / points,
+        -(layout.LABELS + _BAR_HEIGHT) * font / points,
         _BAR_WIDTH,
         _BAR_HEIGHT * font / points,
     )

@@ -13,18 +13,8 @@ from hybridnav.maps import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.maps.files import load_map
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.planner import Preset, PyramidSettings, load_preset
-from hybridnav.planner.saved import parts
+from hybridnav.planner.saved import parts, structures
 from hybridnav.planner.saved.container import read_parts
-from hybridnav.planner.saved.structures import (
-    BUILDING,
-    GONE,
-    GRID,
-    KINDS,
-    PRESET,
-    PYRAMID,
-    ROOMS,
-    refusal,
-)
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
@@ -79,7 +69,9 @@ class Model:
         self._read: dict[str, Any] = {}
         self._reading = threading.RLock()
         if filed:
-            self._sizes = parts.sizes_of(self._of_kind(GRID.kind)[0], max_cells=max_cells)
+            self._sizes = parts.sizes_of(
+                self._of_kind(structures.GRID.kind)[0], max_cells=max_cells
+            )
 
     def __repr__(self) -> str:
         kinds = ", ".join(dict.fromkeys(part.kind for part in self._filed))
@@ -98,7 +90,7 @@ class Model:
     @property
     def presets(self) -> tuple[Preset, ...]:
         """Presets of the planners that the model was saved with; none for a loaded map."""
-        return tuple(map(parts.preset_of, self._of_kind(PRESET.kind)))
+        return tuple(map(parts.preset_of, self._of_kind(structures.PRESET.kind)))
 
     @property
     def rooms(self) -> RoomLabels | None:
@@ -122,14 +114,14 @@ class Model:
     def _read_grid(self) -> OccupancyGrid:
         if self._grid is not None:
             return self._grid
-        return parts.grid_of(self._of_kind(GRID.kind)[0], self._sizes)
+        return parts.grid_of(self._of_kind(structures.GRID.kind)[0], self._sizes)
 
     def _read_rooms(self) -> RoomLabels | None:
-        found = self._of_kind(ROOMS.kind)
+        found = self._of_kind(structures.ROOMS.kind)
         return parts.rooms_of(found[0], self._sizes) if found else None
 
     def _read_topology(self) -> TopologicalMap:
-        found = self._of_kind(PYRAMID.kind)
+        found = self._of_kind(structures.PYRAMID.kind)
         if found:
             pyramid = parts.pyramid_of(found[0], self._sizes, self.grid, self.rooms)
             return TopologicalMap(pyramid)
@@ -194,7 +186,7 @@ class Model:
         rooms
             `rooms`, other ones, or None for none.
         """
-        found = self._of_kind(PYRAMID.kind)
+        found = self._of_kind(structures.PYRAMID.kind)
         own = parts.pyramid_settings(found[0]) if found else {}
         if rooms is self.rooms and own.items() <= settings.model_dump().items() and found:
             return self.topology
@@ -211,11 +203,11 @@ class Model:
         preset = self._own_preset if preset is None else preset
         made = {}
         if self._filed:
-            values = parts.grid_settings(self._of_kind(GRID.kind)[0])
+            values = parts.grid_settings(self._of_kind(structures.GRID.kind)[0])
             made["robot_radius_m"] = values["robot_radius_m"]
         elif self._grid is not None:
             made["robot_radius_m"] = self._grid.robot_radius_m
-        for found in self._of_kind(PYRAMID.kind):
+        for found in self._of_kind(structures.PYRAMID.kind):
             made |= parts.pyramid_settings(found)
         pyramid = preset.pyramid.model_copy(update=made)
         return preset.model_copy(update={"pyramid": pyramid})
@@ -349,7 +341,7 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     """Open a model; see `load`."""
     check_max_cells(max_cells)
     filed = read_parts(path)
-    if filed and filed[0].kind == BUILDING.kind:
+    if filed and filed[0].kind == structures.BUILDING.kind:
         raise ModelError(
             f"model {printable(path)}: it is that of a building, expected one of a map: load it "
             "with load_building"
@@ -363,13 +355,17 @@ def model_of(filed: Sequence[FiledPart], where: str, max_cells: int) -> Model:
     Raises `ModelError` when they are not those of one map.
     """
     for part in filed:
-        if part.kind in GONE:
-            raise refusal(part, "no planner uses portals any more")
-        if part.kind not in KINDS:
-            raise refusal(part, "no such part is known: a newer hybridnav has made it")
+        if part.kind in structures.GONE:
+            raise structures.refusal(part, "no planner uses portals any more")
+        if part.kind not in structures.KINDS:
+            raise structures.refusal(part, "no such part is known: a newer hybridnav has made it")
     # Meshes and graphs occur once for each kind of planner that they were made for.
-    made = [(part.kind, part.values.get("made_for")) for part in filed if part.kind != PRESET.kind]
-    for kind, key in [*made, (GRID.kind, None)]:
+    made = [
+        (part.kind, part.values.get("made_for"))
+        for part in filed
+        if part.kind != structures.PRESET.kind
+    ]
+    for kind, key in [*made, (structures.GRID.kind, None)]:
         if made.count((kind, key)) != 1:
             raise ModelError(
                 f"{where}: {made.count((kind, key))} parts {kind}, expected one: "
