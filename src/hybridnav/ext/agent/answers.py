@@ -18,13 +18,12 @@ from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, matching
-from hybridnav.planner import Blocked, HybridPlanner, plan_tour
+from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav.ext.page.session import Session
-    from hybridnav.planner import Tour
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
 

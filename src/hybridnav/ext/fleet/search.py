@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.links import GOAL, START, ChosenParts
-from hybridnav.planner import PlanStats, PlanStatus
+from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
+from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
+from hybridnav.planner import HybridPlanner, PlanStats, PlanStatus
 from hybridnav.planner.result import PlanDraft
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray, IntArray
-    from hybridnav.ext.fleet.floors import FloorTable
-    from hybridnav.ext.fleet.links import LinkNetwork, Part
-    from hybridnav.planner import HybridPlanner
     from hybridnav.planner.named import At
     from hybridnav.search.found import ClosedCells
 

@@ -16,7 +16,7 @@ from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area, class_reach, class_rules
 from hybridnav.maps.checks import checked_cell, checked_type
-from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid import DualGraphPyramid, Linkage
 from hybridnav.pyramid.decimation import Criterion, squared_limit
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.pyramid import Linkage
 
 
 @copies_alike

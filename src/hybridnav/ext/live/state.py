@@ -14,7 +14,7 @@ from hybridnav.ext.live.kernels.near import box_groups
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
 from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.decimation import contract_alone, contract_places, squared_limit
+from hybridnav.pyramid.decimation import Criterion, contract_alone, contract_places, squared_limit
 from hybridnav.pyramid.record import SURVIVES, BuildStats
 from hybridnav.pyramid.start import parts_of
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.pyramid.decimation import Criterion
 
 # The table of places.
 
