@@ -217,7 +217,7 @@ def pyramid_of(
 
     `box`: the cells of its grid among those of the tiles; `criterion`: that of the merge distance.
 
-    To keep the levels of places that stay, and contract the others beside them, took longer.
+    To keep the levels of places that stay, and contract the others beside them, was not faster.
     """
     place, classes = state.tiles.planes(box)
     differs = classes != grid.classes
