@@ -5,11 +5,11 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 60_414,
-    "lines": 95_760,
-    "files": 393,
-    "code outside ext": 42_700,
-    "lines of a file, median": 274,
+    "code": 60_042,
+    "lines": 95_248,
+    "files": 392,
+    "code outside ext": 42_710,
+    "lines of a file, median": 272,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_545,
+    "lines of tests": 61_526,
 }
 
 

@@ -12,7 +12,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, carry_costs
 from hybridnav.ext.live.state import PLACE, PlaceTable
-from hybridnav.ext.live.tiles import CELL, SIDE, Box, Tiles
+from hybridnav.ext.live.tiles import SIDE, Box, Tiles
 from tests.interrupts import Struck, lines_of, timer
 from tests.strategies import examples, occupancy_grid
 
@@ -25,7 +25,7 @@ SHAPE = (5 * SIDE + 9, 6 * SIDE + 3)
 def cells():
     """Return the cells of a map: patches of places, each of one class."""
     rng = np.random.default_rng(0)
-    cells = np.zeros(SHAPE, CELL)
+    cells = np.zeros(SHAPE, [("place", np.int32), ("class", np.uint8)])
     patches = rng.integers(-1, 90, (SHAPE[0] // 11 + 1, SHAPE[1] // 11 + 1))
     places = patches.repeat(11, 0).repeat(11, 1)[: SHAPE[0], : SHAPE[1]]
     cells["place"], cells["class"] = places, np.where(places < 0, 0, 1 + places % 2)
@@ -33,8 +33,8 @@ def cells():
 
 
 def tiles_of(cells):
-    tiles = Tiles({})
-    tiles.write(Box(0, 0, *SHAPE).moved(*LOW), cells)
+    tiles = Tiles()
+    tiles.put(Box(0, 0, *SHAPE).moved(*LOW), (cells["place"].copy(), cells["class"].copy()))
     tiles.close()
     return tiles
 
@@ -194,14 +194,14 @@ def test_the_table_forgets_places_that_are_no_more():
 
 def state_of(version):
     """Return all that a version consists of."""
-    state = version._state
+    state = version.state
     tiles = {
         key: [values.tobytes() for values in tile] for key, tile in state.tiles.arrays().items()
     }
     numbers = state.places.numbers()
     rows = state.places.read(numbers)
     columns = {name: rows[name].tolist() for name in rows.dtype.names}
-    return tiles, numbers, columns, state.vertex_ends.tobytes()
+    return tiles, numbers, columns
 
 
 @pytest.fixture

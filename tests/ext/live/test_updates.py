@@ -19,7 +19,7 @@ import hybridnav as hn
 from benchmarks.common import OFFICE, with_classes
 from benchmarks.subjects.online import area_of, random_changes
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live import OnlinePyramid, cellwise
+from hybridnav.ext.live import OnlinePyramid, state
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid.cracks import find_cracks
 from tests.ext.live.identities import check_identities, run_machine
@@ -40,7 +40,6 @@ def check_version(version):
     pyramid, classes = version.pyramid, version.grid.classes
     base = Base.of(classes)
     levels = list(pyramid)
-    assert version.n_levels == len(levels)
     check_base(levels[0], base)
     cap = {"limit_m": version.merge_distance_m, "resolution_m": version.grid.resolution_m}
     for level in levels:
@@ -85,17 +84,14 @@ class Robot(RuleBasedStateMachine):
 
     old: Sequence[Any] = ()
     """The version before, and the number of the place of each of its cells."""
-    keeps_levels = True
-    """Whether an update begins with the levels that were read of the version before."""
 
     @initialize(
         classes=class_grids(14),
         merge_distance_m=st.sampled_from([1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 13.0, 40.0]),
-        keeps_levels=st.booleans(),
     )
-    def start(self, classes, merge_distance_m, keeps_levels):
+    def start(self, classes, merge_distance_m):
         """Build the first version."""
-        self.classes, self.origin, self.keeps_levels = classes, (0.0, 0.0), keeps_levels
+        self.classes, self.origin = classes, (0.0, 0.0)
         self.version = version_of(classes, merge_distance_m=merge_distance_m)
 
     def follow(self, classes, *, changed, shift=(0, 0)):
@@ -106,8 +102,7 @@ class Robot(RuleBasedStateMachine):
         self.old = [(self.version, numbers_of(self.version))]
         if isinstance(changed, tuple):
             changed = area_of(frame, changed[:2], changed[2:])
-        version = self.version if self.keeps_levels else unread(self.version)
-        update = version.update(grid, changed=changed)
+        update = self.version.update(grid, changed=changed)
         check_events(self.version, update, shift)
         self.classes, self.version = classes, update.version
 
@@ -164,7 +159,7 @@ def test_versions_follow_a_map():
 
 
 def test_versions_follow_a_map_in_groups_of_changes(monkeypatch):
-    monkeypatch.setattr(cellwise, "_SMALL_CELLS", 0)
+    monkeypatch.setattr(state, "_SMALL_CELLS", 0)
     run_machine(Robot, examples(20), 8, derandomize=True)
 
 
@@ -245,7 +240,7 @@ def test_unchanged_parts_of_a_map_are_shared_between_versions():
     version = version_of(classes, merge_distance_m=20.0)
     classes[5, 5] = 0
     after = version.update(occupancy_grid(classes), changed=(5, 5, 6, 6)).version
-    old, new = version._state.tiles.arrays(), after._state.tiles.arrays()
+    old, new = version.state.tiles.arrays(), after.state.tiles.arrays()
     assert len(old) == 75
     assert sum(new[key] is tile for key, tile in old.items()) >= 73
 
@@ -323,20 +318,6 @@ def test_cells_must_stay_where_they_are(frame, message):
     version = version_of(np.ones((5, 5), np.uint8))
     with pytest.raises(InvalidValueError, match=message):
         version.update(OccupancyGrid(np.zeros((5, 5), np.float32), frame, robot_radius_m=0))
-
-
-def test_levels_that_were_read_are_not_made_again():
-    classes = np.ones((24, 60), np.uint8)
-    version = version_of(classes)
-    classes[10, 4] = 0
-    first = version.update(occupancy_grid(classes)).version
-    assert not first._state.has_levels
-    levels = first.pyramid.record
-    classes[10, 54] = 0
-    second = first.update(occupancy_grid(classes)).version
-    assert {*second._state.places.stale().tolist()} == {first.place_at((10, 54))}
-    near = np.repeat(np.arange(24 * 60) % 60 < 20, 2)
-    assert np.array_equal(levels.edge_end[near], second.pyramid.record.edge_end[near])
 
 
 def test_a_pyramid_with_rooms_is_refused():

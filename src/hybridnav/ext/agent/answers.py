@@ -18,13 +18,12 @@ from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, matching
-from hybridnav.planner import Blocked, HybridPlanner, plan_tour
+from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav.ext.page.session import Session
-    from hybridnav.planner import Tour
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.rooms import Rooms
 
@@ -180,11 +179,9 @@ class MapAnswers:
             for other in door.rooms
             if other != name
         ]
-        place = (
-            "no room"
-            if name is None
-            else f"{self._places.kind(name)} {name}".replace("room room", "room")
-        )
+        place = "no room"
+        if name is not None:
+            place = f"{self._places.kind(name)} {name}".replace("room room", "room")
         text = f"({x:g}, {y:g}) lies in {place}" + ("" if is_free else f", on {ground} ground")
         answer: dict[str, Any] = {
             "text": f"{text}.",
@@ -272,11 +269,11 @@ class MapAnswers:
         ends: Any = tour.start, tour.goal
         why = planner.explain(*ends, blocked=self._shut(asked.avoiding))
         width = places.doubled(why.widest_m)
-        limits = "nothing limits the width" if width is None else f"below {width:.3f} m wide"
+        limits = "nothing limits the width"
+        if width is not None:
+            limits = f"for all who are below {width:.3f} m wide"
         return {
-            "text": f"Yes, in {tour.length_m:.2f} m; for all who are {limits}."
-            if width is not None
-            else f"Yes, in {tour.length_m:.2f} m; {limits}.",
+            "text": f"Yes, in {tour.length_m:.2f} m; {limits}.",
             "can_reach": True,
             "length_m": round(tour.length_m, 3),
             "widest_m": width,
@@ -360,6 +357,9 @@ class MapAnswers:
     def _changed(self, closed: Blocked) -> dict[str, Any]:
         """Take over what is closed from now on."""
         self._before.append(self._closed)
+        return self._use(closed)
+
+    def _use(self, closed: Blocked) -> dict[str, Any]:
         self._closed = closed
         now = self._closed_now()
         return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
@@ -402,10 +402,8 @@ class MapAnswers:
             answer = self._rename(new, old)
             self._before.pop()
             return answer
-        self._closed = before
         self._before.pop()
-        now = self._closed_now()
-        return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
+        return self._use(before)
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
         old = self._places.meant(asked.room, list(self._rooms.names))

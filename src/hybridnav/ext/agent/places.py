@@ -13,13 +13,12 @@ import numpy as np
 from hybridnav.errors import HybridNavError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key
-from hybridnav.planner import Blocked, HybridPlanner
+from hybridnav.planner import Blocked, Explanation, HybridPlanner
 from hybridnav.planner.profile import rebuilt
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav.planner import Explanation
     from hybridnav.topology.rooms import Door, Rooms
 
 Point = tuple[float, float]

@@ -13,14 +13,13 @@ from hybridnav._base.copies import frozen
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorArea, FloorGraph
-from hybridnav.ext.fleet.links import LinkEnd
+from hybridnav.ext.fleet.links import Link, LinkEnd
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.ext.fleet.links import Link
     from hybridnav.maps import OccupancyGrid
 
 Pose = tuple[float, float, float]

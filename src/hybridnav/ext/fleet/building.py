@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import checks
-from hybridnav.ext.fleet.floors import FloorTable, building_parts
-from hybridnav.ext.fleet.links import LinkNetwork
-from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives
-from hybridnav.ext.fleet.search import LinkSearch
+from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
+from hybridnav.ext.fleet.links import Link, LinkNetwork
+from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
+from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner.blocked import as_blocked
+from hybridnav.planner.blocked import Closable, as_blocked
 from hybridnav.planner.private_rooms import Privacy
 from hybridnav.planner.profile import PROFILES, profile_of
 from hybridnav.search.found import ClosedCells
@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._base.progress import Progress
-    from hybridnav.ext.fleet.floors import Floor, Known
-    from hybridnav.ext.fleet.links import Link
-    from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.ext.fleet.search import Endpoint
     from hybridnav.planner import HybridPlanner, Journal, Profile
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.named import At
     from hybridnav.planner.saved.container import Part
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
-from hybridnav.ext.fleet.links import Link
+from hybridnav.ext.fleet.links import Link, LinkEnd
 from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
-from hybridnav.planner import HybridPlanner, PlanStatus
+from hybridnav.planner import HybridPlanner, OutOfOrder, PlanStatus, Profile
 from hybridnav.planner.endpoints import places_of_endpoints, read_point, refusal
 from hybridnav.planner.named import check_names
 from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way, under_profile
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from hybridnav._base.typing import LongArray
-    from hybridnav.ext.fleet.links import LinkEnd
     from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.planner import OutOfOrder, Profile
     from hybridnav.search.found import ClosedCells
 
 _LEAST_PART = 0.05

@@ -15,7 +15,7 @@ from hybridnav.cli import common
 from hybridnav.cli.closed import change_closed, list_closed
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
-from hybridnav.cli.reading import check_model, read_settings
+from hybridnav.cli.reading import MapOptions, check_model, read_settings
 from hybridnav.cli.rendering import in_metric, rounded_bound
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from hybridnav.cli.reading import MapOptions
     from hybridnav.ext.fleet import BuildingAlternatives
 
 

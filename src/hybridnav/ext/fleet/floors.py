@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
 from hybridnav.planner.profile import PROFILES, Profile
-from hybridnav.planner.saved.container import buffers_of
+from hybridnav.planner.saved.container import Part, buffers_of
 from hybridnav.planner.saved.parts import plain
 from hybridnav.planner.saved.structures import BUILDING, FLOOR
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import RoomLabels
     from hybridnav.planner import HybridPlanner, PlanResult
-    from hybridnav.planner.saved.container import Part
     from hybridnav.search.found import ClosedCells
 
 ROUNDED = 1.0 - 1e-12

@@ -13,10 +13,10 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
-from hybridnav.ext.fleet.graph_network import BuildingNetwork
+from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
-from hybridnav.ext.graphs.gather import Findings, shown
-from hybridnav.ext.graphs.judge import LEAST_AREA_M2, excess_of
+from hybridnav.ext.graphs.gather import Finding, Findings, shown
+from hybridnav.ext.graphs.judge import LEAST_AREA_M2, Excess, excess_of
 from hybridnav.ext.graphs.waypoint_graph import add_one_way, components_of, cut_off, one_way_nodes
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.planner.settings import ShortestSettings
@@ -27,10 +27,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.ext.fleet.building import Building
-    from hybridnav.ext.fleet.graph_network import GraphRoute, Position
     from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.ext.graphs.gather import Finding
-    from hybridnav.ext.graphs.judge import Excess
 
 
 @dataclass(frozen=True, eq=False)

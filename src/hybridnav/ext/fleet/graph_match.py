@@ -10,18 +10,16 @@ import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet.align import moved_floor, moved_point, placed_pose
+from hybridnav.ext.fleet.align import Pose, moved_floor, moved_point, placed_pose
 from hybridnav.ext.fleet.building import Building
-from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, join_links
+from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, Point, join_links
 from hybridnav.ext.graphs.attach import placed_points
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav.ext.fleet.align import Pose
     from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.link_nodes import Point
     from hybridnav.ext.fleet.links import Link
 
 AT_LINK_M = 1.0

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.ext.fleet.graph_match import AT_LINK_M
-from hybridnav.ext.fleet.link_nodes import node_at
+from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink
+from hybridnav.ext.fleet.link_nodes import FloorGraph, Point, node_at
 from hybridnav.ext.graphs import attach
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.fleet.building import Building
-    from hybridnav.ext.fleet.graph_match import MatchedGraph, MatchedLink
-    from hybridnav.ext.fleet.link_nodes import FloorGraph, Point
     from hybridnav.maps import OccupancyGrid
 
 Position = tuple[int, "FloatArray"]

@@ -11,21 +11,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 from hybridnav.errors import PlanError
-from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.links import START, Ride
-from hybridnav.ext.fleet.search import COUNTS, stats_of
-from hybridnav.planner import PlanStats, PlanStatus
+from hybridnav.ext.fleet.floors import ROUNDED, Floor
+from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
+from hybridnav.ext.fleet.search import COUNTS, Endpoint, LinkSearch, stats_of
+from hybridnav.planner import Metric, Path, PlanResult, PlanStats, PlanStatus
 from hybridnav.planner.guide import FloorChange, Instruction, Space, sentences
-from hybridnav.planner.guide.itinerary import heading_of, waypoint_text
+from hybridnav.planner.guide.itinerary import Guide, heading_of, waypoint_text
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.links import LinkNetwork, Part
-    from hybridnav.ext.fleet.search import Endpoint, LinkSearch
-    from hybridnav.planner import Metric, Path, PlanResult
-    from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.result import InstructionSource
 
 

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet import BuildingPlan
+from hybridnav.ext.fleet import Building, BuildingPlan, Floor, Link, LinkEnd
 from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, frame_axes, text_width
+from hybridnav.viz.layout import Entry, add_legend, add_scale_bar, add_title, frame_axes, text_width
 from hybridnav.viz.maps import ground_entries
 from hybridnav.viz.room_map import draw_room_cells, room_entry
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
-    from hybridnav.viz.layout import Entry
 
 _MARKS = {"lift": "s", "stairs": "^", "ramp": "D"}
 _POINTS = 6.0

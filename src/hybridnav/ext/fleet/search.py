@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.ext.fleet.floors import ROUNDED
-from hybridnav.ext.fleet.links import GOAL, START, ChosenParts
-from hybridnav.planner import PlanStats, PlanStatus
+from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
+from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
+from hybridnav.planner import HybridPlanner, PlanStats, PlanStatus
 from hybridnav.planner.result import PlanDraft
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray, IntArray
-    from hybridnav.ext.fleet.floors import FloorTable
-    from hybridnav.ext.fleet.links import LinkNetwork, Part
-    from hybridnav.planner import HybridPlanner
     from hybridnav.planner.named import At
     from hybridnav.search.found import ClosedCells
 
@@ -172,8 +169,9 @@ class LinkSearch:
         return True
 
     def _is_known(self, part: Part) -> bool:
-        """Return whether the cost of a part is known."""
-        return self._cost_of(part) is not None
+        """Return whether a part was planned, now or for a query before."""
+        costs, key = self._slot(part)
+        return not math.isnan(costs.known[key])
 
     def _plan(self, part: Part) -> None:
         """Plan one part, and take over its cost and its bound."""
@@ -269,17 +267,10 @@ class LinkSearch:
             self._of_floor[floor] = _Costs(table.lower.copy() if is_closed else table.lower, cost)
         return self._of_floor[floor]
 
-    def _cost_of(self, part: Part) -> float | None:
-        """Return the cost of a part that was planned, now or for a query before; else None."""
-        costs, key = self._slot(part)
-        cost = float(costs.known[key])
-        return None if math.isnan(cost) else cost
-
     def _expected(self, part: Part) -> float:
         """Return the cost of a part if it is known, else its lower bound."""
-        cost = self._cost_of(part)
         costs, key = self._slot(part)
-        return float(costs.lower[key]) if cost is None else cost
+        return float((costs.known if self._is_known(part) else costs.lower)[key])
 
     def _expected_on(self, floor: int) -> FloatArray:
         """Return the costs between the ends on a floor where they are known, else the bounds."""

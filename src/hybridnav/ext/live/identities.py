@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.ext.live.cellwise import CellDraft
+    from hybridnav.ext.live.state import CellDraft
 
-MOST_SIDE = 32_767
-"""Rows or columns of the largest grid: steps between cells have two bytes."""
 _ALIGNED = 1e-6
 """Part of a cell by which the origins of two grids may lie beside whole cells."""
 
@@ -74,15 +72,6 @@ def placed(
     whole = np.full(shape, nothing, array.dtype)
     whole[at[0] : at[0] + array.shape[0], at[1] : at[1] + array.shape[1]] = array
     return whole
-
-
-def check_sides(grid: OccupancyGrid) -> None:
-    """Raise `InvalidValueError` if a grid has too many rows or columns."""
-    if max(grid.shape) > MOST_SIDE:
-        raise InvalidValueError(
-            f"the grid has {grid.shape} cells, expected at most {MOST_SIDE} rows and columns: "
-            "divide the map"
-        )
 
 
 # How stable the numbers of places and rooms are over an update.

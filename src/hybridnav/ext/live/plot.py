@@ -14,10 +14,10 @@ from PIL import Image
 
 from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view, new_figure
+from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view, new_figure
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.room_map import DOOR_POINTS
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import ByteArray, IntArray, PathLike
     from hybridnav.ext.live import OnlineRooms, ReplayStep
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.viz.canvas import View
 
 _MARGINS_IN = (0.65, 0.5, 0.12, 0.3)
 """Left, below, right and above each map: its axes, their names, its title."""

@@ -10,31 +10,26 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.ext.live.cellwise import CellDraft
-from hybridnav.ext.live.identities import check_sides, settle, shift_of
-from hybridnav.ext.live.kernels import near as _ring_kernels
-from hybridnav.ext.live.state import State, pyramid_of, state_of
-from hybridnav.ext.live.tiles import NO_PLACE, Box
+from hybridnav.ext.live.identities import settle, shift_of
+from hybridnav.ext.live.state import CellDraft, State, pyramid_of, state_of
+from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area, class_reach, class_rules
 from hybridnav.maps.checks import checked_cell, checked_type
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.decimation import Criterion, contract_places
-from hybridnav.pyramid.record import SURVIVES
+from hybridnav.pyramid import DualGraphPyramid, Linkage
+from hybridnav.pyramid.decimation import Criterion, squared_limit
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.ext.live.tiles import Tiles
-    from hybridnav.pyramid import Linkage
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
 
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class OnlinePyramid:
-    """One version of a pyramid that follows its map: the places and all levels below them.
+    """One version of a pyramid that follows its map: the places; `pyramid` has all levels below.
 
     `update` returns the next version and leaves this one as it is: both share what did not change.
     A version is a value: plans on an older one go on, in any thread.
@@ -66,8 +61,8 @@ class OnlinePyramid:
     low: tuple[int, int]
     """Row and column of cell (0, 0) among the cells of the first version, negative where the map
     has grown."""
-    _criterion: Criterion = field(repr=False)
-    _state: State = field(repr=False)
+    state: State = field(repr=False)
+    """The cells and the table of places, for what follows the places."""
 
     @classmethod
     def of(cls, pyramid: DualGraphPyramid) -> OnlinePyramid:
@@ -94,18 +89,12 @@ class OnlinePyramid:
                 f"the pyramid was built with the linkage {brief(pyramid.linkage)}, expected "
                 "'throats', the default, or 'radius': places of others do not follow a map"
             )
-        check_sides(pyramid.grid)
-        # Loading a version needs no decimation.
-        from hybridnav.pyramid.decimation import squared_limit  # noqa: PLC0415
-
-        limit = squared_limit(pyramid.merge_distance_m, pyramid.grid.resolution_m)
         return cls(
             pyramid.grid,
             pyramid.merge_distance_m,
             pyramid.linkage,
             pyramid.seed,
             (0, 0),
-            Criterion(pyramid.linkage, limit, pyramid.seed),
             state_of(pyramid),
         )
 
@@ -114,9 +103,9 @@ class OnlinePyramid:
     ) -> Update:
         """Return the next version, that of a changed map.
 
-        Places that hold no changed cell keep their cells, their levels and their numbers, unless
-        they take in new cells, or may merge with what changed beside them. The other places give
-        away and take in single cells. Levels are made when they are read.
+        Places that hold no changed cell keep their cells and their numbers, unless they take in new
+        cells, or may merge with what changed beside them. The other places give away and take in
+        single cells. Levels below the places are made when they are read.
 
         Under the linkage "throats" places of different parts of the first map stay apart, and new
         places may merge with any. Only a build finds throats of new cells.
@@ -147,7 +136,6 @@ class OnlinePyramid:
         """
         checked_type("grid", grid, OccupancyGrid)
         rows, cols = shift_of(self.grid, grid, otherwise="build a new pyramid")
-        check_sides(grid)
         low = self.low[0] - rows, self.low[1] - cols
         whole = Box(0, 0, *grid.shape)
         first_row, high_row, first_col, high_col = box_of_area(changed, grid.frame, grid.shape)
@@ -159,39 +147,28 @@ class OnlinePyramid:
         apart = old.narrowed(class_reach(grid), whole)
         inside = box.common(apart)
         boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
-        state = vars(self).get("_with_levels", self._state)
-        draft = CellDraft(state, self._criterion)
+        draft = CellDraft(self.state, self._criterion)
         draft.change([part.moved(*low) for part in boxes], grid.classes, low)
         events = settle(draft)
         cells = draft.cells - np.array(low)
-        version = replace(self, grid=grid, low=low, _state=draft.close())
+        version = replace(self, grid=grid, low=low, state=draft.close())
         order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1], kind="stable")
         return Update(version, *events, frozen(cells[order]))
 
     @property
-    def state(self) -> State:
-        """The cells and the table of places, for what follows the places."""
-        return self._state
-
-    @property
     def n_places(self) -> int:
         """Places of the version."""
-        return int(self._state.vertex_ends[SURVIVES])
+        return self.state.places.count
 
     @property
-    def n_levels(self) -> int:
-        """Levels up to that of the places, the base included."""
-        return int(np.count_nonzero(self._with_levels.vertex_ends[1:SURVIVES])) + 1
-
-    @cached_property
-    def _with_levels(self) -> State:
-        """The state with all levels below the places."""
-        return with_levels(self._state, self._box(), self._criterion)
+    def _criterion(self) -> Criterion:
+        limit = squared_limit(self.merge_distance_m, self.grid.resolution_m)
+        return Criterion(self.linkage, limit, self.seed)
 
     @cached_property
     def number_of(self) -> IntArray:
         """int32 (rows, cols), the number of the place of each cell of the grid, -1 for none."""
-        return frozen(self._state.tiles.planes(self._box())[0])
+        return frozen(self.state.tiles.planes(self._box())[0])
 
     def place_at(self, cell: tuple[int, int]) -> int:
         """Return the number of the place that holds a cell (row, col) of the grid.
@@ -205,7 +182,7 @@ class OnlinePyramid:
         """
         row, col = checked_cell("cell", cell)
         row, col = row + self.low[0], col + self.low[1]
-        return int(self._state.tiles.planes(Box(row, col, row + 1, col + 1))[0][0, 0])
+        return int(self.state.tiles.planes(Box(row, col, row + 1, col + 1))[0][0, 0])
 
     def receptive_field(self, place: int) -> LongArray:
         """Return the cells of a place, int64 (n, 2), (row, col) of the grid, in the order of rows.
@@ -216,13 +193,13 @@ class OnlinePyramid:
             When the version has no such place.
         """
         is_number = isinstance(place, int | np.integer)
-        if not is_number or not self._state.places.has(place):
+        if not is_number or place not in self.state.places.numbers():
             raise InvalidValueError(
                 f"there is no place {place!r:.40} in this version, expected one of its "
                 f"{self.n_places}: an update states what became of a place"
             )
-        box = Box(*self._state.places.read([place])[0]["box"].tolist())
-        cells = np.argwhere(self._state.tiles.planes(box)[0] == place)
+        box = Box(*self.state.places.read([place])[0]["box"].tolist())
+        cells = np.argwhere(self.state.tiles.planes(box)[0] == place)
         found: LongArray = cells + np.array(box[:2]) - np.array(self.low)
         return found
 
@@ -230,15 +207,15 @@ class OnlinePyramid:
     def pyramid(self) -> DualGraphPyramid:
         """The version as a pyramid of dense arrays, with all levels below the places.
 
-        Making it takes up to three times as long as a build, far longer than an update.
+        Making it takes up to twice as long as a build, far longer than an update.
 
         Raises
         ------
         InvalidValueError
             When cells of the grid changed that no update stated.
         """
-        built = self.merge_distance_m, self.linkage, self.seed
-        return pyramid_of(self._with_levels, self._box(), self.grid, built)
+        box = self._box()
+        return pyramid_of(self.state, box, self.grid, self.merge_distance_m, self._criterion)
 
     @cached_property
     def place_numbers(self) -> LongArray:
@@ -299,64 +276,6 @@ def _outside(inner: Box, outer: Box) -> list[Box]:
         Box(low, inner.high_col, high, outer.high_col),
     ]
     return [box for box in boxes if not box.is_empty]
-
-
-# The levels below places, made when they are read.
-
-
-def with_levels(state: State, box: Box, criterion: Criterion) -> State:
-    """Return a version with all levels below the places that changed since they were made last.
-
-    Each of these places is dissolved into its cells and contracted again, beside places that stay
-    as they are, until its surviving cell alone is left.
-
-    `state`: the version; it stays as it is; `box`: all cells, by the rows and columns of the tiles;
-    `criterion`: when two fields merge; its linkage is "throats" or "radius".
-    """
-    if state.has_levels:
-        return state
-    stale = state.places.stale()
-    tiles, places = state.tiles.next_version(), state.places.next_version()
-    cells, rows = tiles.read(box), places.read(stale)
-    dissolved = _ring_kernels.index_in(cells["place"], stale)
-    gone = (dissolved > 0) | ((cells["class"] == 0) & (cells["end"] > 0))
-    ring = _ring_kernels.ring_round(gone) & (cells["place"] != NO_PLACE)
-    survivors = np.zeros(box.shape, np.bool_)
-    row, col = (rows["cell"] - np.array(box[:2])).T
-    survivors[row, col] = True
-    joins = _joins_of(tiles, box, ring, cells)
-    fields = contract_places(dissolved, survivors, (ring, joins), criterion)
-    fresh = cells["class"] * gone
-    _ring_kernels.enter(
-        tuple(cells[name] for name in ("class", "end", "parent", "edges", "place")),
-        (gone, fresh),
-        (fields.record.vertex_end, fields.record.vertex_parent, fields.record.edge_end),
-        fields.field_of,
-        cells["place"].ravel()[fields.survivors].astype(np.int64),
-    )
-    tiles.write(box, cells)
-    rows["is_stale"] = False
-    places.write(stale, rows)
-    tiles.close()
-    places.close()
-    ends = np.bincount(cells["end"].ravel(), minlength=SURVIVES + 1).astype(np.int64)
-    return State(tiles, places, ends, state.next_place)
-
-
-def _joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteArray:
-    """Return the level at which the two cells of each base edge in a ring join, flat."""
-    joins: ByteArray
-    joins, beyond = _ring_kernels.ring_joins(ring, cells["end"], cells["parent"], cells["place"])
-    beyond[:, 2:] += np.tile(np.array(box[:2]), 2)
-    for edge, reached, *cell, row, col in beyond.tolist():
-        level, first, second = reached, (cell[0], cell[1]), (row, col)
-        while first != second:
-            if tiles.end_at(first) > tiles.end_at(second):
-                first, second = second, first
-            level = max(level, tiles.end_at(first))
-            first = tiles.parent_of(first)
-        joins[edge] = level
-    return joins
 
 
 def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:

@@ -11,21 +11,17 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.identities import Flips, Numbered, flips_between
-from hybridnav.ext.live.pyramid import OnlinePyramid, changed_cells
-from hybridnav.ext.live.room_versions import OnlineRooms
-from hybridnav.maps import OccupancyGrid
+from hybridnav.ext.live.pyramid import OnlinePyramid, Update, changed_cells
+from hybridnav.ext.live.room_versions import OnlineRooms, RoomsUpdate
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
-from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid import DualGraphPyramid, Level
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from hybridnav.ext.live.mapping import LaserScan, Mapper
-    from hybridnav.ext.live.pyramid import Update
-    from hybridnav.ext.live.room_versions import RoomsUpdate
-    from hybridnav.maps import RoomLabels
-    from hybridnav.pyramid import Level
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a version of the cells and places consists of."""
+"""A version of the cells and places, and the draft of the next one."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.tiles import CELL, NO_PLACE, Box, Tiles
+from hybridnav.ext.live.kernels import merging as _merge_kernels
+from hybridnav.ext.live.kernels.cells import take_out
+from hybridnav.ext.live.kernels.near import box_groups
+from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
+from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.record import SURVIVES, BuildStats, Record
+from hybridnav.pyramid.decimation import Criterion, contract_alone, contract_places, squared_limit
+from hybridnav.pyramid.record import SURVIVES, BuildStats
+from hybridnav.pyramid.start import parts_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from hybridnav._base.typing import AnyArray, BoolArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.pyramid import Linkage
 
 # The table of places.
 
@@ -27,13 +32,12 @@ PLACE = np.dtype(
         ("cell", np.int32, (2,)),
         ("box", np.int32, (4,)),
         ("part", np.int32),
-        ("is_stale", np.bool_),
     ],
     align=True,
 )
 """A place: its cells, 0 where there is no place; its surviving cell; its least row and column, and
 the first ones beyond it; the part of the map that it lies in, which keeps it from places of other
-parts, -1 for none (see `start.parts_of`); whether the levels in it are those of older cells."""
+parts, -1 for none (see `start.parts_of`)."""
 
 
 _NONE = np.iinfo(np.int64).max
@@ -77,10 +81,6 @@ class PlaceTable:
         """How many places there were when the table was closed."""
         return self._count
 
-    def has(self, place: int) -> bool:
-        """Return whether there is such a place."""
-        return 0 <= place < _NONE and len(self.known([place])) > 0
-
     def known(self, places: Iterable[int]) -> list[int]:
         """Return those of some numbers that are places."""
         numbers = np.array([*places], np.int64)
@@ -95,16 +95,15 @@ class PlaceTable:
 
     def areas(self, places: Sequence[int]) -> dict[int, int]:
         """Return how many cells each of some places has."""
-        at = np.searchsorted(self._numbers, np.asarray(places, np.int64))
-        return dict(zip(places, self._rows["area"][at].tolist(), strict=True))
+        return dict(zip(places, self.read(places)["area"].tolist(), strict=True))
 
     def write(self, places: Sequence[int] | LongArray, rows: AnyArray) -> None:
-        """Set the rows of some places, all different."""
+        """Set the rows of some places, all different; new ones have the next numbers in turn."""
         numbers = np.asarray(places, np.int64)
         self._own()
         new = numbers[~self._has(numbers)]
         if len(new):
-            self._add(new)
+            self.append(int(new[0]), np.zeros(len(new), PLACE))
         self._rows[np.searchsorted(self._numbers, numbers)] = rows
 
     def drop(self, places: Iterable[int]) -> None:
@@ -113,10 +112,10 @@ class PlaceTable:
         self.write(gone, np.zeros(len(gone), PLACE))
 
     def columns(self) -> tuple[AnyArray, ...]:
-        """Return the numbers, and all of `PLACE` but with the parts last, to change."""
+        """Return the numbers, and all of `PLACE`, to change."""
         self._own()
         if self._columns is None:
-            names = "area", "cell", "box", "is_stale", "part"
+            names = PLACE.names or ()
             self._columns = self._numbers, *(self._rows[name] for name in names)
         return self._columns
 
@@ -124,11 +123,6 @@ class PlaceTable:
         """Return the numbers of all places from a first one on, ascending."""
         begin = int(np.searchsorted(self._numbers, first))
         found: list[int] = self._numbers[begin:][self._rows["area"][begin:] > 0].tolist()
-        return found
-
-    def stale(self) -> LongArray:
-        """Return the places with levels of older cells, int64 (n,), ascending."""
-        found: LongArray = self._numbers[self._rows["is_stale"] & (self._rows["area"] > 0)]
         return found
 
     def append(self, first: int, rows: AnyArray) -> LongArray:
@@ -169,18 +163,6 @@ class PlaceTable:
         self._numbers, self._rows, self._used = numbers, rows, len(stays)
         self._is_own, self._columns = True, None
 
-    def _add(self, numbers: LongArray) -> None:
-        """Make rows for numbers that have none."""
-        self.append(0, np.zeros(len(numbers), PLACE))
-        self._numbers[self._used - len(numbers) : self._used] = numbers
-        used = self._numbers[: self._used]
-        last = used[max(self._used - len(numbers) - 1, 0) :]
-        if (last[:-1] < last[1:]).all():  # above all others
-            return
-        order = np.argsort(used, kind="stable")
-        self._numbers[: self._used] = used[order]
-        _words(self._rows)[: self._used] = _words(self._rows)[order]
-
 
 def _rows(words: LongArray) -> AnyArray:
     """Return as rows what `_words` returned."""
@@ -201,98 +183,240 @@ class State(NamedTuple):
     """Its cells."""
     places: PlaceTable
     """Its places."""
-    vertex_ends: LongArray
-    """int64 (256,), how many cells have each end. Levels at which none ends are left out of the
-    dense form."""
     next_place: int
     """The least number that no place has ever had."""
-    has_levels: bool = True
-    """Whether all levels below the places are those of its cells; see `levels`."""
 
 
 # Versions made from dense pyramids, and dense pyramids from versions.
 
 
 def state_of(pyramid: DualGraphPyramid) -> State:
-    """Return the first version of a pyramid, without the levels above its places."""
+    """Return the first version of a pyramid: its places."""
     level = pyramid[pyramid.place_level]
-    record = pyramid.record.up_to(level.index)
-    rows, cols = shape = pyramid.grid.shape
-    cells = np.zeros(shape, CELL)
-    end = record.vertex_end.reshape(shape)
-    cells["class"], cells["end"], cells["place"] = pyramid.grid.classes, end, level.field_of
-    cells["edges"] = record.edge_end.reshape(rows, cols, 2)
-    row, col = np.nonzero((end > 0) & (end < SURVIVES))
-    parent = record.vertex_parent.reshape(shape)[row, col]
-    cells["parent"][row, col, 0] = parent // cols - row
-    cells["parent"][row, col, 1] = parent % cols - col
-    tiles = Tiles({})
-    tiles.write(Box(0, 0, rows, cols), cells)
+    tiles = Tiles()
+    planes = level.field_of.astype(np.int32), pyramid.grid.classes.copy()
+    tiles.put(Box(0, 0, *pyramid.grid.shape), planes)
     tiles.close()
     table = np.zeros(level.n_vertices, PLACE)
     table["area"], table["cell"] = level.areas, level.cells
     table["box"] = level.boxes + np.array([0, 0, 1, 1])
     table["part"] = -1
     if pyramid.linkage == "throats":
-        # Loading a version needs no decimation.
-        from hybridnav.pyramid.decimation import squared_limit  # noqa: PLC0415
-        from hybridnav.pyramid.start import parts_of  # noqa: PLC0415
-
         limit = squared_limit(pyramid.merge_distance_m, pyramid.grid.resolution_m)
         table["part"] = parts_of(pyramid.grid.classes, limit).at(level.cells)
     places = PlaceTable()
-    places.write(range(level.n_vertices), table)
+    places.append(0, table)
     places.close()
-    n_ends = np.bincount(end.ravel(), minlength=SURVIVES + 1).astype(np.int64)
-    return State(tiles, places, n_ends, level.n_vertices)
+    return State(tiles, places, level.n_vertices)
 
 
 def pyramid_of(
-    state: State, box: Box, grid: OccupancyGrid, built: tuple[float, Linkage, int]
+    state: State, box: Box, grid: OccupancyGrid, merge_distance_m: float, criterion: Criterion
 ) -> DualGraphPyramid:
-    """Return a version as dense arrays.
+    """Return a version as dense arrays: each place is contracted to its surviving cell.
 
-    `box`: the cells of its grid among those of the tiles; `built`: the merge distance in metres,
-    the linkage and the seed by which it was built.
+    `box`: the cells of its grid among those of the tiles; `criterion`: that of the merge distance.
+
+    To keep the levels of places that stay, and contract the others beside them, was not faster.
     """
-    cells = state.tiles.read(box)
-    differs = cells["class"] != grid.classes
+    place, classes = state.tiles.planes(box)
+    differs = classes != grid.classes
     if differs.any():
         row, col = np.argwhere(differs)[0].tolist()
         raise InvalidValueError(
             f"{int(differs.sum())} cells changed outside what the updates stated, the first at "
             f"row {row}, column {col}: pass changed=None to compare all cells"
         )
-    _close_levels(cells, state.vertex_ends)
-    record = _record_of(cells)
-    record.vertex_parent[cells["place"].ravel() == NO_PLACE] = -1
-    stats = BuildStats()
-    pyramid = DualGraphPyramid(grid, *built, stats, None, record)
-    n_levels = int(np.count_nonzero(state.vertex_ends[1:SURVIVES])) + 1
-    stats.tops.append(n_levels - 1)
-    stats.sizes.extend(record.sizes(grid.shape[1], n_levels))
-    return pyramid
+    numbers = state.places.numbers()
+    index_of = np.zeros(state.next_place + 1, np.int32)  # the last one is that of no place
+    index_of[numbers] = np.arange(1, len(numbers) + 1)
+    survivors = np.zeros(box.shape, np.bool_)
+    row, col = (state.places.read(numbers)["cell"] - np.array(box[:2])).T
+    survivors[row, col] = True
+    beside = np.zeros(box.shape, np.bool_), np.zeros(2 * place.size, np.uint8)
+    record = contract_places(index_of[place], survivors, beside, criterion).record
+    ends = record.vertex_end[record.vertex_end < SURVIVES]
+    n_levels = int(ends.max(initial=0)) + 1
+    stats = BuildStats(record.sizes(grid.shape[1], n_levels), tops=[n_levels - 1])
+    linkage, _, seed = criterion
+    return DualGraphPyramid(grid, merge_distance_m, linkage, seed, stats, None, record)
 
 
-def _close_levels(cells: AnyArray, vertex_ends: LongArray) -> None:
-    """Give the levels at which cells end the numbers 1, 2, ..."""
-    levels = np.flatnonzero(vertex_ends[1:SURVIVES]) + 1
-    new_level = np.arange(SURVIVES + 1, dtype=np.uint8)
-    new_level[levels] = np.arange(1, len(levels) + 1)
-    new_end = np.arange(SURVIVES + 1, dtype=np.uint8)
-    new_end[2 * levels] = 2 * new_level[levels]
-    new_end[2 * levels + 1] = 2 * new_level[levels] + 1
-    cells["end"], cells["edges"] = new_level[cells["end"]], new_end[cells["edges"]]
+# The draft of a next version, in which single cells move between places.
+
+_SMALL_CELLS = 512 * 512
+"""Cells of a window below which it takes longer to divide it than to look at all of it."""
 
 
-def _record_of(cells: AnyArray) -> Record:
-    """Return the record of a window, flat."""
-    rows, cols = cells.shape
-    steps = cells["parent"].astype(np.int32)
-    parent = np.arange(rows * cols, dtype=np.int32).reshape(rows, cols)
-    parent += steps[..., 0] * np.int32(cols) + steps[..., 1]
-    return Record(
-        cells["end"].ravel(),
-        np.where(cells["end"] == SURVIVES, -1, parent).ravel().astype(np.int32),
-        cells["edges"].ravel(),
-    )
+class CellDraft:
+    """The next version while it is made; the version before stays as it is.
+
+    Cells that change class leave their places, and join those beside them with the nearest
+    surviving cells within the merge distance; what is left of them makes places of its own.
+
+    `before`: the version before; `criterion`: when two fields merge; its linkage is "throats" or
+    "radius".
+    """
+
+    def __init__(self, before: State, criterion: Criterion) -> None:
+        self.before = before
+        self.tiles = before.tiles.next_version()
+        self.places = before.places.next_version()
+        self.next_place = before.next_place
+        self.cells: LongArray = np.empty((0, 2), np.int64)
+        self.criterion = criterion
+        self.limit = criterion.limit
+
+    def change(self, boxes: Iterable[Box], classes: ByteArray, low: tuple[int, int]) -> None:
+        """Set the classes of the cells of boxes, and move the cells whose class changes.
+
+        For the parameters see `Tiles.differing`.
+        """
+        found = self.tiles.differing(boxes, classes, low)
+        self.cells = np.stack([found.row, found.col], axis=1)
+        if len(found.row):
+            for cells, box in self._groups(found):
+                self._move(cells, box)
+
+    def _groups(self, found: Differing) -> Iterator[tuple[Differing, Box]]:
+        """Yield changed cells that lie far enough from others, and a box round their places."""
+        box = self._box_round(found)
+        if box.shape[0] * box.shape[1] <= _SMALL_CELLS:
+            yield found, box
+            return
+        places = sorted({*found.place.tolist()} - {NO_PLACE})
+        boxes = self.places.read(places)["box"].astype(np.int64)
+        keys = ((found.row // SIDE) << 32) + found.col // SIDE
+        _, first, index = np.unique(keys, return_index=True, return_inverse=True)
+        of_tiles = np.stack([found.row[first], found.col[first]], axis=1) // SIDE * SIDE
+        joined = np.concatenate([boxes, np.hstack([of_tiles, of_tiles + SIDE])])
+        group_of = box_groups(joined)
+        of_cell = group_of[len(places) + index]
+        has = found.place >= 0
+        of_cell[has] = group_of[np.searchsorted(places, found.place[has])]
+        for group in np.unique(of_cell).tolist():
+            inside = of_cell == group
+            cells = Differing(*(values[inside] for values in found))
+            yield self._as_now(cells, Box(*joined[group].tolist()))
+
+    def _as_now(self, cells: Differing, box: Box) -> tuple[Differing, Box]:
+        """Return cells with the places that they are in after other groups, and a box round."""
+        place = self.tiles.planes(box)[0][cells.row - box.low_row, cells.col - box.low_col]
+        cells = cells._replace(place=place.astype(np.int64))
+        return cells, self._box_round(cells)
+
+    def _box_round(self, cells: Differing) -> Box:
+        """Return the least box that holds cells and their places."""
+        at = np.stack([cells.row, cells.col], axis=1)
+        boxes = self.places.read(np.unique(cells.place[cells.place >= 0]))["box"]
+        boxes = np.concatenate([np.hstack([at, at + 1]), boxes])
+        return Box(*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
+
+    def _move(self, found: Differing, box: Box) -> None:
+        """Move changed cells, and merge places that may merge then."""
+        window = _Window(self, box.widened(1))
+        first = self.next_place
+        waiting, lost, altered = window.take_out(found)
+        joined, moved, boxes = _merge_kernels.let_join(
+            window.planes,
+            window.low,
+            self.places.columns(),
+            (altered, first, self.next_place),
+            waiting,
+            self.limit,
+        )
+        made = window.make_places(boxes) if len(boxes) else boxes[:, 0]
+        beyond = _merge_kernels.merge_after(
+            window.planes,
+            window.low,
+            self.places.columns(),
+            (made, moved, lost, first, self.next_place, self.before.next_place),
+            joined,
+            self.limit,
+        )
+        self.tiles.put(window.box, window.planes)
+        while len(beyond):
+            beyond = np.concatenate([self._merge(pair) for pair in unique_rows(beyond).rows])
+
+    def _merge(self, pair: LongArray) -> LongArray:
+        """Merge a pair of places if they may merge, and what may merge with them then."""
+        if len(self.places.known(pair)) < len(pair):
+            return np.empty((0, 2), np.int64)
+        some, other = (Box(*box) for box in self.places.read(pair)["box"].tolist())
+        window = _Window(self, some.joined(other).widened(1))
+        table, first = self.places.columns(), self.before.next_place
+        beyond: LongArray = _merge_kernels.merge_pairs(
+            window.planes, window.low, table, pair.reshape(1, 2), self.limit, first
+        )
+        self.tiles.put(window.box, window.planes)
+        return beyond
+
+    def close(self) -> State:
+        """Return the version."""
+        self.tiles.close()
+        self.places.close()
+        return State(self.tiles, self.places, self.next_place)
+
+
+class _Window:
+    """A box of cells of a draft, which change before they are written back."""
+
+    def __init__(self, draft: CellDraft, box: Box) -> None:
+        self._draft = draft
+        self.box = box
+        self.low = box[:2]
+        self.planes = draft.tiles.planes(box)
+
+    def take_out(self, found: Differing) -> tuple[LongArray, LongArray, LongArray]:
+        """Take changed cells out of their places.
+
+        Return flat cells that wait for a place, the places that lost cells, and those of them that
+        have to be looked at again beside the new ones.
+        """
+        draft, places = self._draft, self._draft.places
+        cells = (found.row - self.low[0]) * self.box.shape[1] + found.col - self.low[1]
+        self.planes[1].ravel()[cells] = found.of_class
+        parents, lost, altered = take_out(
+            self.planes[0], self.low, places.columns(), (cells, found.place), draft.next_place
+        )
+        if len(parents):
+            self._new(places.read(parents))
+        return cells[found.of_class > 0], lost, altered
+
+    def _new(self, rows: AnyArray) -> LongArray:
+        """Enter places with new numbers; return these."""
+        first = self._draft.next_place
+        self._draft.next_place += len(rows)
+        return self._draft.places.append(first, rows)
+
+    def make_places(self, boxes: LongArray) -> LongArray:
+        """Make places of connected cells that no place took in; return those that may be small.
+
+        They have the next numbers, in the window too; their boxes are given.
+        """
+        low = np.array(self.low)
+        rows = np.zeros(len(boxes), PLACE)
+        rows["area"], rows["part"], rows["box"] = 1, -1, boxes + np.tile(low, 2)
+        rows["cell"] = (boxes[:, :2] + boxes[:, 2:]) // 2 + low
+        numbers = self._new(rows)
+        sides = boxes[:, 2:] - boxes[:, :2] - 1
+        is_large = (sides * sides).sum(axis=1) >= self._draft.limit
+        for at in np.flatnonzero(is_large).tolist():
+            self._contract(int(numbers[at]), boxes[at])
+        small: LongArray = numbers[~is_large]
+        return small
+
+    def _contract(self, number: int, box: LongArray) -> None:
+        """Put places, as contraction makes them, in the place of one that is too large."""
+        inside = np.s_[box[0] : box[2], box[1] : box[3]]
+        place, of_class = self.planes[0][inside], self.planes[1][inside]
+        mask = place == number
+        fields = contract_alone(of_class * mask, self._draft.criterion)
+        rows = np.zeros(len(fields.survivors), PLACE)
+        low = np.array(self.low) + box[:2]
+        rows["area"], rows["part"] = fields.areas, -1
+        rows["cell"] = np.stack(np.divmod(fields.survivors, mask.shape[1]), axis=1) + low
+        rows["box"] = fields.boxes + np.array([0, 0, 1, 1]) + np.tile(low, 2)
+        new = self._new(rows)
+        place[mask] = new[fields.field_of[mask]]
+        self._draft.places.drop([number])

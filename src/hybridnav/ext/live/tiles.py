@@ -11,26 +11,13 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.ext.live.kernels import tiles as _tile_kernels
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator
 
-    from hybridnav._base.typing import AnyArray, ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import ByteArray, IntArray, LongArray
 
 SIDE = 64
 """Rows and columns of a tile. A copy takes 3 us: larger tiles are beyond the size for which memory
 is taken anew from the system."""
-
-CELL = np.dtype(
-    [
-        ("class", np.uint8),
-        ("end", np.uint8),
-        ("parent", np.int16, (2,)),
-        ("edges", np.uint8, (2,)),
-        ("place", np.int32),
-    ]
-)
-"""A cell: its `CellClass`; the record of its vertex, the parent as a step in rows and columns, and
-of its edges east and north (see `Record`); the number of its place. Steps instead of flat cells
-stay what they are when the map grows."""
 
 NO_PLACE = -1
 """Number that stands for no place: that of occupied cells and of all outside the map."""
@@ -119,18 +106,14 @@ class Tile(NamedTuple):
     """The cells of a square, in arrays of shape `(SIDE, SIDE)`."""
 
     place: IntArray
-    """int32, the field `place` of `CELL`."""
+    """int32, the number of the place of each cell, `NO_PLACE` for none."""
     of_class: ByteArray
-    """uint8, the field `class`."""
-    record: AnyArray
-    """All other fields."""
+    """uint8, its `CellClass`."""
 
 
-_RECORD = np.dtype([(name, CELL[name]) for name in ("end", "parent", "edges")])
 _EMPTY = Tile(
     frozen(np.full((SIDE, SIDE), NO_PLACE, np.int32)),
     frozen(np.zeros((SIDE, SIDE), np.uint8)),
-    frozen(np.zeros((SIDE, SIDE), _RECORD)),
 )
 """A tile of cells that are no vertices, as is all that lies outside the tiles."""
 
@@ -141,24 +124,19 @@ class Tiles:
 
     Arrays of a version never change: those of a tile are copied when they first change. All that a
     kernel reads is read-only, those copies too, because it takes arrays of one type only.
-
-    `tiles`: tiles, their arrays read-only, by row and column of tiles.
     """
 
-    def __init__(self, tiles: Mapping[tuple[int, int], Tile]) -> None:
+    def __init__(self) -> None:
         self._rows: dict[int, dict[int, Tile]] = {}
         """The tiles of each row of tiles, by their column; versions share rows, too."""
-        for (row, col), tile in tiles.items():
-            self._rows.setdefault(row, {})[col] = tile
         self._own_rows: set[int] = set()
         """Rows that may be written to."""
         self._own: dict[tuple[int, int], tuple[IntArray, ByteArray]] = {}
         """The places and classes that may be written to."""
-        self._own_records: dict[tuple[int, int], AnyArray] = {}
 
     def next_version(self) -> Tiles:
         """Return tiles that share all arrays of these."""
-        tiles = Tiles({})
+        tiles = Tiles()
         tiles._rows = dict(self._rows)
         return tiles
 
@@ -166,18 +144,6 @@ class Tiles:
         """Forget what may be written to: the version is complete."""
         self._own_rows.clear()
         self._own.clear()
-        self._own_records.clear()
-
-    def read(self, box: Box) -> AnyArray:
-        """Return a copy of the cells of a box, `CELL` of its shape."""
-        window = np.empty(box.shape, CELL)
-        for key, inside, within in _parts_of(box):
-            place, of_class, record = self._get(key)
-            part = window[inside]
-            part["place"], part["class"] = place[within], of_class[within]
-            for name in _RECORD.names or ():
-                part[name] = record[name][within]
-        return window
 
     def planes(self, box: Box) -> tuple[IntArray, ByteArray]:
         """Return copies of the places and the classes of the cells of a box."""
@@ -212,21 +178,8 @@ class Tiles:
         tiles = [self._get(key) for key in _keys_of(box)]
         tiles += [_EMPTY] * (-len(tiles) % _MANY)
         for begin in range(0, len(tiles), _MANY):
-            places, classes, _ = zip(*tiles[begin : begin + _MANY], strict=True)
+            places, classes = zip(*tiles[begin : begin + _MANY], strict=True)
             yield begin, (places, classes)
-
-    def end_at(self, cell: tuple[int, int]) -> int:
-        """Return the end of a cell that is a vertex."""
-        row, col = cell
-        record = self._get((row // SIDE, col // SIDE)).record
-        return int(record["end"][row % SIDE, col % SIDE])
-
-    def parent_of(self, cell: tuple[int, int]) -> tuple[int, int]:
-        """Return the cell that a cell went into."""
-        row, col = cell
-        record = self._get((row // SIDE, col // SIDE)).record
-        steps = record["parent"][row % SIDE, col % SIDE]
-        return row + int(steps[0]), col + int(steps[1])
 
     def put(self, box: Box, planes: tuple[IntArray, ByteArray]) -> None:
         """Set the places and the classes of the cells of a box; tiles in which all is equal stay
@@ -240,38 +193,14 @@ class Tiles:
             for at in differs.tolist():
                 _tile_kernels.put_cells(self._owned(keys[at]), keys[at], box, planes)
 
-    def write(self, box: Box, window: AnyArray) -> None:
-        """Set the cells of a box; arrays in which all is equal stay shared."""
-        for key, inside, within in _parts_of(box):
-            cells, tile = window[inside], self._get(key)
-            planes = (tile.place, cells["place"]), (tile.of_class, cells["class"])
-            if any((plane[within] != now).any() for plane, now in planes):
-                place, of_class = self._owned(key)
-                place[within], of_class[within] = cells["place"], cells["class"]
-            if any((tile.record[n][within] != cells[n]).any() for n in _RECORD.names or ()):
-                record = self._owned_record(key)[within]
-                for name in _RECORD.names or ():
-                    record[name] = cells[name]
-
     def _owned(self, key: tuple[int, int]) -> tuple[IntArray, ByteArray]:
         """Return the places and the classes of a tile, to be written to."""
         own = self._own.get(key)
         if own is None:
             tile = self._get(key)
             own = tile.place.copy(), tile.of_class.copy()
-            place, of_class = frozen(own[0].view()), frozen(own[1].view())
-            self._set(key, Tile(place, of_class, tile.record))
+            self._set(key, Tile(frozen(own[0].view()), frozen(own[1].view())))
             self._own[key] = own
-        return own
-
-    def _owned_record(self, key: tuple[int, int]) -> AnyArray:
-        """Return the record of a tile, to be written to."""
-        own = self._own_records.get(key)
-        if own is None:
-            tile = self._get(key)
-            own = tile.record.copy()
-            self._set(key, tile._replace(record=frozen(own.view())))
-            self._own_records[key] = own
         return own
 
     def moved(self, before: Tiles) -> LongArray:
@@ -312,23 +241,3 @@ def _keys_of(box: Box) -> Iterator[tuple[int, int]]:
         low_row, low_col, high_row, high_col = box
         rows = range(low_row // SIDE, -(-high_row // SIDE))
         yield from product(rows, range(low_col // SIDE, -(-high_col // SIDE)))
-
-
-def _parts_of(
-    box: Box,
-) -> Iterator[tuple[tuple[int, int], tuple[slice, slice], tuple[slice, slice]]]:
-    """Yield the tiles that a box meets, and slices of the box and of the tile for each."""
-    low_row, low_col, high_row, high_col = box
-    if box.is_empty:
-        return
-    cols = [_slices(at, low_col, high_col) for at in range(low_col // SIDE, -(-high_col // SIDE))]
-    for row in range(low_row // SIDE, -(-high_row // SIDE)):
-        _, of_box, of_tile = _slices(row, low_row, high_row)
-        for col, inside, within in cols:
-            yield (row, col), (of_box, inside), (of_tile, within)
-
-
-def _slices(at: int, low: int, high: int) -> tuple[int, slice, slice]:
-    """Return the number of a tile along an axis, its slice of a box, and the box's slice of it."""
-    begin, end = max(at * SIDE, low), min((at + 1) * SIDE, high)
-    return at, slice(begin - low, end - low), slice(begin - at * SIDE, end - at * SIDE)

@@ -18,19 +18,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from hybridnav._base.extension import extension
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
+from hybridnav.ext.page import page as pages
 from hybridnav.ext.page import requests as ask
 from hybridnav.ext.page.drawing import GRID
 from hybridnav.ext.page.kept import Finder
-from hybridnav.ext.page.page import (
-    ASSETS,
-    POLICY,
-    PreparingError,
-    asset,
-    exported,
-    exported_floor,
-    live_page,
-)
-from hybridnav.ext.page.session import ConflictError
+from hybridnav.ext.page.session import ConflictError, Session
 
 if TYPE_CHECKING:
     import asyncio
@@ -41,8 +33,6 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-    from hybridnav.ext.page.page import Opening
-    from hybridnav.ext.page.session import Session
     from hybridnav.ext.page.site import Site
     from hybridnav.ext.page.tiles import Theme
 
@@ -50,7 +40,7 @@ _OPTIMUM = {"preset": GRID, "brief": True}
 _MOST_BYTES = 2_000_000
 """Size of a request's body."""
 _HEADERS = (
-    (b"content-security-policy", POLICY.encode()),
+    (b"content-security-policy", pages.POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-resource-policy", b"same-origin"),
@@ -111,7 +101,7 @@ class Guard:
 
 
 def make_app(
-    shown: Site | Opening, *, token: str, port: int, folder: Path, allow_edits: bool = False
+    shown: Site | pages.Opening, *, token: str, port: int, folder: Path, allow_edits: bool = False
 ) -> ASGIApp:
     """Return the application of a page.
 
@@ -121,8 +111,8 @@ def make_app(
     """
     at = f"/{token}"
     routes = [
-        Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
-        *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
+        Route(f"{at}/", _get(lambda _: pages.live_page(), "text/html")),
+        *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in pages.ASSETS),
         *_Answers(shown, folder).routes(at, allow_edits=allow_edits),
     ]
     return Guard(Starlette(routes=routes), token, port)
@@ -131,7 +121,7 @@ def make_app(
 class _Answers:
     """What each request does."""
 
-    def __init__(self, shown: Site | Opening, folder: Path) -> None:
+    def __init__(self, shown: Site | pages.Opening, folder: Path) -> None:
         self._shown, self._folder, self._finder = shown, folder, Finder(folder)
 
     def routes(self, at: str, *, allow_edits: bool) -> list[Route]:
@@ -201,10 +191,12 @@ class _Answers:
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
         site, query = self._shown.site, ask.checked(ask.PartQuery, value) if value else None
-        return exported(site, request.path_params["kind"], query, self._folder)
+        return pages.exported(site, request.path_params["kind"], query, self._folder)
 
     def _export_floor(self, request: Request, _: Any) -> tuple[str, bytes]:
-        return exported_floor(self._session(request), request.path_params["kind"], self._folder)
+        return pages.exported_floor(
+            self._session(request), request.path_params["kind"], self._folder
+        )
 
     def _tile(self, request: Request) -> bytes:
         place = request.path_params
@@ -227,7 +219,7 @@ async def _done(work: Callable[[], Any]) -> Any:
         return await run_in_threadpool(work)
     except ConflictError as error:
         return _error(str(error), _CONFLICT)
-    except PreparingError as error:
+    except pages.PreparingError as error:
         return _error(str(error), _NOT_YET)
     except MapError as error:
         return _error(str(error), _FULL)
@@ -248,7 +240,7 @@ def _get(read: Callable[[Any], Any], kind: str) -> Any:
 
 
 def _asset_reader(name: str) -> Callable[[Any], str]:
-    return lambda _: asset(name)
+    return lambda _: pages.asset(name)
 
 
 def _get_json(read: Callable[[Any], Any]) -> Any:

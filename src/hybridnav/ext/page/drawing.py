@@ -11,7 +11,7 @@ import shapely
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import requests as ask
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.names import natural_key
 from hybridnav.planner import Blocked, PlanResult, load_preset, plan_alternatives, preset_names
 from hybridnav.planner.tour import tour_of
@@ -20,7 +20,6 @@ from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import HybridPlanner, Journal, Preset, Tour
     from hybridnav.planner.saved import Model

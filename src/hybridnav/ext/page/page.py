@@ -17,7 +17,7 @@ from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.graphs.files import export_nav2
 from hybridnav.ext.page.drawing import map_facts
-from hybridnav.ext.page.tiles import TILE, hex_colours, map_layer
+from hybridnav.ext.page.tiles import TILE, Layer, Theme, hex_colours, map_layer
 from hybridnav.planner import export_path, export_rooms
 from hybridnav.planner.guide import languages
 from hybridnav.planner.saved import save
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.page.requests import PartQuery, PlanQuery
     from hybridnav.ext.page.session import Session
     from hybridnav.ext.page.site import Site
-    from hybridnav.ext.page.tiles import Layer, Theme
     from hybridnav.maps import OccupancyGrid
 
 _NAMES = (

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, RoomUse
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.planner import PlanResult
-from hybridnav.planner.guide import sentences
+from hybridnav.planner.guide import Instruction, sentences
 from hybridnav.topology.rooms.files.outlines import Outlines
 from hybridnav.topology.rooms.files.paint import cells_inside
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.fleet import BuildingPlan
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.planner.guide import Instruction
 
 _FAR = 1e7
 """Grid units beyond which nothing lies: a map has fewer cells."""

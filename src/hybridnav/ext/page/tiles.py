@@ -13,7 +13,7 @@ from matplotlib import colormaps
 from PIL import Image
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.viz import style
 from hybridnav.viz.places import colour_vertices
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.pyramid import Level
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.files import printable
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph
+from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph, Link
 from hybridnav.ext.fleet.link_nodes import Stub, node_at, with_stubs
 from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_lane_graph
 from hybridnav.ext.graphs.attach import Network, placed_points
@@ -21,7 +21,7 @@ from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
 from hybridnav.ext.graphs.files import json_graphs as graph_json
 from hybridnav.ext.graphs.files.lif import is_lif, read_lif
 from hybridnav.ext.graphs.files.osm_read import read_osm
-from hybridnav.ext.graphs.files.osm_xml import is_osm
+from hybridnav.ext.graphs.files.osm_xml import Anchor, is_osm
 from hybridnav.ext.graphs.files.rmf_editor import is_drawn, read_drawn
 from hybridnav.ext.graphs.files.rmf_read import is_rmf, read_rmf
 from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
@@ -33,10 +33,7 @@ from hybridnav.topology.rooms.find import outside_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet import Link
-    from hybridnav.ext.graphs.files.osm_xml import Anchor
     from hybridnav.topology.rooms import Door, Rooms
 
 _MOST_XML = 2**26

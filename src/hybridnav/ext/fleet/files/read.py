@@ -27,14 +27,14 @@ from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.checks import checked_radius
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner import Journal, load_preset
+from hybridnav.planner import HybridPlanner, Journal, Preset, load_preset
 from hybridnav.planner.guide.landmarks import Landmarks
-from hybridnav.planner.saved import is_model, load
-from hybridnav.planner.saved.container import parts_within, read_parts
+from hybridnav.planner.saved import Model, is_model, load
+from hybridnav.planner.saved.container import FiledPart, parts_within, read_parts
 from hybridnav.planner.saved.model import model_of
 from hybridnav.planner.saved.parts import values_of
 from hybridnav.planner.saved.structures import BUILDING, FLOOR, refusal
-from hybridnav.topology.rooms import find_rooms
+from hybridnav.topology.rooms import Rooms, find_rooms
 from hybridnav.topology.rooms.files.read import load_rooms
 
 if TYPE_CHECKING:
@@ -42,10 +42,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.ext.fleet.files.entries import EndEntry, Entries, FloorEntry, LinkEntry
-    from hybridnav.planner import HybridPlanner, Preset
-    from hybridnav.planner.saved import Model
-    from hybridnav.planner.saved.container import FiledPart
-    from hybridnav.topology.rooms import Rooms
 
 
 def load_building(

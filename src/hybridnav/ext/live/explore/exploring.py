@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.explore.robot import Robot, laser_all_round
 from hybridnav.maps.checks import checked_whole
@@ -15,7 +15,6 @@ from hybridnav.maps.checks import checked_whole
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray
     from hybridnav.ext.live.explore.goals import Goals
     from hybridnav.ext.live.mapping import SimulatedLaser

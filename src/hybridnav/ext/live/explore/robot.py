@@ -13,18 +13,10 @@ from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav._base.trig import atan2
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
-from hybridnav.ext.live.explore.goals import (
-    Goals,
-    cells_in_reach,
-    doubtful_spots,
-    narrow_spots,
-    rimmed,
-    walled,
-    widest_point,
-)
+from hybridnav.ext.live.explore import goals as plans
 from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
 from hybridnav.ext.live.mapping.sensors import in_sight
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import costs_from
@@ -33,7 +25,6 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.ext.live.mapping.mapper import Area
-    from hybridnav.maps import OccupancyGrid
 
 _SCAN_EVERY_M = 0.5
 _NEAR_M = 0.5
@@ -88,7 +79,7 @@ class Robot:
         sensor: SimulatedLaser,
         seed: int,
     ) -> None:
-        self._world = walled(world)
+        self._world = plans.walled(world)
         self._sensor, self._seed = sensor, seed
         self._noise = np.random.default_rng(seed)
         self._mapper = Mapper(
@@ -112,8 +103,8 @@ class Robot:
         """Points that the robot has driven through, with the bends between its scans."""
         self.n_goals, self.driven_m = 0, 0.0
         self.seconds = dict.fromkeys(("mapping", "pyramid", "goals", "rooms", "planning"), 0.0)
-        point = widest_point(self._world) if start is None else start
-        in_reach = np.argwhere(cells_in_reach(self._world, point))
+        point = plans.widest_point(self._world) if start is None else start
+        in_reach = np.argwhere(plans.cells_in_reach(self._world, point))
         self._reach_points = self._world.frame.points_of(in_reach)
         self.reach_cells = len(self._reach_points)
         self.pose = (float(point[0]), float(point[1]), 0.0)
@@ -137,11 +128,11 @@ class Robot:
         self.seconds["mapping"] += time.perf_counter() - began
         return grid
 
-    def look(self) -> Goals:
+    def look(self) -> plans.Goals:
         """Bring map and pyramid up to date, and return the goals."""
         grid = self._grid()
         began = time.perf_counter()
-        grid = rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
+        grid = plans.rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
         if self._version is None:
             self._version = OnlinePyramid.of(DualGraphPyramid.build(grid, seed=self._seed))
         elif self._changed:
@@ -153,7 +144,7 @@ class Robot:
         self.seconds["pyramid"] += time.perf_counter() - began
         began = time.perf_counter()
         self._at = self._cell(grid)
-        goals = Goals.of(self.topology, self._at, ~self._goal_cells(grid))
+        goals = plans.Goals.of(self.topology, self._at, ~self._goal_cells(grid))
         self.seconds["goals"] += time.perf_counter() - began
         return goals
 
@@ -178,7 +169,7 @@ class Robot:
         row, col = free[np.lexsort((squared, -sizes))[0]].tolist()
         return row, col
 
-    def in_its_room(self, goals: Goals) -> BoolArray:
+    def in_its_room(self, goals: plans.Goals) -> BoolArray:
         """Return the goals that lie in the room that the robot is in, bool (n,)."""
         began = time.perf_counter()
         grid = self.topology.grid
@@ -190,7 +181,7 @@ class Robot:
         inside: BoolArray = room_of[tuple(goals.cells.T)] == room_of[self._at]
         return inside
 
-    def visit(self, goals: Goals, chosen: int, *, arrives: bool) -> None:
+    def visit(self, goals: plans.Goals, chosen: int, *, arrives: bool) -> None:
         """Drive to a goal, or, unless the robot is to arrive there, until it is known."""
         grid = self.topology.grid
         beyond = self._on_lattice(grid, goals.beyond[chosen])
@@ -248,8 +239,8 @@ class Robot:
         """
         began = time.perf_counter()
         grid = self.topology.grid
-        seldom = (spot for spot in narrow_spots(grid, self._at) if self._is_seldom_seen(spot))
-        spots = np.array([*doubtful_spots(grid, self._at), *seldom], np.int64).reshape(-1, 2)
+        seldom = (spot for spot in plans.narrow_spots(grid, self._at) if self._is_seldom_seen(spot))
+        spots = np.array([*plans.doubtful_spots(grid, self._at), *seldom], np.int64).reshape(-1, 2)
         looked = np.reshape(self._spots, (-1, 1, 2))
         apart_m = np.hypot(*np.moveaxis(grid.frame.points_of(spots) - looked, -1, 0))
         spots = spots[(apart_m < _NEAR_M).sum(axis=0) < _TRIES]

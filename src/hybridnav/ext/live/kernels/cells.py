@@ -21,14 +21,14 @@ def join_nearest(window, low, table, cells, limit):
     window
         Places and classes; the places change.
     low, table
-        See above; areas, boxes and stale places change.
+        See above; areas and boxes change.
     cells
         int64 (n,), flat cells that are vertices, none at a side of the window.
     limit
         The squared distance to a surviving cell stays below it.
     """
     place, of_class = window
-    numbers, area, survivor, box, is_stale, _ = table
+    numbers, area, survivor, box, _ = table
     cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
 
@@ -66,7 +66,6 @@ def join_nearest(window, low, table, cells, limit):
             continue
         # A place only gains here, so its area and its box stay exact without another look at it.
         flat[cell] = numbers[nearest]
-        is_stale[nearest] = True
         area[nearest] += 1
         box[nearest, 0], box[nearest, 1] = min(box[nearest, 0], row), min(box[nearest, 1], col)
         box[nearest, 2] = max(box[nearest, 2], row + 1)
@@ -136,7 +135,7 @@ def take_out(place, low, table, removed, first):
     Parameters
     ----------
     place, low, table
-        See above; areas and stale places change.
+        See above; areas change.
     removed
         int64 (n,) twice: flat cells, and the places that they were in, -1 for none.
     first
@@ -151,7 +150,7 @@ def take_out(place, low, table, removed, first):
     int64 (l,)
         Those of them that lost a part, their surviving cell, or a cell at a side of their box.
     """
-    numbers, area, survivor, box, is_stale, _ = table
+    numbers, area, survivor, box, _ = table
 
     # Ordered by place, the cells of each are one run, and those without a place come first.
     order = np.argsort(removed[1], kind="mergesort")
@@ -182,7 +181,6 @@ def take_out(place, low, table, removed, first):
         area[i] -= end - begin
         lost[n_lost] = number
         n_lost += 1
-        is_stale[i] = True
         # The box can only shrink if a cell at one of its sides went.
         alters = False
         for cell in cells[begin:end]:

@@ -96,7 +96,7 @@ def absorbing(window, low, table, lost, limit):
     int64 (m, 2)
         Pairs, as `merge_pairs` takes them.
     """
-    numbers, area, survivor, box, _, _ = table
+    numbers, area, survivor, box, _ = table
     place, of_class = window
     pairs, count = np.empty((16, 2), np.int64), 0
     around = np.empty(4, np.int64)
@@ -184,7 +184,7 @@ def is_inside(box, low, shape, margin):
 @njit(cache=True, nogil=True)
 def may_merge(place, low, table, rows, limit):
     """Return whether two places may merge, and the row of the one whose cell survives."""
-    _, area, survivor, _, _, part = table
+    _, area, survivor, _, part = table
     i, j = rows
     if part[i] != part[j] and min(part[i], part[j]) >= 0:
         return _NO, i
@@ -208,7 +208,7 @@ def reaches(place, low, table, rows, limit):
 
     A place has a cell at each side of its box, which decides on most of them.
     """
-    numbers, _, survivor, box, _, _ = table
+    numbers, _, survivor, box, _ = table
     i, j = rows
     row, col = np.int64(survivor[i, 0]), np.int64(survivor[i, 1])
     of_rows = max(abs(row - box[j, 0]), abs(box[j, 2] - 1 - row))
@@ -229,7 +229,7 @@ def reaches(place, low, table, rows, limit):
 @njit(cache=True, nogil=True)
 def merge(place, low, table, rows, survives):
     """Put the cells of a place, which lies in the window, into another one."""
-    numbers, area, survivor, box, is_stale, part = table
+    numbers, area, survivor, box, part = table
     stays, goes = rows
     number, gone = numbers[stays], numbers[goes]
     for row in range(box[goes, 0] - low[0], box[goes, 2] - low[0]):
@@ -238,7 +238,6 @@ def merge(place, low, table, rows, survives):
                 place[row, col] = number
     area[stays] += area[goes]
     area[goes] = 0
-    is_stale[stays], is_stale[goes] = True, False
     part[stays] = max(part[stays], part[goes])
     survivor[stays, 0], survivor[stays, 1] = survivor[survives, 0], survivor[survives, 1]
     for k in range(2):

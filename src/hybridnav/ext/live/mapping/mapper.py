@@ -186,11 +186,6 @@ class Mapper:
                 f"a map grows by scans, got {scan!r:.80} of type {type(scan).__name__}: make a "
                 "LaserScan of the readings and the pose"
             )
-        area = self._add(scan)
-        self._n_scans += area is not None
-        return area
-
-    def _add(self, scan: LaserScan) -> Area | None:
         model = self._laser
         high_m = min(model.max_range_m, scan.max_range_m)
         hits, ends, kinds, box = beam_ends(
@@ -207,10 +202,12 @@ class Mapper:
             self.resolution_m,
         )
         if not kinds.any():
+            self._n_scans += 1
             return (*scan.pose[:2], *scan.pose[:2])
         area = self._grown(tuple(box.tolist()))
         if area is None:
             return None
+        self._n_scans += 1
         odds = log_odds_of(model.when_hit), log_odds_of(model.when_passed), self._limit
         changes = tuple(np.float32(change) for change in odds)
         for add in (add_hits, add_passes) if model.hits_win else (add_passes, add_hits):
@@ -219,7 +216,7 @@ class Mapper:
                 self._seen_at,
                 self._corner,
                 (hits, ends, kinds),
-                self._n_scans + 1,
+                self._n_scans,
                 changes,
             )
         return area
