@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 60_042,
-    "lines": 95_248,
-    "files": 392,
-    "code outside ext": 42_710,
+    "code": 59_489,
+    "lines": 94_493,
+    "files": 386,
+    "code outside ext": 42_157,
     "lines of a file, median": 272,
     "lines of a file, most": 450,
     "packages": 12,
@@ -17,7 +17,7 @@ LIMITS = {
     "files visited by paper": 52,
     "lines visited by paper": 12_958,
     "modules of a plan and a picture": 132,
-    "imports, % of the code": 9.0,
+    "imports, % of the code": 8.9,
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,

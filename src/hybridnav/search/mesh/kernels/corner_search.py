@@ -142,12 +142,14 @@ def _advance(mesh, graph, links, endpoints, work, factor, limit):
     keys, values = heap
     status = DONE
     while counts[SIZE]:
+        # The corner with the least estimate, unless it was reached by a cheaper path since.
         here, key = values[0], keys[0]
         if key > costs[here] + estimates[here]:
             counts[SIZE] = pop(heap, counts[SIZE])
             continue
         if key * factor >= bounds[UPPER]:
             break
+        # Its edges in the quadrant into which a path may go on.
         x, y, kind, before = cx[here], cy[here], kinds[here], came[here]
         px, py = (sx, sy) if before < 0 else (cx[before], cy[before])
         dx, dy = x - px, y - py
@@ -166,6 +168,7 @@ def _advance(mesh, graph, links, endpoints, work, factor, limit):
         # The blocked cell lies on the left of the path here, or on the right.
         hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
         bend, cost = (px, py, x, y, hand), costs[here]
+        # Round closed cells also the edges to their corners, which meet no closed cell.
         if links is None:
             _relax(mesh, table, None, None, endpoints, work, here, bend, cost, heads[low:high])
         else:

@@ -73,7 +73,7 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = math.hypot(x - sx, y - sy)
-            # From an end of the side the way to the goal need not lead through the rest of the side.
+            # From an end of the side the way to the goal need not cross the rest of the side.
             straight = math.hypot(tx - x, ty - y)
             key = g + (estimate(x, y, wx, wy, ux, uy, tx, ty) if root < 0 else straight)
             if key < bounds[UPPER]:
