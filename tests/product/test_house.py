@@ -6,10 +6,10 @@ from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
     "code": 59_489,
-    "lines": 94_493,
+    "lines": 94_506,
     "files": 386,
     "code outside ext": 42_157,
-    "lines of a file, median": 272,
+    "lines of a file, median": 274,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_526,
+    "lines of tests": 61_535,
 }
 
 

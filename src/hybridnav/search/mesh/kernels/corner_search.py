@@ -130,7 +130,19 @@ def _seed(mesh, table, new, endpoints, seen, work):
 
 @njit(cache=True, nogil=True)
 def _advance(mesh, graph, links, endpoints, work, factor, limit):
-    """Search until the answer is good enough or enough corners are expanded; see `advance`."""
+    """Search until the answer is good enough or enough corners are expanded; see `advance`.
+
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    graph, work
+        See `query_corners`.
+    links
+        The edges to corners of closed cells, see `link`; None if nothing is closed.
+    factor, limit
+        See `advance`.
+    """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads, table, _, new, around = graph
     n_links = 0
@@ -157,6 +169,7 @@ def _advance(mesh, graph, links, endpoints, work, factor, limit):
         if here < len(table):
             place = 2 * here + lobe_of(kind, dx, dy)
             low, high = first[place], first[place + 1]
+        # Without room or time for them the corner stays in the heap.
         if counts[SIZE] + high - low + n_links > len(keys):
             status = WORK_FULL
             break
