@@ -8,8 +8,6 @@ import pytest
 
 import hybridnav as hn
 
-EXACT = "planner.epsilon=0"
-
 
 @pytest.mark.parametrize(
     ("preset", "override", "message"),

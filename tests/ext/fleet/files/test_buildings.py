@@ -21,7 +21,6 @@ from tests.ext.fleet.scenes import random_building
 from tests.plans import PLAIN
 
 MAPS = Path(__file__).parents[4] / "maps"
-DEMO = MAPS / "building" / "building.yaml"
 WALLS = np.zeros((7, 12), dtype=np.float32)
 WALLS[[0, -1]] = WALLS[:, [0, -1]] = 1.0
 WALLS[1:4, 6] = WALLS[5, 6] = 1.0  # a door in row 4
