@@ -231,9 +231,9 @@ class CornerGraph:
     """float64 (n, landmarks), distances in the graph in cells, infinite if there is no path."""
 
     @property
-    def arrays(self) -> tuple[Any, ...]:
-        """The arrays in the order of the kernels, with nothing closed."""
-        return self.first, self.heads, self.landmark_distances, None, None, NOTHING_CLOSED[1]
+    def arrays(self) -> tuple[LongArray, IntArray, FloatArray]:
+        """The arrays in the order of the kernels."""
+        return self.first, self.heads, self.landmark_distances
 
 
 def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray, IntArray] | None:

@@ -23,7 +23,6 @@ from hybridnav.search.mesh.build import (
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
-from hybridnav.search.mesh.kernels.corner_search import link
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
 from hybridnav.search.mesh.kernels.repairs import repair
 from hybridnav.search.mesh.search import (
@@ -227,9 +226,8 @@ Position = tuple[float, float]
 class DetourSearch:
     """Exact shortest any-angle paths round closed cells; threads may share it.
 
-    The first query that needs it repairs the hierarchy of corners round the closed cells, or adds
-    their corners to the graph. Where there is neither, and for ends at a corner of a closed cell,
-    these cells are cut out of the mesh.
+    The first query that needs it repairs the hierarchy of corners round the closed cells. Where
+    there is none, and for ends at a corner of a closed cell, these cells are cut out of the mesh.
 
     Parameters
     ----------
@@ -268,7 +266,6 @@ class DetourSearch:
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
         self._repaired: tuple[Any, Any] | None = None
-        self._has_parts = False
 
     @property
     def search(self) -> MeshSearch:
@@ -295,9 +292,9 @@ class DetourSearch:
         return self._repaired is not None
 
     def repaired(self) -> tuple[Any, Any] | None:
-        """Return the corners, and their hierarchy or graph round the closed cells; None without."""
+        """Return the corners, and their hierarchy round the closed cells; None without one."""
         opened, graph = self._open, self._open.graph
-        if self._repaired is not None or graph is None:
+        if self._repaired is not None or not isinstance(graph, CornerHierarchy):
             return self._repaired
         xs, ys, kinds, *new = self._without(
             lambda left: kernels.corners_round(
@@ -309,11 +306,6 @@ class DetourSearch:
             return None
         corners = xs, ys, *read_only(kinds), *opened.arrays[3:]
         around = read_only(*self._closure), *read_only(self._free, *new), n_corners
-        if not isinstance(graph, CornerHierarchy):
-            links = link(corners, around, opened.place, opened.footing)
-            known = *graph.arrays[:2], opened.footing, *read_only(*links), around
-            self._repaired = corners, known
-            return self._repaired
         arrays = graph.arrays[:4]
         known, room = (opened.footing, around, opened.edges, opened.place), _PATCHED
         while not len((patches := repair(corners, arrays, *known, room))[1]):
@@ -356,14 +348,6 @@ class DetourSearch:
         repaired = None
         if not (at_corner and kernels.path_crosses(self._closure, self._free, ends)):
             repaired = self.repaired()
-        # The cut mesh knows at once that its parts are apart; a graph is searched to the end.
-        if self._has_parts and repaired is not None:
-            found = self.search.path(cells, positions, budget_s=0.0)
-            if math.isinf(found.lower_bound_cells):
-                return found
         search = self.search if repaired is None else self._open
         left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        found = search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=repaired)
-        if repaired is not None and math.isinf(found.lower_bound_cells):
-            self._has_parts = not isinstance(self._open.graph, CornerHierarchy)
-        return found
+        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=repaired)

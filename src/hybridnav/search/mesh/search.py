@@ -21,11 +21,9 @@ from hybridnav.search.mesh.build import (
     add_landmarks,
     contract_corners,
     find_edges,
-    read_only,
 )
 from hybridnav.search.mesh.hubs import HubLabels, label_corners
 from hybridnav.search.mesh.kernels import hubs, polyanya
-from hybridnav.search.mesh.kernels.corner_search import geodesics_of
 from hybridnav.search.mesh.kernels.queries import answer
 from hybridnav.search.mesh.kernels.repairs import footing_of
 
@@ -112,7 +110,7 @@ class _CornerWork(_Work):
 
     def __init__(self, mesh: ConvexMesh, n_landmarks: int) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners) + MOST_NEW
+        n = len(mesh.corners)
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
         self.corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, np.empty(n, np.int32)
@@ -254,7 +252,7 @@ class MeshSearch:
                 if graph is None:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
-            if graph is not None:
+            if isinstance(graph, CornerHierarchy):
                 _ = self.footing
             progress(2, 2)
 
@@ -274,14 +272,10 @@ class MeshSearch:
         self.is_prepared = True
 
     @cached_property
-    def footing(self) -> Any:
-        """What answers round closed cells need: of a hierarchy see `kernels.repairs`, else the
-        distances from landmarks in free space."""
-        graph = self._graph
-        assert graph is not None  # noqa: S101 - the caller has looked
-        if isinstance(graph, CornerHierarchy):
-            return footing_of(self.arrays, graph.arrays[:4])
-        return read_only(geodesics_of(self.arrays, self.place, graph.arrays[:3]))[0]
+    def footing(self) -> tuple[Any, ...]:
+        """What repairs need of the hierarchy; see `kernels.repairs`."""
+        assert isinstance(self._graph, CornerHierarchy)  # noqa: S101 - the caller has looked
+        return footing_of(self.arrays, self._graph.arrays[:4])
 
     def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
         """Build hub labels of the corners, which answer later queries in microseconds.
@@ -341,7 +335,7 @@ class MeshSearch:
             finds a shorter one. With epsilon the search ends as soon as this path is proved good
             enough; without epsilon it saves little.
         repaired
-            Corners, and hierarchy or graph, round closed cells, see `DetourSearch`; or None.
+            Corners and hierarchy round closed cells, see `DetourSearch`; None with nothing closed.
 
         Returns
         -------

@@ -13,15 +13,15 @@ from numba.extending import overload
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.contraction import grow_rows
-from hybridnav.search.mesh.kernels.intervals import (
+from hybridnav.search.mesh.kernels.corner_search import (
     APART,
-    SPLIT,
+    MET,
     polygon_in,
     polygons_of_endpoints,
     polygons_with,
 )
 from hybridnav.search.mesh.kernels.polyanya import DONE, PAUSED, WORK_FULL
-from hybridnav.search.mesh.kernels.views import has_target, see_from_point, touches
+from hybridnav.search.mesh.kernels.views import distance, has_target, see_from_point, touches
 
 CHANGED, DEAD = 4, 8
 """Bits of a kind: the corner touches a closed cell, so that no path bends there; all cells at it
@@ -63,12 +63,6 @@ def _first_from(closure, row, col):
         else:
             high = middle
     return low, end
-
-
-@njit(cache=True, nogil=True)
-def is_any_closed(closure):
-    """Return whether there is a closed cell."""
-    return closure[0][0] <= closure[0][1]
 
 
 @njit(cache=True, nogil=True)
@@ -328,10 +322,8 @@ def see_round(mesh, around, place, goal, room, found):
     contain it; `room`, `found`: see `see_from_point`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    x, y, starts = place
     closure, free, polygons, members, n_old = around
-    if not is_any_closed(closure):
-        return see_from_point(mesh, x, y, starts, goal, room, found)
+    x, y, starts = place
     seen = room[2]
     is_seen = np.zeros(len(cx) - n_old, np.bool_)
     for polygon in starts:
@@ -362,28 +354,11 @@ def see_round(mesh, around, place, goal, room, found):
 
 @njit(cache=True, nogil=True)
 def look_round(mesh, where, endpoints, rooms, bounds, around):
-    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
+    """Do the same as `look_from_endpoints` past closed cells.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    where
-        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_endpoints`.
-    rooms
-        int32 room for the polygons of start and goal, room of `see_from_point`.
-    bounds
-        Receives the length and lower bound of the answer: infinite if the endpoints are not
-        connected, their distance if they see each other.
-    around
-        The closure (see `closure_of`), the free cells before, int32 polygons of new corners, and
-        which these are; the number of corners before. No end is a corner of a closed cell.
-
-    Returns
-    -------
-    tuple
-        `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the
-        goal sees and then those that the start sees; the indices at which both lists end.
+    Neither end is a corner of a closed cell. `around` holds the closure (see `closure_of`), the
+    free cells before, int32 polygons of new corners, and which corners these are; the number of
+    corners before.
     """
     sx, sy, tx, ty = endpoints
     component, polygon_at, cells = where
@@ -394,17 +369,15 @@ def look_round(mesh, where, endpoints, rooms, bounds, around):
     if how == APART:
         bounds[:] = np.inf
         return DONE, 0, 0
-    if how == SPLIT or is_any_closed(around[0]):
-        nowhere = (0.0, 0.0, starts[:0])
-        n, _ = see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
-        if n < 0:
-            return WORK_FULL, 0, 0
-        target = (tx, ty, goals[:n_goals] if how == SPLIT else starts[:0])
-        n_all, is_seen = see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
-        if n_all < 0:
-            return WORK_FULL, 0, 0
-        is_hidden = how == SPLIT and not is_seen
-        if is_hidden or crosses(around[0], around[1], sx, sy, tx, ty):
-            return PAUSED, n, n_all
-    bounds[:] = math.hypot(tx - sx, ty - sy)
-    return DONE, 0, 0
+    nowhere = (0.0, 0.0, starts[:0])
+    n, _ = see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
+    if n < 0:
+        return WORK_FULL, 0, 0
+    target = (tx, ty, goals[:n_goals] if how != MET else starts[:0])
+    n_all, is_seen = see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
+    if n_all < 0:
+        return WORK_FULL, 0, 0
+    if (is_seen or how == MET) and not crosses(around[0], around[1], sx, sy, tx, ty):
+        bounds[:] = distance(sx, sy, tx, ty)
+        return DONE, 0, 0
+    return PAUSED, n, n_all

@@ -4,19 +4,12 @@ A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph
 (landmarks). S. Oh, H. W. Leong: Edge N-level sparse visibility graphs, 2017 (taut edges).
 """
 
+import math
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import turn_of
-from hybridnav.search.contraction import grow_rows
-from hybridnav.search.mesh.kernels.closures import (
-    DEAD,
-    crosses,
-    look_round,
-    see_round,
-)
-from hybridnav.search.mesh.kernels.intervals import polygon_in, polygons_with
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
     DONE,
@@ -32,15 +25,8 @@ from hybridnav.search.mesh.kernels.polyanya import (
     pop,
     push,
     put_corner,
-    spread_from,
 )
-from hybridnav.search.mesh.kernels.views import (
-    distance,
-    lobe_of,
-    see_quadrant,
-    touches,
-    walls_at,
-)
+from hybridnav.search.mesh.kernels.views import distance, lobe_of, see_from_point
 
 _SLACK = 1e-9
 """Rounding of distances in the graph, in cells."""
@@ -51,13 +37,12 @@ _SLACK = 1e-9
 def query_corners(mesh, graph, where, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
-    `mesh`, `endpoints`: see `successors`; `graph`: int64 (2 n + 1,) and int32 (m,) of `edges_of`;
-    float64 (n, landmarks) of `landmarks_of`, with closed cells of `geodesics_of`; both results of
-    `link`, None if nothing is closed; what `look_round` needs; `where`: see `look_round`; `work`:
-    arrays of one query: room for the polygons of the endpoints; room of `see_from_point`; cost of
-    corners (infinite), estimate, corner before, length to the goal (infinite), corners touched;
-    keys and values of the heap; float64 (2, landmarks) bounds of the goal; counts and bounds;
-    `effort`: see `query`. Result: see `query`.
+    `mesh`, `endpoints`: see `successors`; `graph`: int64 (2 n + 1,) and int32 (m,) of `edges_of`,
+    float64 (n, landmarks) of `landmarks_of`; `where`: see `look_from_endpoints`; `work`: arrays of
+    one query: room for the polygons of the endpoints; room of `see_from_point`; cost of corners
+    (infinite), estimate, corner before, length to the goal (infinite), corners touched; keys and
+    values of the heap; float64 (2, landmarks) bounds of the goal; counts and bounds; `effort`: see
+    `query`. Result: see `query`.
     """
     starts, goals, room, corners, heap, _, counts, bounds = work
     costs, _, _, to_goal, touched = corners
@@ -67,8 +52,9 @@ def query_corners(mesh, graph, where, endpoints, work, effort):
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        rooms, around = (starts, goals, room), graph[5]
-        status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
+        status, n, n_all = look_from_endpoints(
+            mesh, where, endpoints, (starts, goals, room), bounds
+        )
         if n_all - n > len(heap[0]):
             status = WORK_FULL
         if status == WORK_FULL:
@@ -77,12 +63,9 @@ def query_corners(mesh, graph, where, endpoints, work, effort):
             return DONE, none if bounds[UPPER] == np.inf else _path_through(
                 mesh, endpoints, corners[2], -1
             )
-        seen = room[2][:n], room[2][n:n_all]
-        _seed(mesh, graph[2], graph[4], endpoints, seen, work)
+        _seed(mesh, graph, endpoints, (room[2][:n], room[2][n:n_all]), work)
         counts[BEGUN], counts[MARKED] = 1, n
-    status = DONE
-    if limit >= 0:
-        status = _advance(mesh, graph, graph[3], endpoints, work, factor, limit)
+    status = _advance(mesh, graph, endpoints, work, factor, limit) if limit >= 0 else DONE
     if status != DONE:
         return status, none
     for corner in room[2][: counts[MARKED]]:
@@ -96,12 +79,12 @@ def query_corners(mesh, graph, where, endpoints, work, effort):
 
 
 @njit(cache=True, nogil=True)
-def _seed(mesh, table, new, endpoints, seen, work):
+def _seed(mesh, graph, endpoints, seen, work):
     """Mark the corners that see the goal, and reach those that the start sees."""
     cx, cy = mesh[0], mesh[1]
     sx, sy, tx, ty = endpoints
     from_goal, from_start = seen
-    n_landmarks = table.shape[1]
+    table = graph[2]
     corners, goal_bounds, counts = work[3], work[5], work[6]
     to_goal = corners[3]
     # The distance of the goal from a landmark lies between these two, in the graph.
@@ -109,68 +92,41 @@ def _seed(mesh, table, new, endpoints, seen, work):
     goal_bounds[1] = -np.inf
     for corner in from_goal:
         to_goal[corner] = distance(cx[corner], cy[corner], tx, ty)
-        for k in range(n_landmarks):
-            at_least = at_most = np.inf
-            if corner < len(table):
-                at_least = at_most = table[corner, k]
-            if new is not None:
-                if corner >= len(table):
-                    row = new[corner - len(table)]
-                    at_least, at_most = row[0, k], row[1, k]
-            if at_least < np.inf:
-                goal_bounds[0, k] = min(goal_bounds[0, k], at_least + to_goal[corner] - _SLACK)
-                goal_bounds[1, k] = max(goal_bounds[1, k], at_most - to_goal[corner] + _SLACK)
-    for k in range(n_landmarks):
+        for k in range(table.shape[1]):
+            if table[corner, k] < np.inf:
+                at_most, at_least = table[corner, k] + to_goal[corner], table[corner, k]
+                goal_bounds[0, k] = min(goal_bounds[0, k], at_most - _SLACK)
+                goal_bounds[1, k] = max(goal_bounds[1, k], at_least - to_goal[corner] + _SLACK)
+    for k in range(table.shape[1]):
         if goal_bounds[0, k] == np.inf:
             goal_bounds[0, k], goal_bounds[1, k] = -np.inf, np.inf
     counts[SIZE] = 0
-    bend = (sx, sy, sx, sy, 0.0)
-    _relax(mesh, table, new, None, endpoints, work, -1, bend, 0.0, from_start)
+    _relax(mesh, table, endpoints, work, -1, (sx, sy, sx, sy, 0.0), 0.0, from_start)
 
 
 @njit(cache=True, nogil=True)
-def _advance(mesh, graph, links, endpoints, work, factor, limit):
-    """Search until the answer is good enough or enough corners are expanded; see `advance`.
-
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    graph, work
-        See `query_corners`.
-    links
-        The edges to corners of closed cells, see `link`; None if nothing is closed.
-    factor, limit
-        See `advance`.
-    """
+def _advance(mesh, graph, endpoints, work, factor, limit):
+    """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, heads, table, _, new, around = graph
-    n_links = 0
-    if links is not None:
-        n_links = links.shape[1]
+    first, heads, table = graph
     _, _, _, corners, heap, _, counts, bounds = work
     costs, estimates, came, _, _ = corners
     sx, sy, _, _ = endpoints
     keys, values = heap
     status = DONE
     while counts[SIZE]:
-        # The corner with the least estimate, unless it was reached by a cheaper path since.
         here, key = values[0], keys[0]
         if key > costs[here] + estimates[here]:
             counts[SIZE] = pop(heap, counts[SIZE])
             continue
         if key * factor >= bounds[UPPER]:
             break
-        # Its edges in the quadrant into which a path may go on.
         x, y, kind, before = cx[here], cy[here], kinds[here], came[here]
         px, py = (sx, sy) if before < 0 else (cx[before], cy[before])
         dx, dy = x - px, y - py
-        low = high = np.int64(0)
-        if here < len(table):
-            place = 2 * here + lobe_of(kind, dx, dy)
-            low, high = first[place], first[place + 1]
-        # Without room or time for them the corner stays in the heap.
-        if counts[SIZE] + high - low + n_links > len(keys):
+        place = 2 * here + lobe_of(kind, dx, dy)
+        low, high = first[place], first[place + 1]
+        if counts[SIZE] + high - low > len(keys):
             status = WORK_FULL
             break
         if counts[EXPANDED] >= limit:
@@ -180,29 +136,24 @@ def _advance(mesh, graph, links, endpoints, work, factor, limit):
         counts[EXPANDED] += 1
         # The blocked cell lies on the left of the path here, or on the right.
         hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
-        bend, cost = (px, py, x, y, hand), costs[here]
-        # Round closed cells also the edges to their corners, which meet no closed cell.
-        if links is None:
-            _relax(mesh, table, None, None, endpoints, work, here, bend, cost, heads[low:high])
-        else:
-            _relax(mesh, table, new, around, endpoints, work, here, bend, cost, heads[low:high])
-            low, high = np.searchsorted(links[0], here), np.searchsorted(links[0], here + 1)
-            _relax(mesh, table, new, None, endpoints, work, here, bend, cost, links[1, low:high])
+        _relax(
+            mesh, table, endpoints, work, here, (px, py, x, y, hand), costs[here], heads[low:high]
+        )
     least = min(keys[0], bounds[UPPER]) if counts[SIZE] else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
     return status
 
 
 @njit(cache=True, nogil=True)
-def _relax(mesh, table, new, around, endpoints, work, before, bend, cost_before, heads):
+def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
     """Reach corners from a corner, or from the start, if that is cheaper than before.
 
     Parameters
     ----------
     mesh, endpoints
         See `successors`.
-    table, new, around
-        Parts of the graph; the last is None if no edge meets a closed cell.
+    table
+        float64 (n, landmarks), from `landmarks_of`.
     work
         Arrays of the query; see `query_corners`.
     before, cost_before
@@ -227,24 +178,18 @@ def _relax(mesh, table, new, around, endpoints, work, before, bend, cost_before,
         is_new = costs[corner] == np.inf
         if is_new:
             left = distance(wx, wy, tx, ty)
-            for k in range(table.shape[1] if corner < len(table) else 0):
+            for k in range(table.shape[1]):
                 reached = table[corner, k]
                 if reached < np.inf:
                     left = max(left, goal_bounds[0, k] - reached, reached - goal_bounds[1, k])
-            if new is not None:
-                left = max(left, _left_of_new(new, goal_bounds, corner - len(table)))
         else:
             left = estimates[corner]
         through = cost + to_goal[corner]
-        if through >= upper and cost + left >= upper:
-            continue
-        # Few edges get here, fewer pass closed cells: they are tested as they are met.
-        if around is not None:
-            if mesh[2][corner] & DEAD or crosses(around[0], around[1], x, y, wx, wy):
-                continue
         if through < upper:
             upper = through
             counts[LAST] = corner
+        elif cost + left >= upper:
+            continue
         if is_new:
             estimates[corner] = left
             touched[n_touched] = corner
@@ -253,16 +198,6 @@ def _relax(mesh, table, new, around, endpoints, work, before, bend, cost_before,
         if cost + left < upper:
             size = push(heap, size, cost + left, corner)
     counts[SIZE], counts[TOUCHED], bounds[UPPER] = size, n_touched, upper
-
-
-@njit(cache=True, nogil=True)
-def _left_of_new(new, goal_bounds, row):
-    """Return a bound of the length from a corner of closed cells to the goal, by landmarks."""
-    left = 0.0
-    for k in range(goal_bounds.shape[1] if row >= 0 else 0):
-        if new[row, 1, k] < np.inf:
-            left = max(left, goal_bounds[0, k] - new[row, 1, k], new[row, 0, k] - goal_bounds[1, k])
-    return left
 
 
 @njit(cache=True, nogil=True)
@@ -283,128 +218,178 @@ def _path_through(mesh, endpoints, came, corner):
     return path[n:].copy()
 
 
-# The graph round closed cells: distances from landmarks that hold there too, and new corners.
+# Kernels of the endpoints of a query: the polygons that contain them, the corners that they see.
+
+APART, MET, SPLIT = -1, 1, 0
+"""Positions of the endpoints of a query: not connected, in one polygon, in several."""
 
 
-@guarded
 @njit(cache=True, nogil=True)
-def geodesics_of(mesh, place, graph):
-    """Compute the distances of all corners from landmarks in free space.
+def look_from_endpoints(mesh, where, endpoints, rooms, bounds):
+    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
-    Those in the graph are longer where a shortest path leaves the landmark, or arrives, in the
-    quadrant opposite to the blocked cell. Round closed cells, a path of the graph may go on from
-    such a corner; only distances in free space are then bounds.
+    `mesh`, `endpoints`: see `successors`; `where`: component of polygons, the polygon of each cell,
+    and `cells`; see `polygons_of_endpoints`; `rooms`: int32 room for the polygons of start and
+    goal, room of `see_from_point`; `bounds`: receives the length and lower bound of the answer:
+    infinite if the endpoints are not connected, their distance if they see each other. Result:
+    `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the goal
+    sees and then those that the start sees; the indices at which both lists end.
+    """
+    sx, sy, tx, ty = endpoints
+    component, polygon_at, cells = where
+    starts, goals, room = rooms
+    how, n_starts, n_goals = polygons_of_endpoints(
+        mesh, component, polygon_at, cells, endpoints, starts, goals
+    )
+    if how == APART:
+        bounds[:] = np.inf
+        return DONE, 0, 0
+    if how == SPLIT:
+        nowhere = (0.0, 0.0, starts[:0])
+        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
+        if n < 0:
+            return WORK_FULL, 0, 0
+        target = (tx, ty, goals[:n_goals])
+        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, room, n)
+        if n_all < 0:
+            return WORK_FULL, 0, 0
+        if not is_seen:
+            return PAUSED, n, n_all
+    bounds[:] = math.hypot(tx - sx, ty - sy)
+    return DONE, 0, 0
+
+
+@njit(cache=True, nogil=True)
+def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts, goals):
+    """Find the polygons that contain the endpoints of a query.
+
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    component
+        int32 (p,) of `blocks_of`.
+    polygon_at
+        int32 (rows, cols), the polygon at the centre of each cell.
+    cells
+        Row and column of the start's cell, then of the goal's; free ones.
+    starts, goals
+        int32, room for as many polygons as the mesh has.
+
+    Returns
+    -------
+    tuple
+        `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
+    """
+    sx, sy, tx, ty = endpoints
+    from_row, from_col, to_row, to_col = cells
+    inner = polygon_in(mesh, component, polygon_at, from_row, from_col)
+    last = polygon_in(mesh, component, polygon_at, to_row, to_col)
+    if component[inner] != component[last]:
+        return APART, 0, 0
+    n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
+    n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
+    for k in range(n_starts):
+        for m in range(n_goals):
+            if starts[k] == goals[m]:
+                return MET, n_starts, n_goals
+    return SPLIT, n_starts, n_goals
+
+
+@njit(cache=True, nogil=True)
+def polygon_in(mesh, component, polygon_at, row, col):
+    """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
+    cx, cy, _, first, begins, finishes, _, _ = mesh
+    polygon = polygon_at[row, col]
+    if polygon >= 0 and component[polygon] >= 0:
+        return polygon
+    for other in range(len(first) - 2, -1, -1):
+        holds = component[other] >= 0
+        for slot in range(first[other], first[other + 1]):
+            u, w = begins[slot], finishes[slot]
+            holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
+        if holds:
+            return other
+    return polygon
+
+
+@njit(cache=True, nogil=True)
+def polygons_with(mesh, inner, row, col, x, y, found):
+    """Find the polygons with a point of a free cell, also on their sides, reached inside the cell.
 
     Parameters
     ----------
     mesh
         See `successors`.
-    place
-        Component of polygons, and the polygon of each cell.
-    graph
-        int64 (2 n + 1,) and int32 (m,) of `edges_of`, float64 (n, landmarks) of `landmarks_of`.
+    inner
+        The polygon at the centre of the cell.
+    row, col
+        The cell.
+    x, y
+        The point, in the closed square of the cell: where two free cells meet only at a corner, it
+        belongs to this cell.
+    found
+        int32, room for the polygons, as many as the mesh has.
 
     Returns
     -------
-    numpy.ndarray
-        float64 (n, landmarks).
+    int
+        Number of polygons found.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, heads, table = graph
-    n = len(kinds)
-    arrived = np.ascontiguousarray(table.T)
-    wall = walls_at(mesh, place[0])
-    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
-    heap = np.empty(n), np.empty(n, np.int32)
-    for k in range(table.shape[1]):
-        # What the landmark sees in the third quadrant is nearer, and what lies behind.
-        source = np.argmin(table[:, k])
-        size = 0
-        found, room = see_quadrant(mesh, source, wall[source], 2, room)
-        for corner in room[2][:found]:
-            reached = distance(cx[source], cy[source], cx[corner], cy[corner])
-            if reached < arrived[k, corner]:
-                arrived[k, corner] = reached
-                size = push(heap, size, reached, corner)
-        heap = spread_from((cx, cy), (first, heads), heap, size, arrived[k])
-    # The last segment may arrive in the third quadrant.
-    reached_at = np.ascontiguousarray(arrived.T)
-    geodesics = reached_at.copy()
-    for corner in range(n):
-        if kinds[corner] >= 4 or wall[corner] < 0:
-            continue
-        found, room = see_quadrant(mesh, corner, wall[corner], 2, room)
-        for other in room[2][:found]:
-            further = distance(cx[corner], cy[corner], cx[other], cy[other])
-            for k in range(table.shape[1]):
-                geodesics[corner, k] = min(geodesics[corner, k], reached_at[other, k] + further)
-    return geodesics
+    cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
+    found[0] = inner
+    n = 1
+    at = 0
+    while at < n:
+        polygon = found[at]
+        at += 1
+        low, high = first[polygon], first[polygon + 1]
+        for slot in range(low, high):
+            if twins[slot] < 0:
+                continue
+            u = begins[slot]
+            w = finishes[slot]
+            # The segment from the centre to the point meets no wall: its polygons are connected.
+            if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
+                continue
+            other = polygon_of[twins[slot]]
+            is_known = False
+            for k in range(n):
+                is_known = is_known or found[k] == other
+            if not is_known:
+                found[n] = other
+                n += 1
+    kept = 0
+    for k in range(n):
+        polygon = found[k]
+        low, high = first[polygon], first[polygon + 1]
+        holds = True
+        for slot in range(low, high):
+            u = begins[slot]
+            w = finishes[slot]
+            holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], x, y) >= 0
+        if holds:
+            found[kept] = polygon
+            kept += 1
+    return kept
 
 
 @njit(cache=True, nogil=True)
-def see_from_new(mesh, around, place, point, room, polygons):
-    """Return the number of corners that a new corner sees, and the room, which may grow."""
-    x, y = point
-    row, col = int(y), int(x)
-    inner = polygon_in(mesh, place[0], place[1], row, col)
-    starts = polygons[: polygons_with(mesh, inner, row, col, x, y, polygons)]
-    nowhere = (0.0, 0.0, starts[:0])
-    n, _ = see_round(mesh, around, (x, y, starts), nowhere, room, 0)
-    while n < 0:
-        room = grow_rows(room[0]), grow_rows(room[1]), grow(room[2])
-        n, _ = see_round(mesh, around, (x, y, starts), nowhere, room, 0)
-    return n, room
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def link(mesh, around, place, table):
-    """Find the edges between the corners of closed cells, and to those that they see.
+def _touch(ax, ay, bx, by, px, py, qx, qy):
+    """Return whether two segments have a point in common.
 
     Parameters
     ----------
-    mesh
-        See `successors`, with the corners and kinds of `corners_round`.
-    around
-        See `look_round`.
-    place
-        Component of polygons, and the polygon of each cell.
-    table
-        Result of `geodesics_of`.
-
-    Returns
-    -------
-    tuple
-        int32 (2, m), the corners at which the edges begin, sorted, and those at which they end;
-        float64 (new, 2, landmarks) least and greatest distance of each new corner from landmarks.
+    ax, ay, bx, by
+        Ends of one segment, in cells.
+    px, py, qx, qy
+        Ends of the other.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    n_old, n_all = around[4], len(cx)
-    view = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
-    polygons = np.empty(len(place[0]), np.int32)
-    bounds = np.empty((n_all - n_old, 2, table.shape[1]))
-    bounds[:, 0], bounds[:, 1] = -np.inf, np.inf
-    ends, m = np.empty((1024, 2), np.int32), 0
-    for corner in range(n_old, n_all):
-        x, y, kind = cx[corner], cy[corner], kinds[corner]
-        n, view = see_from_new(mesh, around, place, (x, y), view, polygons)
-        for other in view[2][:n]:
-            dx, dy = cx[other] - x, cy[other] - y
-            if other < n_old:
-                apart = distance(x, y, cx[other], cy[other])
-                row = bounds[corner - n_old]
-                for k in range(table.shape[1]):
-                    row[0, k] = max(row[0, k], table[other, k] - apart)
-                    row[1, k] = min(row[1, k], table[other, k] + apart)
-            # Only segments along which a path may bend round it, each once.
-            if n_old <= other <= corner or not touches(kind, dx, dy):
-                continue
-            while m + 2 > len(ends):
-                ends = grow_rows(ends)
-            ends[m, 0], ends[m, 1], ends[m + 1, 0], ends[m + 1, 1] = corner, other, other, corner
-            m += 2
-    order = np.argsort(ends[:m, 0], kind="mergesort")
-    links = np.empty((2, m), np.int32)
-    for k in range(m):
-        links[0, k], links[1, k] = ends[order[k], 0], ends[order[k], 1]
-    return links, bounds
+    if max(ax, bx) < min(px, qx) or max(px, qx) < min(ax, bx):
+        return False
+    if max(ay, by) < min(py, qy) or max(py, qy) < min(ay, by):
+        return False
+    return (
+        turn_of(ax, ay, bx, by, px, py) * turn_of(ax, ay, bx, by, qx, qy) <= 0
+        and turn_of(px, py, qx, qy, ax, ay) * turn_of(px, py, qx, qy, bx, by) <= 0
+    )

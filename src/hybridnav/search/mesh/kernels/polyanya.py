@@ -23,7 +23,7 @@ from hybridnav.search.mesh.kernels.intervals import (
     successors,
     turns,
 )
-from hybridnav.search.mesh.kernels.views import distance, see_quadrant, walls_at
+from hybridnav.search.mesh.kernels.views import distance, see_from_corner
 
 DONE, PAUSED, WORK_FULL = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;
@@ -298,24 +298,32 @@ def edges_of(mesh, component, limit):
     `lobe_of`; int32 (m,) the corner at which each edge ends. Each edge occurs in both directions.
     If there are more edges than the limit, the last entry of the first array is -1.
     """
-    kinds = mesh[2]
+    kinds, begins, twins, polygon_of = mesh[2], mesh[4], mesh[6], mesh[7]
     n = len(kinds)
-    wall = walls_at(mesh, component)
-    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    wall = np.full(n, -1, np.int32)
+    for slot in range(len(begins)):
+        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
+            wall[begins[slot]] = slot
+    target = (0.0, 0.0, np.empty(0, np.int32))
+    whole, real, seen = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
     first = np.zeros(2 * n + 1, np.int64)
     heads = np.empty(16 * n, np.int32)
     m = 0
     for corner in range(n):
         for lobe in range(2):
             found = 0
-            if kinds[corner] < 4 and wall[corner] >= 0:
-                found, room = see_quadrant(mesh, corner, wall[corner], lobe, room)
+            while kinds[corner] < 4 and wall[corner] >= 0:
+                room = (whole, real, seen)
+                found = see_from_corner(mesh, corner, wall[corner], lobe, target, room, 0)
+                if found >= 0:
+                    break
+                whole, real, seen = _doubled(whole), _doubled(real), _doubled(seen)
             if m + found > limit:
                 first[2 * n] = -1
                 return first, heads[:0].copy()
             while m + found > len(heads):
                 heads = _doubled(heads)
-            heads[m : m + found] = room[2][:found]
+            heads[m : m + found] = seen[:found]
             m += found
             first[2 * corner + lobe + 1] = m
     return first, heads[:m].copy()
@@ -328,17 +336,12 @@ def distances_from(points, graph, source, distances):
     `points`: float64 x and y of corners; `graph`: the graph of `edges_of`; `distances`: float64
     (n,), filled in.
     """
+    cx, cy = points
+    first, heads = graph
     heap = (np.empty(1024), np.empty(1024, np.int32))
     distances[:] = np.inf
     distances[source] = 0.0
-    spread_from(points, graph, heap, push(heap, 0, 0.0, source), distances)
-
-
-@njit(cache=True, nogil=True)
-def spread_from(points, graph, heap, size, distances):
-    """Spread distances from the corners in a heap, and return the heap; see `distances_from`."""
-    cx, cy = points
-    first, heads = graph
+    size = push(heap, 0, 0.0, source)
     while size:
         here, cost = heap[1][0], heap[0][0]
         size = pop(heap, size)
@@ -353,7 +356,6 @@ def spread_from(points, graph, heap, size, distances):
             if reached < distances[other]:
                 distances[other] = reached
                 size = push(heap, size, reached, other)
-    return heap
 
 
 @njit(cache=True, nogil=True)
