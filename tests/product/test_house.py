@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_489,
-    "lines": 94_506,
+    "code": 59_373,
+    "lines": 94_300,
     "files": 386,
-    "code outside ext": 42_157,
+    "code outside ext": 42_041,
     "lines of a file, median": 274,
     "lines of a file, most": 450,
     "packages": 12,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_535,
+    "lines of tests": 61_540,
 }
 
 
