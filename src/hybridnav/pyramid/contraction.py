@@ -104,11 +104,6 @@ _NO_HULLS = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
 class Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
-    joins: ByteArray = np.empty(0, np.uint8)
-    """By base edge, the level at which its cells join anyway, 0 for none; see `contract_within`."""
-    last_join = 0
-    """The greatest of these levels."""
-
     survivors: BoolArray | None = None
     """By flat cell, those that survive whatever they merge with; None for no such cells."""
 
@@ -183,40 +178,17 @@ class Decimation:
         """Build the next level; return False if this one is the apex."""
         count = self._find_candidates()
         self._lap("candidates")
-        if count == 0 and self._level >= max(self._whole_at, self.last_join):
-            return False
         if count == 0 and self._level >= self._whole_at:
-            # Nothing happens below the next level at which cells join.
-            self._level = int(self.joins[self.joins > self._level].min()) - 1
+            return False
         self._level += 1
         if self._level > MAX_LEVELS:
             raise InvalidValueError(f"the map needs more than {MAX_LEVELS} levels")
-        scratch = self._scratch_of_level()
+        scratch = self._scratch.for_level(self.n_vertices, len(self._darts.base_edge))
         self._select(scratch, count)
-        joined = self._select_joins(scratch)
         self._make_level(scratch)
-        while joined:
-            scratch = self._scratch_of_level()
-            self._select(scratch, 0)
-            joined = self._select_joins(scratch)
-            if joined:
-                self._make_level(scratch)
         self._note_loops()
         self._lap("compaction")
         return True
-
-    def _scratch_of_level(self) -> Scratch:
-        return self._scratch.for_level(len(self._vertices.cells), len(self._darts.base_edge))
-
-    def _select_joins(self, scratch: Scratch) -> bool:
-        """Add stars of what joins up to this level; return whether there are any."""
-        if not len(self.joins):
-            return False
-        darts, stars = self._darts, (scratch.parent, scratch.kernel_dart)
-        count: int = _base_kernels.select_joins(
-            darts.origin, darts.base_edge, self.joins, self._level, *stars
-        )
-        return count > 0
 
     def _make_level(self, scratch: Scratch) -> None:
         """Contract the chosen stars and remove the edges that this makes redundant."""

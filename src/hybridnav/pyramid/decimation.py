@@ -108,29 +108,6 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     return run.record, run.stats, places
 
 
-def contract_within(  # noqa: PLR0913 - each criterion of merging is an argument of its own
-    start: Start,
-    linkage: Linkage,
-    limit: int,
-    seed: int,
-    joins: ByteArray,
-    *,
-    survivors: BoolArray | None = None,
-) -> None:
-    """Contract stars from a start until no edge may be contracted and all that joins has joined.
-
-    `start`: where to start, with a record of the base. The kinds of vertices that join differ.
-    `linkage`, `limit`, `seed`: see `decimate`; `joins`: uint8 by base edge, the level at which its
-    two cells join whatever lies between them, 0 for edges that this does not concern; empty for
-    none; `survivors`: bool by flat cell, cells that survive whatever they merge with; at most one
-    of each kind.
-    """
-    run = Decimation(start, seed, _LINKAGES[linkage], limit)
-    run.joins, run.last_join = joins, int(joins.max(initial=0))
-    run.survivors = survivors
-    run.exhaust()
-
-
 def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
     places: Level,
     record: Record,
@@ -254,10 +231,6 @@ class Expansion:
         return low * len(self._areas) + high
 
 
-_FIRST_KIND = 3
-"""The least number that is no class: cells of a ring have kinds of their own."""
-
-
 class Criterion(NamedTuple):
     """What decides whether two fields merge."""
 
@@ -272,8 +245,6 @@ class Criterion(NamedTuple):
 class Fields(NamedTuple):
     """The fields of a window after its decimation."""
 
-    record: Record
-    """All levels; flat arrays of the window."""
     field_of: IntArray
     """int32 (rows, cols), the field of each cell, -1 for none."""
     survivors: LongArray
@@ -284,36 +255,18 @@ class Fields(NamedTuple):
     """int32 (n, 4), as `Level.boxes`."""
 
 
-def contract_places(
-    places: IntArray,
-    survivors: BoolArray,
-    beside: tuple[BoolArray, ByteArray],
-    criterion: Criterion,
-) -> Fields:
-    """Contract each of some places to its surviving cell, beside fields that stay as they are.
+def contract_places(places: IntArray, survivors: BoolArray, criterion: Criterion) -> Record:
+    """Contract each of some places to its surviving cell, and return all levels, flat.
 
     `places`: int32 (rows, cols), the place of each cell that starts as a vertex of the base, from
     1; 0 elsewhere; `survivors`: bool (rows, cols), the cell of each place that survives. The
-    linkage is "radius", and no cell is too far from that of its place. `beside`: bool (rows, cols),
-    the cells beside the places: all that share a 2x2 block with one of theirs; and uint8 by base
-    edge, the level at which two of these join, 0 for all other edges. Only these cells of the
-    fields that stay are looked at. They join one another at the levels at which they do so in their
-    fields, so that edges to them end where they must. `criterion`: when two fields merge. Returns
-    one for each place, with the ends of all its edges. What is stated about the cells beside them
-    is of no use elsewhere.
+    linkage is "radius", and no cell is too far from that of its place. `criterion`: when two fields
+    merge.
     """
     in_blocks = np.where(survivors, np.int32(0), places)
-    ring, joins = beside
-    kinds = np.where(ring, np.int32(1), places)
-    kinds.flags.writeable = in_blocks.flags.writeable = False
-    record, darts, vertices, *rest = start_at_base(kinds, criterion.limit, in_blocks=in_blocks)
-    kind = vertices.classes.astype(np.int32)
-    on_ring = np.flatnonzero(ring[tuple(vertices.cells.T)])
-    kind[on_ring] = max(_FIRST_KIND, int(places.max(initial=0)) + 1) + np.arange(len(on_ring))
-    start = Start(record, darts, vertices._replace(classes=kind), *rest)
-    contract_within(start, *criterion, joins, survivors=survivors.ravel())
-    field_of, found, areas, boxes = _fields(record, places.shape[1])
-    return Fields(record, field_of.reshape(places.shape), found, areas, boxes)
+    places.flags.writeable = in_blocks.flags.writeable = False
+    start = start_at_base(places, criterion.limit, in_blocks=in_blocks)
+    return _contract_within(start, criterion, survivors.ravel())
 
 
 def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
@@ -323,10 +276,22 @@ def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
     fields merge.
     """
     classes.flags.writeable = False  # as the classes of a grid are: another type compiles anew
-    start = start_at_base(classes, criterion.limit)
-    contract_within(start, *criterion, np.empty(0, np.uint8))
-    field_of, survivors, areas, boxes = _fields(start.record, classes.shape[1])
-    return Fields(start.record, field_of.reshape(classes.shape), survivors, areas, boxes)
+    record = _contract_within(start_at_base(classes, criterion.limit), criterion, None)
+    field_of, survivors, areas, boxes = _fields(record, classes.shape[1])
+    return Fields(field_of.reshape(classes.shape), survivors, areas, boxes)
+
+
+def _contract_within(start: Start, criterion: Criterion, survivors: BoolArray | None) -> Record:
+    """Contract stars from a start until no edge may be contracted, and return its record.
+
+    `survivors`: bool by flat cell, cells that survive whatever they merge with; at most one of each
+    kind.
+    """
+    linkage, limit, seed = criterion
+    run = Decimation(start, seed, _LINKAGES[linkage], limit)
+    run.survivors = survivors
+    run.exhaust()
+    return start.record
 
 
 def _fields(record: Record, cols: int) -> tuple[IntArray, LongArray, LongArray, IntArray]:

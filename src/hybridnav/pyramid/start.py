@@ -14,13 +14,9 @@ from hybridnav.pyramid.kernels.decimation import Vertices
 from hybridnav.pyramid.record import SURVIVES, Record
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, ByteArray, LongArray
-
-
-if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._base.typing import ByteArray, IntArray
+    from hybridnav._base.typing import AnyArray, ByteArray, IntArray, LongArray
     from hybridnav.pyramid.level import Level
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]

@@ -233,8 +233,7 @@ def pyramid_of(
     survivors = np.zeros(box.shape, np.bool_)
     row, col = (state.places.read(numbers)["cell"] - np.array(box[:2])).T
     survivors[row, col] = True
-    beside = np.zeros(box.shape, np.bool_), np.zeros(2 * place.size, np.uint8)
-    record = contract_places(index_of[place], survivors, beside, criterion).record
+    record = contract_places(index_of[place], survivors, criterion)
     ends = record.vertex_end[record.vertex_end < SURVIVES]
     n_levels = int(ends.max(initial=0)) + 1
     stats = BuildStats(record.sizes(grid.shape[1], n_levels), tops=[n_levels - 1])
