@@ -17,7 +17,6 @@ from hybridnav.search.mesh.kernels.intervals import (
     WHOLE_SIDE,
     G,
     along,
-    estimate,
     estimate_of,
     put,
     successors,
@@ -52,7 +51,7 @@ def seed(mesh, blocks, endpoints, starts, work):
     """
     cx, cy, kinds, first, begins, finishes, twins, _ = mesh
     block_of, is_open = blocks
-    sx, sy, tx, ty = endpoints
+    sx, sy, _, _ = endpoints
     whole, real, keys, values, _, _, counts, bounds = work
     n = size = 0
     for polygon in starts:
@@ -63,7 +62,7 @@ def seed(mesh, blocks, endpoints, starts, work):
                 continue
             u, w = begins[slot], finishes[slot]
             ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
-            root, g, x, y = -1, 0.0, sx, sy
+            root, g = -1, 0.0
             if turn_of(sx, sy, ux, uy, wx, wy) == 0:
                 # The start lies on the side, or on its line.
                 if (ux - sx) * (wx - sx) <= 0.0 and (uy - sy) * (wy - sy) <= 0.0:
@@ -73,11 +72,9 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = math.hypot(x - sx, y - sy)
-            # From an end of the side the way to the goal need not cross the rest of the side.
-            straight = math.hypot(tx - x, ty - y)
-            key = g + (estimate(x, y, wx, wy, ux, uy, tx, ty) if root < 0 else straight)
+            put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
+            key = g + estimate_of(mesh, endpoints, whole, real, n)
             if key < bounds[UPPER]:
-                put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
                 size = push((keys, values), size, key, n)
                 n += 1
     counts[N], counts[SIZE] = n, size
