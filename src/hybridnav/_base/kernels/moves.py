@@ -195,9 +195,7 @@ def field_distances(classes, field_of, sources):
                     # An entry with the worse cost stays: to take it out would need a search.
                     into = new_cost // STRAIGHT % 3
                     if count[into] == open_cells.shape[1]:
-                        larger = np.empty((3, 2 * open_cells.shape[1]), np.int32)
-                        larger[:, : open_cells.shape[1]] = open_cells
-                        open_cells = larger
+                        open_cells = np.concatenate((open_cells, open_cells), axis=1)
                     open_cells[into, count[into]] = to
                     count[into] += 1
             turn += 1

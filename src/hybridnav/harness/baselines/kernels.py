@@ -68,9 +68,7 @@ def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
                 mark[to] = is_open
                 into = cost // STRAIGHT % 3
                 if count[into] == waiting.shape[1]:
-                    larger = np.empty((3, 2 * waiting.shape[1]), np.int32)
-                    larger[:, : waiting.shape[1]] = waiting
-                    waiting = larger
+                    waiting = np.concatenate((waiting, waiting), axis=1)
                 waiting[into, count[into]] = to
                 count[into] += 1
         turn += 1
