@@ -5,17 +5,17 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_373,
-    "lines": 94_300,
+    "code": 59_299,
+    "lines": 94_195,
     "files": 386,
-    "code outside ext": 42_041,
-    "lines of a file, median": 274,
+    "code outside ext": 41_968,
+    "lines of a file, median": 272,
     "lines of a file, most": 450,
     "packages": 12,
     "arrows between packages": 60,
     "arrows, with single modules": 79,
     "files visited by paper": 52,
-    "lines visited by paper": 12_958,
+    "lines visited by paper": 12_859,
     "modules of a plan and a picture": 132,
     "imports, % of the code": 8.9,
     "long kernels without headings": 0,
