@@ -31,8 +31,15 @@ def cluster():
         patch.setenv("PYTHONPATH", str(ROOT))
         patch.setenv(faulty.FATAL_PAIR, "2,2>2,2")
         with (
-            # What is asked of a worker that died is asked again soon.
-            dask.config.set({"distributed.comm.timeouts.connect": "5s"}),
+            dask.config.set(
+                {
+                    # What is asked of a worker that died is asked again soon.
+                    "distributed.comm.timeouts.connect": "5s",
+                    # So long after a worker died, dask stops its nanny if the next one is not up
+                    # just then: by default 15 s, in which another test kills the next one.
+                    "distributed.deploy.lost-worker-timeout": "1h",
+                }
+            ),
             distributed.LocalCluster(
                 n_workers=1,
                 threads_per_worker=1,
