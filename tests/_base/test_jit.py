@@ -107,6 +107,50 @@ def test_kept_code_that_names_a_module_that_is_gone_is_compiled_anew(tmp_path: P
         assert (done.returncode, done.stdout) == (0, "4.0\n"), done.stderr
 
 
+_CALLS = """
+import logging, sys
+sys.path.insert(0, sys.argv[1])
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message).14s")
+from kept.callers import outer
+print(outer(1.0))
+"""
+
+
+def test_kept_code_is_compiled_anew_when_a_module_that_it_imports_changes(tmp_path: Path) -> None:
+    """As after an upgrade in place: a module that did not change calls one that did."""
+    package = tmp_path / "kept"
+    package.mkdir()
+    (package / "sizes.py").write_text("STEP = 2.0\n")
+    (package / "within.py").write_text(
+        "from hybridnav._base.jit import njit\nfrom kept import sizes\n"
+        "from kept.sizes import STEP\n"
+        "@njit(cache=True)\ndef inner(x):\n    return x + STEP\n"
+    )
+    (package / "callers.py").write_text(
+        "from hybridnav._base.jit import njit\nfrom kept.within import (\n    inner,\n)\n"
+        "@njit(cache=True)\ndef middle(x):\n    return inner(x)\n"
+        "@njit(cache=True)\ndef outer(x):\n    return 10.0 * middle(x)\n"
+    )
+
+    def run() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", _CALLS, tmp_path],
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    assert run() == "compiled outer\n30.0\n"
+    assert run() == "30.0\n"
+    within = package / "within.py"
+    within.write_text(within.read_text().replace("x + STEP", "x - STEP"))
+    assert run() == "compiled outer\n-10.0\n"
+    (package / "sizes.py").write_text("STEP = 3.0\n")
+    assert run() == "compiled outer\n-20.0\n"
+    assert run() == "-20.0\n"
+
+
 _SHIPS = """
 import logging, os, sys
 from pathlib import Path

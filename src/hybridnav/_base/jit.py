@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import multiprocessing
+import re
 import sys
 import time
 import warnings
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -88,6 +90,43 @@ def _tell() -> None:
         )
 
 
+_IMPORT = re.compile(r"^from ([\w.]+) import (?:\(([^)]*)\)|(.*))", re.MULTILINE)
+
+
+@cache
+def _source(module: str) -> tuple[bytes, list[str]]:
+    """Return the text of a module, and the modules that it may import from."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    text = b"" if file is None else Path(file).read_bytes()
+    imported = []
+    for of, *names in _IMPORT.findall(text.decode()):
+        imported += [of, *(f"{of}.{name}" for name in re.findall(r"\w+", " ".join(names)))]
+    return text, imported
+
+
+@cache
+def _stamp(module: str) -> str:
+    """Return a digest of a module and of what it imports of its own package, and so on.
+
+    numba asks for the module alone, and would run kept code of kernels that others changed.
+    """
+    package, found, to_see = module.partition(".")[0], dict[str, bytes](), [module]
+    while to_see:
+        name = to_see.pop()
+        if name not in found and name.partition(".")[0] == package:
+            found[name], imported = _source(name)
+            to_see += imported
+    return hashlib.sha256(b"".join(found[name] for name in sorted(found))).hexdigest()
+
+
+class _Stamped(CompileResultCacheImpl):
+    """What is kept of a compiled kernel; it holds while nothing that it is made of changes."""
+
+    def __init__(self, py_func: Any) -> None:
+        super().__init__(py_func)  # type: ignore[no-untyped-call]
+        self._locator.get_source_stamp = partial(_stamp, py_func.__module__)
+
+
 class _Nowhere(UserWideCacheLocator):
     """The place of compiled code where no folder can be written."""
 
@@ -95,7 +134,7 @@ class _Nowhere(UserWideCacheLocator):
         """Ask for no folder."""
 
 
-class _Entries(CompileResultCacheImpl):
+class _Entries(_Stamped):
     """What is kept of a compiled kernel: the machine code.
 
     numba adds the code that compiled callers link to, which are the twins' alone, and a listing:
@@ -115,6 +154,12 @@ class _Entries(CompileResultCacheImpl):
         stub = "".join(f'define void @"{one}"() {{ ret void }}\n' for one in names)
         others[4] = ""
         return ((name, kind, (code, llvm.parse_assembly(stub).as_bitcode())), about, *others)
+
+
+class _InnerCache(FunctionCache):
+    """Kept code of a twin, which its callers link to."""
+
+    _impl_class = _Stamped
 
 
 class _Cache(FunctionCache):
@@ -222,6 +267,10 @@ class _Inner(_Renewed):
     literal.
     """
 
+    def enable_caching(self) -> None:
+        """Keep what is compiled, and look for what is kept."""
+        self._cache = _InnerCache(self.py_func)  # type: ignore[no-untyped-call]
+
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for the types of the arguments, not for their values."""
         return super().get_call_template(tuple(map(_type_of, args)), kws)
@@ -275,10 +324,11 @@ class _Kernel(_Renewed):
         code = self.py_func
         twin = FunctionType(code.__code__, code.__globals__, code.__name__, code.__defaults__)
         twin.__qualname__ = f"{code.__qualname__}_inner"
-        is_kept = self.stats.cache_path is not None
-        options = {**self.targetoptions, "no_cpython_wrapper": True, "cache": is_kept}
+        options = {**self.targetoptions, "no_cpython_wrapper": True, "cache": False}
         kernel: Any = numba.jit(**options)(twin)
         kernel.__class__ = _Inner
+        if self.stats.cache_path is not None:
+            kernel.enable_caching()
         return kernel
 
     @property
