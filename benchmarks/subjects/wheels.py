@@ -2,7 +2,8 @@
 
 For each Python `EXERCISE` runs with a wheel in an environment of its own. What it compiles is
 compiled for the levels of x86-64 in `hybridnav._base.jit.LEVELS` and packed, until it compiles
-nothing; the next Python begins with the kernels of the one before. Then, in a home that cannot be
+nothing; the next Python begins with the kernels of the one before, the first one with those of a
+checkout of this commit whose tests have run, if `--known` names one. Then, in a home that cannot be
 written, the answers of `tests.answers` must be those of a run that compiles for this processor, bit
 for bit, with nothing compiled. Exits with 1 where one fails.
 """
@@ -204,6 +205,7 @@ def judge(environment: Environment, tree: Path, folder: Path) -> bool:
 
 OPTIONS = [
     option("--python", nargs="+", default=[sys.executable]),
+    option("--known", type=Path, help="a checkout of this commit whose tests have run"),
     option("--out", type=Path, default=ROOT / "out" / "wheels"),
 ]
 
@@ -214,6 +216,8 @@ def main(given: Namespace) -> int:
         raise Refused("the tree is not clean: commit first, kernels are built from commits")
     given.out.mkdir(parents=True, exist_ok=True)
     kernels: Kernels = {}
+    if given.known is not None:
+        take_kernels(given.known / "src", kernels)
     is_fine = []
     for python in given.python:
         with tempfile.TemporaryDirectory() as scratch:
