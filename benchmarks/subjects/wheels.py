@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -167,23 +168,27 @@ def answers(python: Path, folder: Path, **settings: str) -> tuple[dict[str, Any]
     return json.loads(done.stdout)["answers"], done.stderr.strip().splitlines()[-1]
 
 
-def seconds(environment: Environment, *words: str) -> float:
-    """Return the seconds of a processor that a command takes in an empty home, least of three."""
+def seconds(environment: Environment, *words: str) -> tuple[float, float]:
+    """Return the seconds that a command takes in an empty home, and those of processors, least of
+    three each."""
     found = []
     for _ in range(3):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
         command = environment.python.with_name("hybridnav")
         run(command, *words, env={"PATH": os.environ["PATH"], "HOME": os.devnull})
+        took = time.perf_counter() - began
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return min(found)
+        found.append((took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+    wall, cpu = map(min, zip(*found, strict=True))
+    return wall, cpu
 
 
 def judge(environment: Environment, tree: Path, folder: Path) -> bool:
     """Print whether an installed wheel answers as compiled code does, in a home of no use."""
     packages = environment.packages
     for words in (("--help",), *((*PLAN, "--preset", preset) for preset in TIMED)):
-        print(f"  {seconds(environment, *words):.2f} s of a processor: {' '.join(words)}")
+        wall, cpu = seconds(environment, *words)
+        print(f"  {wall:.2f} s, {cpu:.2f} s of processors: {' '.join(words)}", flush=True)
     for part in ("tests", "benchmarks", "maps"):
         shutil.copytree(tree / part, folder / part)
     for place in (packages / "hybridnav").rglob("__pycache__"):
