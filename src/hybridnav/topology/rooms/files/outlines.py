@@ -233,7 +233,7 @@ class Borders:
 
         `lines`: the chains in the same order.
         """
-        chains = shapely.get_parts(lines)[self.chains_of[room]]
+        chains = shapely.get_geometry(lines, self.chains_of[room])
         return shapely.build_area(shapely.MultiLineString(list(chains[shapely.length(chains) > 0])))
 
     def without_short(self, at_most: float) -> Borders:
