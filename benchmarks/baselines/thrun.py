@@ -10,7 +10,7 @@ from scipy import ndimage
 from benchmarks.baselines.kernels import thrun as kernels
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines.regions import RegionPlanner, joined_regions
+from hybridnav.harness.baselines.regions import RegionPlanner
 from hybridnav.maps import CellClass
 from hybridnav.route.coarse import ArcSearch
 
@@ -232,3 +232,40 @@ def centres_of(region_of: IntArray, n_regions: int) -> FloatArray:
     label = region_of[rows, cols]
     sums = [np.bincount(label, weights=w, minlength=n_regions) for w in (rows, cols)]
     return np.stack(sums, axis=1) / np.bincount(label, minlength=n_regions)[:, None]
+
+
+def joined_regions(
+    region_of: IntArray, *, corner_cutting: bool = False
+) -> tuple[LongArray, FloatArray]:
+    """Return the pairs of regions with a legal move from one to the other.
+
+    `region_of`: int32 (rows, cols), the region of each free cell, -1 elsewhere; `corner_cutting`:
+    whether diagonals may cut corners. Returns int64 (n_pairs, 2), the lower label first, sorted;
+    float64 (n_pairs, 2), the mean of the middles of the moves between the two, (row, col) with
+    cells at whole numbers.
+    """
+    n_regions = int(region_of.max(initial=-1)) + 1
+    free = region_of >= 0
+    rising, falling = free[:-1, :-1] & free[1:, 1:], free[:-1, 1:] & free[1:, :-1]
+    if not corner_cutting:
+        rising = falling = rising & falling
+    keys, rows, cols = [], [], []
+    for tail, head, legal, offset in (
+        (np.s_[:, :-1], np.s_[:, 1:], free[:, :-1] & free[:, 1:], (0.0, 0.5)),
+        (np.s_[:-1, :], np.s_[1:, :], free[:-1] & free[1:], (0.5, 0.0)),
+        (np.s_[:-1, :-1], np.s_[1:, 1:], rising, (0.5, 0.5)),
+        (np.s_[:-1, 1:], np.s_[1:, :-1], falling, (0.5, 0.5)),
+    ):
+        row, col = np.nonzero(legal & (region_of[tail] != region_of[head]))
+        endpoints = np.stack([region_of[tail][row, col], region_of[head][row, col]]).astype(
+            np.int64
+        )
+        keys.append(endpoints.min(axis=0) * n_regions + endpoints.max(axis=0))
+        rows.append(row + offset[0])
+        cols.append(col + offset[1])
+    found, pair_of, count = np.unique(np.concatenate(keys), return_inverse=True, return_counts=True)
+    sums = [
+        np.bincount(pair_of, weights=np.concatenate(w), minlength=len(found)) for w in (rows, cols)
+    ]
+    pairs = np.stack(np.divmod(found, max(n_regions, 1)), axis=1)
+    return pairs, np.stack(sums, axis=1) / count[:, None]

@@ -73,6 +73,15 @@ def test_a_kernel_that_kernels_call_is_called_from_python_too() -> None:
     assert _sum_of_times(values) == 12.5
 
 
+def fresh(code: str, folder: Path) -> str:
+    """Run code in a process that keeps kernels in a folder; return what it prints."""
+    command = [sys.executable, "-c", code, str(folder)]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")}
+    return subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+
+
 _STALE = """
 import sys
 from collections import namedtuple
@@ -92,19 +101,10 @@ def test_kept_code_that_names_a_module_that_is_gone_is_compiled_anew(tmp_path: P
         "@njit(cache=True)\ndef inner(state):\n    return state.values.sum()\n"
         "@njit(cache=True)\ndef outer(state):\n    return inner(state) + 1.0\n"
     )
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for module, other in (("before", "after"), ("after", "before")):
         (tmp_path / f"{module}.py").write_text(tuples)
         (tmp_path / f"{other}.py").unlink(missing_ok=True)
-        code = _STALE.format(module=module)
-        done = subprocess.run(
-            [sys.executable, "-c", code, tmp_path],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert (done.returncode, done.stdout) == (0, "4.0\n"), done.stderr
+        assert fresh(_STALE.format(module=module), tmp_path) == "4.0\n"
 
 
 _CALLS = """
@@ -132,23 +132,14 @@ def test_kept_code_is_compiled_anew_when_a_module_that_it_imports_changes(tmp_pa
         "@njit(cache=True)\ndef outer(x):\n    return 10.0 * middle(x)\n"
     )
 
-    def run() -> str:
-        return subprocess.run(
-            [sys.executable, "-c", _CALLS, tmp_path],
-            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-
-    assert run() == "compiled outer\n30.0\n"
-    assert run() == "30.0\n"
+    assert fresh(_CALLS, tmp_path) == "compiled outer\n30.0\n"
+    assert fresh(_CALLS, tmp_path) == "30.0\n"
     within = package / "within.py"
     within.write_text(within.read_text().replace("x + STEP", "x - STEP"))
-    assert run() == "compiled outer\n-10.0\n"
+    assert fresh(_CALLS, tmp_path) == "compiled outer\n-10.0\n"
     (package / "sizes.py").write_text("STEP = 3.0\n")
-    assert run() == "compiled outer\n-20.0\n"
-    assert run() == "-20.0\n"
+    assert fresh(_CALLS, tmp_path) == "compiled outer\n-20.0\n"
+    assert fresh(_CALLS, tmp_path) == "-20.0\n"
 
 
 _SHIPS = """

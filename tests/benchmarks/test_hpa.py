@@ -13,7 +13,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.baselines.hpa import HpaStar
-from benchmarks.baselines.thrun import ThrunMap
+from benchmarks.baselines.thrun import ThrunMap, joined_regions
 from hybridnav._base.moves import length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines import MethodResult
@@ -425,3 +425,13 @@ def test_the_depot_is_cut_into_regions_whose_paths_are_a_little_longer(data: Pat
             losses.append(recounted(answer.cells) / recounted(optimum) - 1)
     assert min(losses) >= -1e-9
     assert np.mean(losses) < 0.1
+
+
+def test_regions_are_joined_by_legal_moves_only() -> None:
+    region_of = np.array([[0, 1, 4], [2, 3, -1], [-1, -1, 5]], np.int32)
+    pairs, middles = joined_regions(region_of)
+    assert pairs.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [1, 4], [2, 3]]
+    assert middles[0].tolist() == [0.0, 0.5]
+    assert middles[2].tolist() == [0.5, 0.5]
+    cut, _ = joined_regions(region_of, corner_cutting=True)
+    assert {(3, 4), (3, 5)} <= {(u, v) for u, v in cut.tolist()}

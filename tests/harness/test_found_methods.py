@@ -59,17 +59,8 @@ class Unsure(ByCells):
         return Found(None, lower_bound_m=query.straight_m)
 
 
-@pytest.mark.parametrize(
-    ("method", "is_faulty", "share"),
-    [(ByCells, False, 1), (Boastful, True, 1), (AtAnyAngle, False, 1), (Unsure, False, 0)],
-)
-def test_a_search_method_is_asked_and_judged_like_any_other(
-    method: type[ByCells],
-    is_faulty: bool,  # noqa: FBT001
-    share: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def outcome_of(method: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Ask a method six pairs in this process; return what the study makes of it."""
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
     monkeypatch.setitem(sys.modules, "mine", sys.modules[__name__])
     settings = RunSettings(
@@ -82,6 +73,21 @@ def test_a_search_method_is_asked_and_judged_like_any_other(
     evaluate(settings, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     (outcome,) = study.of_method(method.__name__)
+    return outcome
+
+
+@pytest.mark.parametrize(
+    ("method", "is_faulty", "share"),
+    [(ByCells, False, 1), (Boastful, True, 1), (AtAnyAngle, False, 1), (Unsure, False, 0)],
+)
+def test_a_search_method_is_asked_and_judged_like_any_other(
+    method: type[ByCells],
+    is_faulty: bool,  # noqa: FBT001
+    share: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    outcome = outcome_of(method, tmp_path, monkeypatch)
     assert outcome.checks == (7 if share else 0)
     assert bool(outcome.faults) == is_faulty
     assert np.isfinite(outcome.lengths_m).any() == (share > 0)
@@ -158,18 +164,7 @@ def test_proofs_of_a_method_are_checked_and_counted(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
-    monkeypatch.setitem(sys.modules, "mine", sys.modules[__name__])
-    settings = RunSettings(
-        maps=(str(write_map(tmp_path, ROOMS)),),
-        presets=(),
-        baselines=(name_of(method),),
-        pairs=6,
-        robot_radius_m=0.0,
-    )
-    evaluate(settings, tmp_path / "run")
-    study = write_outputs(tmp_path / "run")
-    (outcome,) = study.of_method(method.__name__)
+    outcome = outcome_of(method, tmp_path, monkeypatch)
     row = consistency_row([outcome])
     pairs = len(outcome.records)
     assert row["proofs checked"] == pairs

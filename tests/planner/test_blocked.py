@@ -21,20 +21,10 @@ from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.planner.blocked import Blocked, as_blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import components, move_graph
+from tests.plans import TWO_ROOMS as ROOMS
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TOLERANCE = 1e-5
-ROOMS = drawn(
-    ".......#.......",
-    "...............",
-    ".......#.......",
-    ".......#.......",
-    ".......#.......",
-    ".......#.......",
-    ".......#.......",
-    "...............",
-    ".......#.......",
-)
 DOOR = hn.Door(3, ("kitchen", None), (1.0, 2.0), 0.9, (LevelArc(2, 0),))
 PLAIN = settings(max_examples=examples(100), deadline=None, derandomize=True)
 

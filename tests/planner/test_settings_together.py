@@ -12,36 +12,29 @@ import hybridnav as hn
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("paper", "planner.epsilon=0.1", "planner.epsilon: no key of method paper, but of "),
-        (
-            "grid-astar",
-            "planner.epsilon=0",
-            "planner.epsilon: no key of method grid-astar, but of ",
+        *(
+            (preset, f"planner.{key}={value}", f"planner.{key}: no key of method {method}, but of ")
+            for method, preset, key, value in (
+                ("paper", "paper", "epsilon", "0.1"),
+                ("grid-astar", "grid-astar", "epsilon", "0"),
+                ("octile", "octile", "epsilon", "0.1"),
+                ("octile", "octile", "refine", "grid-astar"),
+                ("octile", "octile", "refine", "gates"),
+                ("shortest", "shortest", "refine", "grid-astar"),
+                ("shortest", "shortest", "smooth", "line-of-sight"),
+                ("cheapest", "robot", "refine", "a:C"),
+            )
         ),
         (
             "paper",
             "planner.refine=stored-paths",
             "planner.refine: should be 'grid-astar' or a class",
         ),
-        ("octile", "planner.epsilon=0.1", "planner.epsilon: no key of method octile, but of "),
-        ("octile", "planner.refine=grid-astar", "planner.refine: no key of method octile, but of "),
-        ("octile", "planner.refine=gates", "planner.refine: no key of method octile, but of "),
         ("octile", "planner.method=fast", "planner.method: should be one of 'shortest', "),
         ("octile", "planner.method=[1]", "planner.method: should be one of 'shortest', "),
         ("octile", "planner.coarse=fast", "coarse is gone: write method, one of shortest, "),
         ("octile", "planner.coarse=[]", "coarse is gone: write method, one of shortest, "),
         ("octile", "planner.smooth=arcs", "planner.smooth: "),
-        (
-            "shortest",
-            "planner.refine=grid-astar",
-            "planner.refine: no key of method shortest, but of ",
-        ),
-        (
-            "shortest",
-            "planner.smooth=line-of-sight",
-            "planner.smooth: no key of method shortest, but of ",
-        ),
-        ("robot", "planner.refine=a:C", "planner.refine: no key of method cheapest, but of "),
         *itertools.product(["paper", "octile"], ["planner.smooth=los"], ["planner.smooth: "]),
         ("octile", "planner.smooth=true", "planner.smooth: "),
         ("octile", "planner.smooth=", "planner.smooth: "),

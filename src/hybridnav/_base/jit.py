@@ -267,10 +267,6 @@ class _Inner(_Renewed):
     literal.
     """
 
-    def enable_caching(self) -> None:
-        """Keep what is compiled, and look for what is kept."""
-        self._cache = _InnerCache(self.py_func)  # type: ignore[no-untyped-call]
-
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for the types of the arguments, not for their values."""
         return super().get_call_template(tuple(map(_type_of, args)), kws)
@@ -328,7 +324,7 @@ class _Kernel(_Renewed):
         kernel: Any = numba.jit(**options)(twin)
         kernel.__class__ = _Inner
         if self.stats.cache_path is not None:
-            kernel.enable_caching()
+            kernel._cache = _InnerCache(twin)  # type: ignore[no-untyped-call]  # noqa: SLF001
         return kernel
 
     @property

@@ -32,6 +32,15 @@ def drawn_conditions(scene: Scene) -> tuple[set[str], bool]:
     return closed, bool(scene.rng.random() < 0.8)
 
 
+def asked(scene: Scene) -> tuple[hn.ext.fleet.BuildingPlan, Where, Where, list[hn.ext.fleet.Link]]:
+    """Return a plan of a drawn question, its ends, and the links that it may use."""
+    start, goal = scene.somewhere(), scene.somewhere()
+    closed, stairs = drawn_conditions(scene)
+    ends = scene.named(start), scene.named(goal)
+    plan = scene.building.plan(*ends, closed_links=closed, stairs=stairs)
+    return plan, start, goal, usable(scene, closed, stairs=stairs)
+
+
 def check_figures(
     scene: Scene,
     plan: hn.ext.fleet.BuildingPlan,
@@ -84,12 +93,7 @@ def check_figures(
 def test_shortest_is_exact(seed: int) -> None:
     scene = random_building(seed)
     for _ in range(4):
-        start, goal = scene.somewhere(), scene.somewhere()
-        closed, stairs = drawn_conditions(scene)
-        links = usable(scene, closed, stairs=stairs)
-        plan = scene.building.plan(
-            scene.named(start), scene.named(goal), closed_links=closed, stairs=stairs
-        )
+        plan, start, goal, links = asked(scene)
         optimum = optimum_any_angle(scene, start, goal, links)
         if math.isinf(optimum):
             assert plan.status is hn.PlanStatus.NO_PATH
@@ -107,12 +111,7 @@ def test_cells(preset: str, seed: int) -> None:
     scene = random_building(seed, preset=preset)
     is_exact = preset != "paper"
     for _ in range(3):
-        start, goal = scene.somewhere(), scene.somewhere()
-        closed, stairs = drawn_conditions(scene)
-        links = usable(scene, closed, stairs=stairs)
-        plan = scene.building.plan(
-            scene.named(start), scene.named(goal), closed_links=closed, stairs=stairs
-        )
+        plan, start, goal, links = asked(scene)
         cells = [grid.enterable() for grid in scene.grids]
         optimum = optimum_on_cells(scene, start, goal, links, cells)
         assert plan.lower_bound <= optimum + 1e-9

@@ -14,7 +14,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines import MethodResult, Solver
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
-from hybridnav.harness.baselines.regions import SimpleGraphPyramid, first_arcs, joined_regions
+from hybridnav.harness.baselines.regions import SimpleGraphPyramid, first_arcs
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.pyramid.graphs import report_of
 from hybridnav.route import MaxDistanceSearch
@@ -326,16 +326,6 @@ def test_a_search_on_arcs_decides_between_equal_walks_by_the_second_cost() -> No
         assert plan.vertices is not None
         assert plan.vertices.tolist() == [0, middle, 3, 4]
         assert graph.search(0, 5).vertices is None
-
-
-def test_regions_are_joined_by_legal_moves_only() -> None:
-    region_of = np.array([[0, 1, 4], [2, 3, -1], [-1, -1, 5]], np.int32)
-    pairs, middles = joined_regions(region_of)
-    assert pairs.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [1, 4], [2, 3]]
-    assert middles[0].tolist() == [0.0, 0.5]
-    assert middles[2].tolist() == [0.5, 0.5]
-    cut, _ = joined_regions(region_of, corner_cutting=True)
-    assert {(3, 4), (3, 5)} <= {(u, v) for u, v in cut.tolist()}
 
 
 def test_places_that_only_corners_join_are_not_joined() -> None:

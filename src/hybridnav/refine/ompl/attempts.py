@@ -39,7 +39,6 @@ class Attempts:
         self.budget = Budget(began, query.deadline_s - kept_s, setup.settings.iterations)
         self.search = Search() if query.tells_search else None
         self.bound_m = 0.0
-        self._base = base
         self._send = send
         self._steps: list[str] = []
         self._trace: list[tuple[float, float]] = []

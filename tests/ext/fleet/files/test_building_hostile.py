@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from tests.ext.hostile import reader
 from tests.strategies import examples
 
 BOMB = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
@@ -23,21 +24,7 @@ NODE = '{"nodeId": "a", "nodePosition": {"x": 1, "y": 2}}'
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a file with some content; the building, or the error's text."""
-
-    def load(name, content):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        try:
-            return hn.ext.fleet.load_building_graph(path)
-        except hn.errors.MapError as error:
-            text = str(error)
-        assert text.isprintable()
-        assert name in text
-        assert len(text) < 500 + len(str(tmp_path))
-        return text
-
-    return load
+    return reader(hn.ext.fleet.load_building_graph, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from tests.ext.graphs.files import graph_writers as writers
 from tests.ext.graphs.files.graph_writers import Plain
+from tests.ext.hostile import reader
 from tests.strategies import examples
 
 NODE = '{"type":"Feature","properties":{"id":1},"geometry":{"type":"Point","coordinates":[1,2]}}'
@@ -29,21 +30,7 @@ ENTITIES = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a file with some content; the graph, or the error's text without the folder."""
-
-    def load(name, content):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        try:
-            return hn.ext.graphs.load_graph(path)
-        except hn.errors.MapError as error:
-            text = str(error)
-        assert text.isprintable()
-        assert name in text
-        assert len(text) < 500 + len(str(tmp_path))
-        return text
-
-    return load
+    return reader(hn.ext.graphs.load_graph, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,6 @@ class _Reader(XmlReader):
         self.is_graphml = False
         self._is_directed = [True]
         self._keys: dict[str, tuple[str, str]] = {}
-        self._defaults: dict[str, dict[str, Any]] = {}
         self._open: list[tuple[dict[str, str], dict[str, Any]]] = []
         self._key: str | None = None
         self._text: list[str] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -233,7 +233,7 @@ class Borders:
 
         `lines`: the chains in the same order.
         """
-        chains = shapely.get_geometry(lines, self.chains_of[room])
+        chains: Any = shapely.get_geometry(lines, self.chains_of[room])
         return shapely.build_area(shapely.MultiLineString(list(chains[shapely.length(chains) > 0])))
 
     def without_short(self, at_most: float) -> Borders:
