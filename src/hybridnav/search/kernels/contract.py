@@ -147,17 +147,18 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
 
 
 @njit(cache=True, nogil=True)
-def _shortcuts(graph, node, stamp, work, pairs):
+def _shortcuts(graph, node, stamp, work, joined):
     """Find the shortcuts that the removal of a corner needs.
 
-    `graph`, `work`: see `_search`; `stamp`: number of the last search; `pairs`: int64 (n, 2), room
-    for all pairs of arcs from the corner; filled with the pairs that a shortcut joins. Result:
-    number of shortcuts, number of legs in them, stamp of the last search.
+    `graph`, `work`: see `_search`; `stamp`: number of the last search; `joined`: bool (n, n), room
+    for all pairs of arcs from the corner; set where a shortcut joins the two. Result: number of
+    shortcuts, number of legs in them, stamp of the last search.
     """
     begin, size, pool, kinds, follow = graph
     records = work[0]
     n_pairs = n_legs = 0
     end = begin[node] + size[node]
+    joined[:] = False
     for one in range(begin[node], end - 1):
         cost, packed = pool[one, 0], pool[one, 1]
         may_follow = follow[kinds[node], packed >> 6 & 63]
@@ -176,7 +177,8 @@ def _shortcuts(graph, node, stamp, work, pairs):
                 continue
             there = pool[two, 1] >> HEAD_SHIFT
             if records[there, 1] >> 8 != stamp or records[there, 0] > cost + pool[two, 0]:
-                pairs[n_pairs, 0], pairs[n_pairs, 1] = one, two
+                joined[one - begin[node], two - begin[node]] = True
+                joined[two - begin[node], one - begin[node]] = True
                 n_pairs += 1
                 n_legs += (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
     return n_pairs, n_legs, stamp
@@ -196,20 +198,12 @@ def _take_out(begin, size, pool, node):
 
 
 @njit(cache=True, nogil=True)
-def _put_in(parts, pool, used, tail, arc):
-    """Put an arc into a corner's part of the pool, or improve the one that has its head.
-
-    Return the pool, a new one if there was no room, and the used number of its rows.
-    """
+def _room_for(parts, pool, used, tail, wanted):
+    """Make room for more arcs from a corner; return the pool, a new one if it was full, and the
+    used number of its rows."""
     begin, size, room = parts
-    cost, packed, past = arc
-    for at in range(begin[tail], begin[tail] + size[tail]):
-        if pool[at, 1] >> HEAD_SHIFT == packed >> HEAD_SHIFT:
-            if cost < pool[at, 0]:
-                pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
-            return pool, used
-    if size[tail] == room[tail]:
-        room[tail] = 2 * size[tail] + 2
+    if size[tail] + wanted > room[tail]:
+        room[tail] = 2 * (size[tail] + wanted)
         while used + room[tail] > pool.shape[0]:
             larger = np.empty((2 * pool.shape[0], 3), np.int64)
             larger[:used] = pool[:used]
@@ -217,10 +211,49 @@ def _put_in(parts, pool, used, tail, arc):
         pool[used : used + size[tail]] = pool[begin[tail] : begin[tail] + size[tail]]
         begin[tail] = used
         used += room[tail]
-    at = begin[tail] + size[tail]
-    pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
-    size[tail] += 1
     return pool, used
+
+
+@njit(cache=True, nogil=True)
+def _put_in(parts, node, one, joined, work):
+    """Put the shortcuts past a removed corner into the part of one of its neighbours.
+
+    An arc that leads to the same head already is improved instead.
+
+    Parameters
+    ----------
+    parts
+        Begin and size of parts of the pool, and the pool, in which there is room.
+    node
+        The removed corner.
+    one
+        The position of the arc to the neighbour, of those from the corner.
+    joined
+        Bool (n,), the arcs from the corner to the heads of the shortcuts.
+    work
+        Records, in whose column 2 the place of each head is noted, and a new negative mark.
+    """
+    begin, size, pool = parts
+    records, mark = work
+    there = pool[begin[node] + one]
+    tail = there[1] >> HEAD_SHIFT
+    first = begin[tail]
+    for k in range(size[tail]):
+        records[pool[first + k, 1] >> HEAD_SHIFT, 2] = mark << 32 | k
+    for two in range(joined.size):
+        if not joined[two]:
+            continue
+        back = pool[begin[node] + two]
+        cost, head = there[0] + back[0], back[1] >> HEAD_SHIFT
+        noted = records[head, 2]
+        at = first + (noted & 0xFFFFFFFF)
+        if noted >> 32 != mark:
+            at = first + size[tail]
+            size[tail] += 1
+        elif cost >= pool[at, 0]:
+            continue
+        pool[at, 0], pool[at, 1] = cost, pack(head, there[1] & 63, back[1] & 63)
+        pool[at, 2] = node << 32 | (there[2] & 0xFFFFFFFF) + (back[2] & 0xFFFFFFFF)
 
 
 @njit(cache=True, nogil=True)
@@ -284,8 +317,8 @@ def contract(kinds, first, arcs, follow, effort):
     # A witness search queues the arcs of the corners that it settles, at most `most` for each.
     records = np.zeros((n, 3), np.int64)
     heap = np.empty((most_settled * most + 1, 2), np.int64)
-    pairs = np.empty((most, 2), np.int64)
-    stamp = looked = np.int64(0)
+    joined = np.empty(most * most, np.bool_)
+    stamp = looked = mark = np.int64(0)
     waiting = n
     is_core, is_given_up = False, not have_reverses(first, arcs[:, 1] >> HEAD_SHIFT)
     while waiting > 0:
@@ -317,10 +350,12 @@ def contract(kinds, first, arcs, follow, effort):
         # Shortcuts gave corners more arcs than the graph did: the work arrays follow.
         if most_settled * most >= heap.shape[0]:
             heap = np.empty((2 * most_settled * most + 1, 2), np.int64)
-        if size[node] * size[node] > pairs.shape[0]:
-            pairs = np.empty((2 * size[node] * size[node], 2), np.int64)
+        n_arcs = size[node]
+        if n_arcs * n_arcs > joined.size:
+            joined = np.empty(2 * n_arcs * n_arcs, np.bool_)
+        table = joined[: n_arcs * n_arcs].reshape(n_arcs, n_arcs)
         graph, work = (begin, size, pool, kinds, follow), (records, heap, most_settled)
-        n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, pairs)
+        n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, table)
 
         # Prefer corners whose removal adds few arcs and legs for those that it takes away. The
         # level spreads removals over the map, so that the hierarchy stays flat.
@@ -344,15 +379,13 @@ def contract(kinds, first, arcs, follow, effort):
 
         # A shortcut takes the class at each of its ends from the arc there, so `follow` holds for
         # it too, and its legs from both. Each comes with its reverse.
-        for i in range(n_pairs):
-            one, two = pairs[i, 0], pairs[i, 1]
-            cost = pool[one, 0] + pool[two, 0]
-            past = node << 32 | (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
-            for there, back in ((one, two), (two, one)):
-                tail, head = pool[there, 1] >> HEAD_SHIFT, pool[back, 1] >> HEAD_SHIFT
-                packed = pack(head, pool[there, 1] & 63, pool[back, 1] & 63)
-                arc = cost, packed, past
-                pool, used = _put_in((begin, size, room), pool, used, tail, arc)
+        for one in range(n_arcs):
+            n_wanted = np.count_nonzero(table[one])
+            if n_wanted > 0:
+                mark -= 1
+                tail = pool[begin[node] + one, 1] >> HEAD_SHIFT
+                pool, used = _room_for((begin, size, room), pool, used, tail, n_wanted)
+                _put_in((begin, size, pool), node, one, table[one], (records, mark))
                 most = max(most, size[tail])
     return *_packed_arcs(begin, size, pool), taken
 
