@@ -339,4 +339,9 @@ def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
     assert "does not start" in result.refinement.steps[0]
     assert "/nowhere/python" in result.refinement.steps[0]
     planner.close()
+    with monkeypatch.context() as patched:
+        patched.setattr("hybridnav.refine.ompl.client._START_S", 0.0)
+        late = planner.plan(*ENDS)
+    assert "is not ready" in late.refinement.steps[0]  # type: ignore[union-attr]
+    planner.close()
     assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]

@@ -297,6 +297,7 @@ class Worker:
 
 
 _NO_START = "the process of OMPL does not start; `python -c 'import ompl.geometric'` may show why"
+_SLOW = f"the process of OMPL is not ready after {_START_S:g} s: is the machine busy?"
 
 
 class _Start(threading.Thread):
@@ -317,7 +318,7 @@ class _Start(threading.Thread):
             with theirs:
                 self.process = _launch(theirs.fileno())
             self.connection.send(self._setup)
-            refusal = self.connection.recv() if self.connection.poll(_START_S) else _NO_START
+            refusal = self.connection.recv() if self.connection.poll(_START_S) else Failure(_SLOW)
             self.problem = "" if refusal is None else getattr(refusal, "reason", _NO_START)
         except Exception as error:  # noqa: BLE001 - no process or thread, too many files, at exit
             self.problem = f"{_NO_START} ({error})" if str(error) else _NO_START
