@@ -197,7 +197,7 @@ def judge(environment: Environment, tree: Path, folder: Path) -> bool:
         (place / "__pycache__").touch()  # stops the super-user too, as permissions do not
     best, compiled = answers(environment.python, folder)
     compiled_folder = packages / "hybridnav" / "compiled"
-    (version,) = compiled_folder.iterdir()
+    (version,) = (place for place in compiled_folder.iterdir() if place.is_dir())
     (version / "x86-64-v3").rename(version / "kept")
     plain, compiled_plain = answers(environment.python, folder)
     compiled_folder.rename(compiled_folder.with_name("kept"))
