@@ -202,18 +202,14 @@ def queries(free: Any, seed: int) -> Iterator[tuple[Any, Any]]:
 
 
 @settings(max_examples=examples(120), deadline=None)
-@given(closures(), seeds, st.booleans())
+@given(closures(), seeds, st.sampled_from(SEARCHED))
 def test_a_detour_is_the_shortest_path_of_a_mesh_without(
-    case: tuple[Any, Any],
-    seed: int,
-    is_prepared: bool,  # noqa: FBT001
+    case: tuple[Any, Any], seed: int, kind: str
 ) -> None:
     free, closed = case
     left = without(free, closed)
     assume(left.any())
-    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
-    if is_prepared:
-        search.prepare()
+    search, anew = search_of(build_mesh(free), kind), MeshSearch(build_mesh(left))
     round_it = DetourSearch(search, free, closed)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
@@ -309,16 +305,66 @@ def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
         assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
 
 
-def test_a_hierarchy_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell() -> None:
+@pytest.mark.parametrize("kind", SEARCHED[1:])
+def test_a_graph_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell(kind: str) -> None:
     free = np.ones((6, 9), np.bool_)
     free[2, 4] = False
-    search = MeshSearch(build_mesh(free))
-    search.prepare()
+    search = search_of(build_mesh(free), kind)
     for where, is_repaired in ((0.5, True), (0.0, False)):
         round_it = DetourSearch(search, free, np.array([2 * 9 + 3, 3 * 9 + 5]))
         found = round_it.path(((3, 3), (2, 8)), ((3.0 + where, 3.0 + where), (2.5, 8.5)))
         assert round_it.is_ready is is_repaired
         assert found.positions is not None
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(closures(), seeds)
+def test_of_equally_short_paths_the_graph_takes_the_same_with_cells_closed_beside(
+    case: tuple[Any, Any], seed: int
+) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search = search_of(build_mesh(free), "landmarks")
+    round_it = DetourSearch(search, free, closed)
+    rng = np.random.default_rng(seed)
+    for first, last in rng.choice(np.argwhere(left), (8, 2)).tolist():
+        query = (first, last), ((first[0] + 0.5, first[1] + 0.5), (last[0] + 0.5, last[1] + 0.5))
+        opened, found = search.path(*query), round_it.path(*query)
+        if opened.positions is not None and not round_it.is_met_by(opened):
+            assert found.positions is not None
+            assert found.positions.tolist() == opened.positions.tolist()
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(closures(), seeds, st.sampled_from([1, 3]))
+def test_a_long_search_that_asks_whether_its_ends_are_apart_is_exact(
+    case: tuple[Any, Any], seed: int, patience: int
+) -> None:
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search, anew = search_of(build_mesh(free), "landmarks"), MeshSearch(build_mesh(left))
+    round_it = DetourSearch(search, free, closed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(searches, "PATIENCE", patience)
+        for query in [*queries(left, seed)] * 2:
+            optimum = anew.path(*query).length_cells
+            found = round_it.path(*query)
+            assert found.length_cells == pytest.approx(optimum, abs=1e-9)
+            assert found.lower_bound_cells == found.length_cells
+
+
+def test_a_graph_that_queries_have_built_leaves_paths_round_closed_cells_alone() -> None:
+    free = np.ones((9, 9), np.bool_)
+    free[4, 4] = False
+    for expanded, is_used in ((0, True), (20_000, False)):
+        search = search_of(build_mesh(free), "landmarks")
+        search.expanded = expanded
+        round_it = DetourSearch(search, free, np.array([4 * 9 + 3]))
+        found = round_it.path(((4, 0), (4, 8)), ((4.5, 0.5), (4.5, 8.5)))
+        assert found.lower_bound_cells == found.length_cells
+        assert round_it.is_ready is is_used
 
 
 @pytest.mark.parametrize("is_prepared", [False, True])
@@ -351,15 +397,14 @@ def steps(
 
 
 @settings(max_examples=examples(25), deadline=None)
-@given(closures(), seeds)
+@given(closures(), seeds, st.sampled_from(SEARCHED[1:]))
 def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
-    case: tuple[Any, Any], seed: int
+    case: tuple[Any, Any], seed: int, kind: str
 ) -> None:
     free, closed = case
     left = without(free, closed)
     assume(left.any())
-    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
-    search.prepare()
+    search, anew = search_of(build_mesh(free), kind), MeshSearch(build_mesh(left))
     round_it = DetourSearch(search, free, closed)
     rng = np.random.default_rng(seed)
     (a, b), (c, d) = rng.choice(np.argwhere(left), 2).tolist()

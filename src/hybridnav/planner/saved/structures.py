@@ -223,7 +223,7 @@ _EDGES: dict[str, int | str] = {"corners": "4*cells", "edges": "200*corners"}
 
 CORNER_GRAPH = Structure(
     "corner graph",
-    1,
+    2,
     (
         ArraySpec("first", "int64", ("2*corners+1",), below="edges", is_offsets=True),
         ArraySpec("heads", "int32", ("edges",), least=0, below="corners"),

@@ -228,12 +228,12 @@ class CornerGraph:
     heads: IntArray
     """int32 (m,), the corner at which each edge ends; every edge occurs in both directions."""
     landmark_distances: FloatArray
-    """float64 (n, landmarks), distances in the graph in cells, infinite if there is no path."""
+    """float64 (n, landmarks), distances in free space in cells, infinite if there is no path."""
 
     @property
-    def arrays(self) -> tuple[LongArray, IntArray, FloatArray]:
-        """The arrays in the order of the kernels."""
-        return self.first, self.heads, self.landmark_distances
+    def arrays(self) -> tuple[Any, ...]:
+        """The arrays in the order of the kernels, with nothing closed."""
+        return self.first, self.heads, self.landmark_distances, None, None, NOTHING_CLOSED[1]
 
 
 def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray, IntArray] | None:
@@ -295,7 +295,7 @@ def add_landmarks(
         part[mesh.begins[of_slot >= 0]] = of_slot[of_slot >= 0]
         inside = part == np.bincount(part, weights=degrees).argmax()
         source = int(np.where(inside, degrees, -1).argmax())
-        kernels.landmarks_of(arrays[:2], (first, heads), source, table)
+        kernels.landmarks_of(arrays, (first, heads), mesh.component, source, table)
     table.flags.writeable = False
     return CornerGraph(first, heads, table)
 
@@ -327,7 +327,9 @@ NOTHING_CLOSED = (
     read_only(np.empty(0, np.int32), _NO_ROWS, _NO_ROWS),
     (
         read_only(np.array([1, 0, 1, -1]), np.zeros(1, np.int64), np.empty(0, np.int64)),
-        *read_only(np.empty((0, 0), np.bool_), np.empty(0, np.int32), np.empty(0, np.int32)),
+        *read_only(np.empty((0, 0), np.bool_)),
+        read_only(np.empty(0, np.bool_), np.empty(0, np.int32)),
+        *read_only(np.empty(0, np.int32)),
         0,
     ),
 )

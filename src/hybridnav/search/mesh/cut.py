@@ -23,6 +23,7 @@ from hybridnav.search.mesh.build import (
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
+from hybridnav.search.mesh.kernels.corner_search import link
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
 from hybridnav.search.mesh.kernels.repairs import repair
 from hybridnav.search.mesh.search import (
@@ -226,8 +227,9 @@ Position = tuple[float, float]
 class DetourSearch:
     """Exact shortest any-angle paths round closed cells; threads may share it.
 
-    The first query that needs it repairs the hierarchy of corners round the closed cells. Where
-    there is none, and for ends at a corner of a closed cell, these cells are cut out of the mesh.
+    The first query that needs it repairs the hierarchy of corners round the closed cells, or adds
+    their corners to the graph. Where there is neither, and for ends at a corner of a closed cell,
+    these cells are cut out of the mesh.
 
     Parameters
     ----------
@@ -266,6 +268,7 @@ class DetourSearch:
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
         self._repaired: tuple[Any, Any] | None = None
+        self._has_parts = False
 
     @property
     def search(self) -> MeshSearch:
@@ -289,14 +292,20 @@ class DetourSearch:
     @property
     def is_ready(self) -> bool:
         """Whether paths are found round the closed cells as quickly as with them open."""
-        return self._repaired is not None
+        return self._repaired is not None and self._open.labels is None
 
     def repaired(self) -> tuple[Any, Any] | None:
-        """Return the corners, and their hierarchy round the closed cells; None without one."""
+        """Return the corners, and their hierarchy or graph round the closed cells; None without.
+
+        A graph that queries have built is left alone: of equally short paths round closed cells,
+        the one that is found must not depend on what was asked before.
+        """
         opened, graph = self._open, self._open.graph
-        if self._repaired is not None or not isinstance(graph, CornerHierarchy):
+        if self._repaired is not None or graph is None:
             return self._repaired
-        xs, ys, kinds, *new = self._without(
+        if not isinstance(graph, CornerHierarchy) and opened.is_worth_a_graph:
+            return None
+        xs, ys, kinds, is_listed, (polygons, members) = self._without(
             lambda left: kernels.corners_round(
                 opened.arrays, self._closure, self._closed, left, opened.place
             )
@@ -305,7 +314,14 @@ class DetourSearch:
         if len(xs) > n_corners + MOST_NEW:
             return None
         corners = xs, ys, *read_only(kinds), *opened.arrays[3:]
-        around = read_only(*self._closure), *read_only(self._free, *new), n_corners
+        free, members = read_only(self._free, members)
+        listed = read_only(is_listed, polygons)
+        around = read_only(*self._closure), free, listed, members, n_corners
+        if not isinstance(graph, CornerHierarchy):
+            links = link(corners, around, opened.place, graph.landmark_distances)
+            known = *graph.arrays[:3], *read_only(*links), around
+            self._repaired = corners, known
+            return self._repaired
         arrays = graph.arrays[:4]
         known, room = (opened.footing, around, opened.edges, opened.place), _PATCHED
         while not len((patches := repair(corners, arrays, *known, room))[1]):
@@ -344,10 +360,26 @@ class DetourSearch:
         """Find a shortest path between two positions, as `MeshSearch.path` does."""
         until = math.inf if budget_s is None else perf_counter() + budget_s
         ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
-        at_corner = (ends == np.floor(ends)).all(axis=1).any()
+        corners = ends[(ends == np.floor(ends)).all(axis=1)]
         repaired = None
-        if not (at_corner and kernels.path_crosses(self._closure, self._free, ends)):
+        if not any(kernels.path_crosses(self._closure, self._free, one[None]) for one in corners):
             repaired = self.repaired()
         search = self.search if repaired is None else self._open
+        known: tuple[Any, ...] | None = None
+        if repaired is not None:
+            are_apart: Callable[[], bool] | None = None
+            if not isinstance(self._open.graph, CornerHierarchy):
+                are_apart = partial(self._are_apart, cells, positions)
+                if self._has_parts and are_apart():
+                    return MeshPath(None, math.inf, math.inf, 0)
+            known = *repaired, are_apart
         left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        return search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=repaired)
+        found = search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=known)
+        # Where there are parts, later queries ask the cut mesh at once.
+        self._has_parts |= math.isinf(found.lower_bound_cells)
+        return found
+
+    def _are_apart(self, *ends: Any) -> bool:
+        """Return whether the closed cells part two positions: the cut mesh knows it at once, where
+        a search of the graph would visit all that its start reaches."""
+        return math.isinf(self.search.path(*ends, budget_s=0.0).lower_bound_cells)

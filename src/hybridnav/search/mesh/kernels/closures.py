@@ -8,20 +8,21 @@ cells, with a margin; side tests alone decide whether a segment meets a cell.
 import math
 
 import numpy as np
+from numba import types
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.contraction import grow_rows
-from hybridnav.search.mesh.kernels.corner_search import (
+from hybridnav.search.mesh.kernels.intervals import (
     APART,
-    MET,
+    SPLIT,
     polygon_in,
     polygons_of_endpoints,
     polygons_with,
 )
 from hybridnav.search.mesh.kernels.polyanya import DONE, PAUSED, WORK_FULL
-from hybridnav.search.mesh.kernels.views import distance, has_target, see_from_point, touches
+from hybridnav.search.mesh.kernels.views import has_target, see_from_point, touches
 
 CHANGED, DEAD = 4, 8
 """Bits of a kind: the corner touches a closed cell, so that no path bends there; all cells at it
@@ -63,6 +64,12 @@ def _first_from(closure, row, col):
         else:
             high = middle
     return low, end
+
+
+@njit(cache=True, nogil=True)
+def is_any_closed(closure):
+    """Return whether there is a closed cell."""
+    return closure[0][0] <= closure[0][1]
 
 
 @njit(cache=True, nogil=True)
@@ -227,7 +234,8 @@ def corners_round(mesh, closure, closed, left, place):
     `mesh`: see `successors`; `closure`, `closed`: see `closure_of`; the flat cells; `left`: bool
     (rows, cols), free cells that are not closed; `place`: component of polygons, and the polygon of
     each cell. Result: x and y of all corners, new ones last; their kinds, with `CHANGED` and
-    `DEAD`; int32 polygons that contain a new corner, sorted, and which.
+    `DEAD`; bool (p,) whether each polygon has a new corner; int32 (2, m) these polygons, sorted,
+    and which they have.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     box = closure[0]
@@ -271,7 +279,7 @@ def corners_round(mesh, closure, closed, left, place):
             every[corner] |= DEAD
     # The polygons with each new corner: views are told of it there.
     room, listed = np.empty(len(place[0]), np.int32), np.empty((64, 2), np.int64)
-    n_listed = 0
+    is_listed, n_listed = np.zeros(len(place[0]), np.bool_), 0
     for k in range(n_new):
         x, y = found[k, 0], found[k, 1]
         inner = polygon_in(mesh, place[0], place[1], y, x)
@@ -279,16 +287,27 @@ def corners_round(mesh, closure, closed, left, place):
             if n_listed == len(listed):
                 listed = grow_rows(listed)
             listed[n_listed, 0], listed[n_listed, 1] = polygon, k
+            is_listed[polygon] = True
             n_listed += 1
     # Sorted, so that a view finds those of its polygon by halving.
     order = np.argsort(listed[:n_listed, 0], kind="mergesort")
-    polygons, members = np.empty(n_listed, np.int32), np.empty(n_listed, np.int32)
-    for k in range(n_listed):
-        polygons[k], members[k] = listed[order[k], 0], listed[order[k], 1]
-    return xs, ys, every, polygons, members
+    return xs, ys, every, is_listed, np.ascontiguousarray(listed[order].T.astype(np.int32))
 
 
 # Views round closed cells.
+
+
+@njit(cache=True, nogil=True)
+def _mark(new, polygon, x, y, rays):
+    """Mark the new corners in a polygon that are seen from a point between two rays."""
+    polygons, members, xs, ys, is_seen = new
+    lx, ly, rx, ry = rays
+    k = np.searchsorted(polygons, polygon)
+    while k < len(polygons) and polygons[k] == polygon:
+        one = members[k]
+        if turn_of(x, y, rx, ry, xs[one], ys[one]) >= 0:
+            is_seen[one] |= turn_of(x, y, lx, ly, xs[one], ys[one]) <= 0
+        k += 1
 
 
 @overload(has_target)
@@ -296,20 +315,19 @@ def _has_new_corners(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rul
     """Return what stands for `has_target` for new corners, which are marked, and one point."""
 
     def mark(target, polygon, x, y, rays):
-        polygons, members, xs, ys, is_seen, tx, ty, goals = target
+        # A view passes thousands of polygons, few with a new corner: only there the arrays of these
+        # are unpacked, which takes longer than all the rest.
+        if target[0][polygon]:
+            _mark(target[1], polygon, x, y, rays)
+        tx, ty, goals = target[2]
         lx, ly, rx, ry = rays
-        k = np.searchsorted(polygons, polygon)
-        while k < len(polygons) and polygons[k] == polygon:
-            one = members[k]
-            if turn_of(x, y, rx, ry, xs[one], ys[one]) >= 0:
-                is_seen[one] |= turn_of(x, y, lx, ly, xs[one], ys[one]) <= 0
-            k += 1
         for goal in goals:
             if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
                 return turn_of(x, y, lx, ly, tx, ty) <= 0
         return False
 
-    return mark if len(target) == 8 else None
+    is_nested = len(target) == 3 and isinstance(target[1], types.BaseTuple)
+    return mark if is_nested else None
 
 
 @njit(cache=True, nogil=True)
@@ -322,16 +340,18 @@ def see_round(mesh, around, place, goal, room, found):
     contain it; `room`, `found`: see `see_from_point`.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    closure, free, polygons, members, n_old = around
     x, y, starts = place
+    closure, free, listed, members, n_old = around
+    if not is_any_closed(closure):
+        return see_from_point(mesh, x, y, starts, goal, room, found)
     seen = room[2]
     is_seen = np.zeros(len(cx) - n_old, np.bool_)
     for polygon in starts:
-        k = np.searchsorted(polygons, polygon)
-        while k < len(polygons) and polygons[k] == polygon:
+        k = np.searchsorted(listed[1], polygon)
+        while k < len(members) and listed[1][k] == polygon:
             is_seen[members[k]] = True
             k += 1
-    target = (polygons, members, cx[n_old:], cy[n_old:], is_seen, *goal)
+    target = (listed[0], (listed[1], members, cx[n_old:], cy[n_old:], is_seen), goal)
     n, is_goal_seen = see_from_point(mesh, x, y, starts, target, room, found)
     if n < 0 or n + len(is_seen) > len(seen):
         return -1, False
@@ -354,11 +374,29 @@ def see_round(mesh, around, place, goal, room, found):
 
 @njit(cache=True, nogil=True)
 def look_round(mesh, where, endpoints, rooms, bounds, around):
-    """Do the same as `look_from_endpoints` past closed cells.
+    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
-    Neither end is a corner of a closed cell. `around` holds the closure (see `closure_of`), the
-    free cells before, int32 polygons of new corners, and which corners these are; the number of
-    corners before.
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    where
+        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_endpoints`.
+    rooms
+        int32 room for the polygons of start and goal, room of `see_from_point`.
+    bounds
+        Receives the length and lower bound of the answer: infinite if the endpoints are not
+        connected, their distance if they see each other.
+    around
+        The closure (see `closure_of`), the free cells before, the polygons of new corners and which
+        these are (see `corners_round`), the number of corners before. No end is a corner of a
+        closed cell.
+
+    Returns
+    -------
+    tuple
+        `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the
+        goal sees and then those that the start sees; the indices at which both lists end.
     """
     sx, sy, tx, ty = endpoints
     component, polygon_at, cells = where
@@ -369,15 +407,17 @@ def look_round(mesh, where, endpoints, rooms, bounds, around):
     if how == APART:
         bounds[:] = np.inf
         return DONE, 0, 0
-    nowhere = (0.0, 0.0, starts[:0])
-    n, _ = see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
-    if n < 0:
-        return WORK_FULL, 0, 0
-    target = (tx, ty, goals[:n_goals] if how != MET else starts[:0])
-    n_all, is_seen = see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
-    if n_all < 0:
-        return WORK_FULL, 0, 0
-    if (is_seen or how == MET) and not crosses(around[0], around[1], sx, sy, tx, ty):
-        bounds[:] = distance(sx, sy, tx, ty)
-        return DONE, 0, 0
-    return PAUSED, n, n_all
+    if how == SPLIT or is_any_closed(around[0]):
+        nowhere = (0.0, 0.0, starts[:0])
+        n, _ = see_round(mesh, around, (tx, ty, goals[:n_goals]), nowhere, room, 0)
+        if n < 0:
+            return WORK_FULL, 0, 0
+        target = (tx, ty, goals[:n_goals] if how == SPLIT else starts[:0])
+        n_all, is_seen = see_round(mesh, around, (sx, sy, starts[:n_starts]), target, room, n)
+        if n_all < 0:
+            return WORK_FULL, 0, 0
+        is_hidden = how == SPLIT and not is_seen
+        if is_hidden or crosses(around[0], around[1], sx, sy, tx, ty):
+            return PAUSED, n, n_all
+    bounds[:] = math.hypot(tx - sx, ty - sy)
+    return DONE, 0, 0

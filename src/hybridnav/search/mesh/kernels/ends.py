@@ -6,9 +6,9 @@ from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.kernels.labels import climb, grow_rows
-from hybridnav.search.mesh.kernels.corner_search import polygon_in, polygons_with
 from hybridnav.search.mesh.kernels.hubs import FAR as UNREACHED
 from hybridnav.search.mesh.kernels.hubs import is_hidden, view_of_square
+from hybridnav.search.mesh.kernels.intervals import polygon_in, polygons_with
 from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, lobe_of, see_from_point
 
 

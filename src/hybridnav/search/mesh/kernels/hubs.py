@@ -167,7 +167,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     """Find a shortest path between two points by the labels of corners.
 
     `mesh`, `endpoints`: see `successors`; `labels`: the arrays of `HubLabels`; `where`: see
-    `look_from_endpoints`; `work`: room for the corners of both ends: int8 (2, n) whether the end
+    `look_round`; `work`: room for the corners of both ends: int8 (2, n) whether the end
     sees each (1), or not (-1), or it is not known (0); int32 (2, n) their views; int64 (2, n)
     distances to them; int64 (n,) least distances by the corners of the goal. By hub, int64 the
     least distance from the start, above the number of its corner (`FAR`); int32 hubs touched.

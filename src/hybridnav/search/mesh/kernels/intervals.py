@@ -309,3 +309,140 @@ def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
             cost += math.hypot(cx[by] - x, cy[by] - y)
         n = put(nodes, n, twin, by, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
     return n
+
+
+# The polygons that contain the endpoints of a query.
+
+APART, MET, SPLIT = -1, 1, 0
+"""Positions of the endpoints of a query: not connected, in one polygon, in several."""
+
+
+@njit(cache=True, nogil=True)
+def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts, goals):
+    """Find the polygons that contain the endpoints of a query.
+
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    component
+        int32 (p,) of `blocks_of`.
+    polygon_at
+        int32 (rows, cols), the polygon at the centre of each cell.
+    cells
+        Row and column of the start's cell, then of the goal's; free ones.
+    starts, goals
+        int32, room for as many polygons as the mesh has.
+
+    Returns
+    -------
+    tuple
+        `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
+    """
+    sx, sy, tx, ty = endpoints
+    from_row, from_col, to_row, to_col = cells
+    inner = polygon_in(mesh, component, polygon_at, from_row, from_col)
+    last = polygon_in(mesh, component, polygon_at, to_row, to_col)
+    if component[inner] != component[last]:
+        return APART, 0, 0
+    n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
+    n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
+    for k in range(n_starts):
+        for m in range(n_goals):
+            if starts[k] == goals[m]:
+                return MET, n_starts, n_goals
+    return SPLIT, n_starts, n_goals
+
+
+@njit(cache=True, nogil=True)
+def polygon_in(mesh, component, polygon_at, row, col):
+    """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
+    cx, cy, _, first, begins, finishes, _, _ = mesh
+    polygon = polygon_at[row, col]
+    if polygon >= 0 and component[polygon] >= 0:
+        return polygon
+    for other in range(len(first) - 2, -1, -1):
+        holds = component[other] >= 0
+        for slot in range(first[other], first[other + 1]):
+            u, w = begins[slot], finishes[slot]
+            holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
+        if holds:
+            return other
+    return polygon
+
+
+@njit(cache=True, nogil=True)
+def polygons_with(mesh, inner, row, col, x, y, found):
+    """Find the polygons with a point of a free cell, also on their sides, reached inside the cell.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    inner
+        The polygon at the centre of the cell.
+    row, col
+        The cell.
+    x, y
+        The point, in the closed square of the cell: where two free cells meet only at a corner, it
+        belongs to this cell.
+    found
+        int32, room for the polygons, as many as the mesh has; their number is returned.
+    """
+    cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
+    found[0] = inner
+    n = 1
+    at = 0
+    while at < n:
+        polygon = found[at]
+        at += 1
+        low, high = first[polygon], first[polygon + 1]
+        for slot in range(low, high):
+            if twins[slot] < 0:
+                continue
+            u = begins[slot]
+            w = finishes[slot]
+            # The segment from the centre to the point meets no wall: its polygons are connected.
+            if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
+                continue
+            other = polygon_of[twins[slot]]
+            is_known = False
+            for k in range(n):
+                is_known = is_known or found[k] == other
+            if not is_known:
+                found[n] = other
+                n += 1
+    kept = 0
+    for k in range(n):
+        polygon = found[k]
+        low, high = first[polygon], first[polygon + 1]
+        holds = True
+        for slot in range(low, high):
+            u = begins[slot]
+            w = finishes[slot]
+            holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], x, y) >= 0
+        if holds:
+            found[kept] = polygon
+            kept += 1
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _touch(ax, ay, bx, by, px, py, qx, qy):
+    """Return whether two segments have a point in common.
+
+    Parameters
+    ----------
+    ax, ay, bx, by
+        Ends of one segment, in cells.
+    px, py, qx, qy
+        Ends of the other.
+    """
+    if max(ax, bx) < min(px, qx) or max(px, qx) < min(ax, bx):
+        return False
+    if max(ay, by) < min(py, qy) or max(py, qy) < min(ay, by):
+        return False
+    return (
+        turn_of(ax, ay, bx, by, px, py) * turn_of(ax, ay, bx, by, qx, qy) <= 0
+        and turn_of(px, py, qx, qy, ax, ay) * turn_of(px, py, qx, qy, bx, by) <= 0
+    )

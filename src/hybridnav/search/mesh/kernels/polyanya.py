@@ -22,7 +22,7 @@ from hybridnav.search.mesh.kernels.intervals import (
     successors,
     turns,
 )
-from hybridnav.search.mesh.kernels.views import distance, see_from_corner
+from hybridnav.search.mesh.kernels.views import distance, see_quadrant, walls_at
 
 DONE, PAUSED, WORK_FULL = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;
@@ -295,87 +295,108 @@ def edges_of(mesh, component, limit):
     `lobe_of`; int32 (m,) the corner at which each edge ends. Each edge occurs in both directions.
     If there are more edges than the limit, the last entry of the first array is -1.
     """
-    kinds, begins, twins, polygon_of = mesh[2], mesh[4], mesh[6], mesh[7]
+    kinds = mesh[2]
     n = len(kinds)
-    wall = np.full(n, -1, np.int32)
-    for slot in range(len(begins)):
-        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
-            wall[begins[slot]] = slot
-    target = (0.0, 0.0, np.empty(0, np.int32))
-    whole, real, seen = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    wall = walls_at(mesh, component)
+    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    nowhere = 0.0, 0.0, np.empty(0, np.int32)
     first = np.zeros(2 * n + 1, np.int64)
     heads = np.empty(16 * n, np.int32)
     m = 0
     for corner in range(n):
         for lobe in range(2):
             found = 0
-            while kinds[corner] < 4 and wall[corner] >= 0:
-                room = (whole, real, seen)
-                found = see_from_corner(mesh, corner, wall[corner], lobe, target, room, 0)
-                if found >= 0:
-                    break
-                whole, real, seen = _doubled(whole), _doubled(real), _doubled(seen)
+            if kinds[corner] < 4 and wall[corner] >= 0:
+                found, room = see_quadrant(mesh, corner, wall[corner], lobe, nowhere, room)
             if m + found > limit:
                 first[2 * n] = -1
                 return first, heads[:0].copy()
             while m + found > len(heads):
                 heads = _doubled(heads)
-            heads[m : m + found] = seen[:found]
+            heads[m : m + found] = room[2][:found]
             m += found
             first[2 * corner + lobe + 1] = m
     return first, heads[:m].copy()
 
 
+@guarded
 @njit(cache=True, nogil=True)
-def distances_from(points, graph, source, distances):
-    """Compute the distances of all corners from one in the graph, infinite if not reached.
+def landmarks_of(mesh, graph, component, source, table):
+    """Compute the distances of all corners from landmarks, in free space.
 
-    `points`: float64 x and y of corners; `graph`: the graph of `edges_of`; `distances`: float64
-    (n,), filled in.
+    Those in the graph are longer where a shortest path leaves the landmark, or arrives, in the
+    quadrant opposite to the blocked cell. Round closed cells, a path may go on from such a corner.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    graph
+        The graph of `edges_of`.
+    component
+        See `edges_of`.
+    source
+        The first landmark: the others are in the same part of the graph. Each is the corner
+        farthest from those before.
+    table
+        float64 (n, landmarks), filled in.
     """
-    cx, cy = points
-    first, heads = graph
-    heap = (np.empty(1024), np.empty(1024, np.int32))
-    distances[:] = np.inf
-    distances[source] = 0.0
-    size = push(heap, 0, 0.0, source)
-    while size:
-        here, cost = heap[1][0], heap[0][0]
-        size = pop(heap, size)
-        if cost > distances[here]:
-            continue
-        low, high = first[2 * here], first[2 * here + 2]
-        while size + high - low > len(heap[0]):
-            heap = (_doubled(heap[0]), _doubled(heap[1]))
-        for k in range(low, high):
-            other = heads[k]
-            reached = cost + distance(cx[here], cy[here], cx[other], cy[other])
-            if reached < distances[other]:
-                distances[other] = reached
-                size = push(heap, size, reached, other)
-
-
-@njit(cache=True, nogil=True)
-def landmarks_of(points, graph, source, table):
-    """Compute the distances of all corners from landmarks.
-
-    The first landmark is a given corner, each other one the corner farthest from those before.
-
-    `points`, `graph`: see `distances_from`; `source`: the first landmark: the others are in the
-    same part of the graph; `table`: float64 (n, landmarks), filled in.
-    """
-    n, number = table.shape
-    distances = np.empty(n)
-    nearest = np.full(n, np.inf)
+    cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
+    (offsets, heads), (n, number) = graph, table.shape
+    wall = walls_at(mesh, component)
+    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    heap = np.empty(n), np.empty(n, np.int32)
+    arrived, nearest = np.empty((number, n)), np.full(n, np.inf)
+    points = np.stack((cy, cx), axis=1)
     landmark = source
     for k in range(number):
-        distances_from(points, graph, landmark, distances)
-        table[:, k] = distances
-        far = 0.0
-        for corner in range(n):
-            nearest[corner] = min(nearest[corner], distances[corner])
-            if far < nearest[corner] < np.inf:
-                far, landmark = nearest[corner], corner
+        # One row for each landmark while they are found.
+        distances = arrived[k]
+        distances[:] = np.inf
+        # The first segment may leave in the third quadrant, for any corner that is seen there.
+        is_seen = np.zeros(n, np.bool_)
+        sight = first, begins, points, is_seen
+        _, room = see_quadrant(mesh, landmark, wall[landmark], 2, sight, room)
+        # Corners of a polygon round the landmark are seen because it is convex, itself too.
+        slot = wall[landmark]
+        while slot >= 0:
+            low, high = first[polygon_of[slot]], first[polygon_of[slot] + 1]
+            is_seen[begins[low:high]] = True
+            slot = twins[slot - 1 if slot > low else high - 1]
+        size = 0
+        for other in range(n):
+            if is_seen[other] and kinds[other] < 4:
+                distances[other] = distance(cx[landmark], cy[landmark], cx[other], cy[other])
+                size = push(heap, size, distances[other], other)
+        # Farther corners are reached along the edges, from the nearest one on.
+        while size:
+            here, cost = heap[1][0], heap[0][0]
+            size = pop(heap, size)
+            if cost > distances[here]:
+                continue
+            low, high = offsets[2 * here], offsets[2 * here + 2]
+            while size + high - low > len(heap[0]):
+                heap = (_doubled(heap[0]), _doubled(heap[1]))
+            for other in heads[low:high]:
+                reached = cost + distance(cx[here], cy[here], cx[other], cy[other])
+                if reached < distances[other]:
+                    distances[other] = reached
+                    size = push(heap, size, reached, other)
+        # The next landmark is far from all so far.
+        nearest = np.minimum(nearest, distances)
+        landmark = np.argmax(np.where(nearest < np.inf, nearest, -1.0))
+    # The last one may arrive in the third quadrant.
+    before = np.ascontiguousarray(arrived.T)
+    table[:] = before
+    nowhere = 0.0, 0.0, np.empty(0, np.int32)
+    for corner in range(n):
+        if kinds[corner] >= 4 or wall[corner] < 0:
+            continue
+        found, room = see_quadrant(mesh, corner, wall[corner], 2, nowhere, room)
+        for other in room[2][:found]:
+            further = distance(cx[corner], cy[corner], cx[other], cy[other])
+            for k in range(number):
+                table[corner, k] = min(table[corner, k], before[other, k] + further)
 
 
 @njit(cache=True, nogil=True)

@@ -12,14 +12,9 @@ from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
 from hybridnav.search.mesh.kernels.closures import look_round
-from hybridnav.search.mesh.kernels.corner_search import (
-    APART,
-    MET,
-    look_from_endpoints,
-    polygons_of_endpoints,
-    query_corners,
-)
+from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.hubs import query_hubs
+from hybridnav.search.mesh.kernels.intervals import APART, MET, polygons_of_endpoints
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
     DONE,
@@ -213,7 +208,7 @@ def _answer(mesh, graph, place, where, points, work, effort):
     """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
     if isinstance(graph[1], tuple):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
-    kernel = {3: query_corners, 5: query_hierarchy}.get(len(graph), query_hubs)
+    kernel = {6: query_corners, 5: query_hierarchy}.get(len(graph), query_hubs)
     return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
@@ -235,7 +230,7 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
 
     if isinstance(graph[1], types.BaseTuple):
         return by_intervals
-    if len(graph) == 3:
+    if len(graph) == 6:
         return by_corners
     return by_hierarchy if len(graph) == 5 else by_hubs
 
@@ -254,7 +249,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
 
     `mesh`, `endpoints`: see `successors`; `hierarchy`: results of `contract` and
     `classes_that_follow`; patches of `repair` with what `look_round` needs, all empty if nothing is
-    closed; `where`: see `look_from_endpoints`; `work`: arrays of one query: room for the polygons
+    closed; `where`: see `look_round`; `work`: arrays of one query: room for the polygons
     of the endpoints; room of `see_from_point`; records of corners, int64 (n, 4), costs from the
     start and from the goal (`FAR`), and the tail and arc by which each was reached; corners
     touched; two heaps; counts and bounds; `effort`: see `query`. Result: see `query`.
@@ -266,13 +261,8 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        patches, around = hierarchy[4]
-        rooms = starts, goals, room
-        # The corners that both ends see, round closed cells if there are any.
-        if len(patches[0]):
-            status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
-        else:
-            status, n, n_all = look_from_endpoints(mesh, where, endpoints, rooms, bounds)
+        rooms, around = (starts, goals, room), hierarchy[4][1]
+        status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
         if n_all > len(heaps[0]):
             status = WORK_FULL
         if status == WORK_FULL:

@@ -21,9 +21,8 @@ from hybridnav.search.mesh.kernels.closures import (
     KIND,
     crosses,
     is_beside,
-    see_round,
 )
-from hybridnav.search.mesh.kernels.corner_search import polygon_in, polygons_with
+from hybridnav.search.mesh.kernels.corner_search import see_from_new
 from hybridnav.search.mesh.kernels.views import class_of, cost_of, touches
 
 _GROUP = 64
@@ -346,15 +345,7 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
         x, y, kind = cx[corner], cy[corner], kinds[corner]
         if not _patch(hierarchy, patches, corner):
             break
-        inner = polygon_in(mesh, place[0], place[1], int(y), int(x))
-        starts = polygons[: polygons_with(mesh, inner, int(y), int(x), x, y, polygons)]
-        nowhere = (0.0, 0.0, starts[:0])
-        n = -1
-        while n < 0:
-            n, _ = see_round(mesh, around, (x, y, starts), nowhere, view, 0)
-            if n < 0:  # there was no room
-                more = 2 * len(view[2])
-                view = np.empty((more, 2), np.int32), np.empty((more, 4)), np.empty(more, np.int32)
+        n, view = see_from_new(mesh, around, place, (x, y), view, polygons)
         # Only segments along which a path may bend round it, each once.
         for k in range(n):
             other = np.int64(view[2][k])

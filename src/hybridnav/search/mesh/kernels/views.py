@@ -16,8 +16,9 @@ from numba import types
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import turn_of
-from hybridnav.search.contraction import pack
+from hybridnav.search.contraction import grow_rows, pack
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2
@@ -60,10 +61,13 @@ def lobe_of(kind, dx, dy):
 
 @njit(cache=True, nogil=True)
 def axes(kind, lobe):
-    """Return the right and the left limit of a quadrant of `lobe_of`, as directions."""
+    """Return the right and the left limit of a quadrant of `lobe_of`, as directions.
+
+    Quadrant 2 is the one opposite to the blocked cell.
+    """
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
-    qx, qy = (ex, -ey) if lobe == 0 else (-ex, ey)
+    qx, qy = ex if lobe == 0 else -ex, ey if lobe == 1 else -ey
     return (qx, 0.0, 0.0, qy) if qx * qy > 0.0 else (0.0, qy, qx, 0.0)
 
 
@@ -167,6 +171,27 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
         slot = twins[last]
     found, _ = _spread(mesh, x, y, target, room, n, found)
     return found
+
+
+@njit(cache=True, nogil=True)
+def walls_at(mesh, component):
+    """Return a slot of a wall that begins at each corner, int32 (n,), -1 for none."""
+    begins, twins, polygon_of = mesh[4], mesh[6], mesh[7]
+    wall = np.full(len(mesh[2]), -1, np.int32)
+    for slot in range(len(begins)):
+        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
+            wall[begins[slot]] = slot
+    return wall
+
+
+@njit(cache=True, nogil=True)
+def see_quadrant(mesh, corner, slot, lobe, target, room):
+    """Return the number of corners seen, see `see_from_corner`, and the room, which may grow."""
+    found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
+    while found < 0:
+        room = grow_rows(room[0]), grow_rows(room[1]), grow(room[2])
+        found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
+    return found, room
 
 
 @njit(cache=True, nogil=True)
