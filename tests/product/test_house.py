@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_460,
-    "lines": 94_493,
+    "code": 59_464,
+    "lines": 94_500,
     "files": 386,
-    "code outside ext": 42_130,
+    "code outside ext": 42_134,
     "lines of a file, median": 272,
     "lines of a file, most": 450,
     "packages": 12,

@@ -327,6 +327,11 @@ def load(
     return Model(grid)
 
 
+def load_grid(path: PathLike, **reading: Any) -> OccupancyGrid:
+    """Load the map of a model; parameters as in `load`."""
+    return load(path, **reading).grid
+
+
 def is_model(path: PathLike) -> bool:
     """Return whether a path names a model, that is, ends in `.hnm`."""
     return Path(path).suffix.lower() == MODEL_SUFFIX

@@ -380,7 +380,9 @@ def contract(kinds, first, arcs, follow, effort):
         # A shortcut takes the class at each of its ends from the arc there, so `follow` holds for
         # it too, and its legs from both. Each comes with its reverse.
         for one in range(n_arcs):
-            n_wanted = np.count_nonzero(table[one])
+            n_wanted = 0
+            for two in range(n_arcs):
+                n_wanted += table[one, two]
             if n_wanted > 0:
                 mark -= 1
                 tail = pool[begin[node] + one, 1] >> HEAD_SHIFT
