@@ -201,16 +201,24 @@ def queries(free: Any, seed: int) -> Iterator[tuple[Any, Any]]:
         yield (first, last), (start, goal)
 
 
+def detour_of(
+    case: tuple[Any, Any], kind: str = "intervals"
+) -> tuple[Any, MeshSearch, DetourSearch, MeshSearch]:
+    """The cells that closures leave, searches of the whole mesh and round the closures, and one of
+    a mesh built without them."""
+    free, closed = case
+    left = without(free, closed)
+    assume(left.any())
+    search = search_of(build_mesh(free), kind)
+    return left, search, DetourSearch(search, free, closed), MeshSearch(build_mesh(left))
+
+
 @settings(max_examples=examples(120), deadline=None)
 @given(closures(), seeds, st.sampled_from(SEARCHED))
 def test_a_detour_is_the_shortest_path_of_a_mesh_without(
     case: tuple[Any, Any], seed: int, kind: str
 ) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search, anew = search_of(build_mesh(free), kind), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(search, free, closed)
+    left, search, round_it, anew = detour_of(case, kind)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         found, opened = round_it.path(*query), search.path(*query)
@@ -271,11 +279,7 @@ def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
 @settings(max_examples=examples(40), deadline=None)
 @given(closures(), seeds)
 def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search = MeshSearch(build_mesh(free))
-    round_it = DetourSearch(search, free, closed)
+    left, search, round_it, _ = detour_of(case)
     cells, positions = zip(*queries(left, seed), strict=True)
     pairs = np.array(cells), np.array(positions)
     many = shortest_paths(
@@ -322,11 +326,7 @@ def test_a_graph_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell(kind: st
 def test_of_equally_short_paths_the_graph_takes_the_same_with_cells_closed_beside(
     case: tuple[Any, Any], seed: int
 ) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search = search_of(build_mesh(free), "landmarks")
-    round_it = DetourSearch(search, free, closed)
+    left, search, round_it, _ = detour_of(case, "landmarks")
     rng = np.random.default_rng(seed)
     for first, last in rng.choice(np.argwhere(left), (8, 2)).tolist():
         query = (first, last), ((first[0] + 0.5, first[1] + 0.5), (last[0] + 0.5, last[1] + 0.5))
@@ -341,11 +341,7 @@ def test_of_equally_short_paths_the_graph_takes_the_same_with_cells_closed_besid
 def test_a_long_search_that_asks_whether_its_ends_are_apart_is_exact(
     case: tuple[Any, Any], seed: int, patience: int
 ) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search, anew = search_of(build_mesh(free), "landmarks"), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(search, free, closed)
+    left, _, round_it, anew = detour_of(case, "landmarks")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(searches, "PATIENCE", patience)
         for query in [*queries(left, seed)] * 2:
@@ -401,11 +397,7 @@ def steps(
 def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
     case: tuple[Any, Any], seed: int, kind: str
 ) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search, anew = search_of(build_mesh(free), kind), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(search, free, closed)
+    left, search, round_it, anew = detour_of(case, kind)
     rng = np.random.default_rng(seed)
     (a, b), (c, d) = rng.choice(np.argwhere(left), 2).tolist()
     query = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
@@ -429,11 +421,7 @@ def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
 def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
     case: tuple[Any, Any], seed: int, epsilon: float
 ) -> None:
-    free, closed = case
-    left = without(free, closed)
-    assume(left.any())
-    search, anew = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(left))
-    round_it = DetourSearch(search, free, closed)
+    left, _, round_it, anew = detour_of(case)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         found = round_it.path(*query, epsilon=epsilon)

@@ -7,7 +7,6 @@ A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.contraction import grow_rows
 from hybridnav.search.mesh.kernels.closures import (
@@ -34,11 +33,7 @@ from hybridnav.search.mesh.kernels.polyanya import (
     push,
     put_corner,
 )
-from hybridnav.search.mesh.kernels.views import (
-    distance,
-    lobe_of,
-    touches,
-)
+from hybridnav.search.mesh.kernels.views import distance, lobe_of, touches, view_room
 
 _SLACK = 1e-9
 """Rounding of distances in the graph, in cells."""
@@ -342,7 +337,7 @@ def see_from_new(mesh, around, place, point, room, polygons):
     nowhere = (0.0, 0.0, starts[:0])
     n, _ = see_round(mesh, around, (x, y, starts), nowhere, room, 0)
     while n < 0:
-        room = grow_rows(room[0]), grow_rows(room[1]), grow(room[2])
+        room = view_room(2 * len(room[2]))
         n, _ = see_round(mesh, around, (x, y, starts), nowhere, room, 0)
     return n, room
 
@@ -371,7 +366,7 @@ def link(mesh, around, place, table):
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     n_old, n_all = around[4], len(cx)
-    view = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    view = view_room(1024)
     polygons = np.empty(len(place[0]), np.int32)
     bounds = np.empty((n_all - n_old, 2, table.shape[1]))
     bounds[:, 0], bounds[:, 1] = -np.inf, np.inf

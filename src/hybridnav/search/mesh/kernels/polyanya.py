@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import GRAIN, turn_of
 from hybridnav.search.mesh.kernels.intervals import (
     ENDS,
@@ -22,7 +23,7 @@ from hybridnav.search.mesh.kernels.intervals import (
     successors,
     turns,
 )
-from hybridnav.search.mesh.kernels.views import distance, see_quadrant, walls_at
+from hybridnav.search.mesh.kernels.views import distance, see_quadrant, view_room, walls_at
 
 DONE, PAUSED, WORK_FULL = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;
@@ -276,12 +277,6 @@ def pop(heap, size):
 # Kernels of the graph of corners: its edges, and distances in it from landmarks.
 
 
-@njit(cache=True, nogil=True)
-def _doubled(array):
-    """Return a copy with room for twice as many rows."""
-    return np.concatenate((array, array))
-
-
 @guarded
 @njit(cache=True, nogil=True)
 def edges_of(mesh, component, limit):
@@ -298,7 +293,7 @@ def edges_of(mesh, component, limit):
     kinds = mesh[2]
     n = len(kinds)
     wall = walls_at(mesh, component)
-    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    room = view_room(1024)
     nowhere = 0.0, 0.0, np.empty(0, np.int32)
     first = np.zeros(2 * n + 1, np.int64)
     heads = np.empty(16 * n, np.int32)
@@ -312,7 +307,7 @@ def edges_of(mesh, component, limit):
                 first[2 * n] = -1
                 return first, heads[:0].copy()
             while m + found > len(heads):
-                heads = _doubled(heads)
+                heads = grow(heads)
             heads[m : m + found] = room[2][:found]
             m += found
             first[2 * corner + lobe + 1] = m
@@ -344,7 +339,7 @@ def landmarks_of(mesh, graph, component, source, table):
     cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
     (offsets, heads), (n, number) = graph, table.shape
     wall = walls_at(mesh, component)
-    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    room = view_room(1024)
     heap = np.empty(n), np.empty(n, np.int32)
     arrived, nearest = np.empty((number, n)), np.full(n, np.inf)
     points = np.stack((cy, cx), axis=1)
@@ -376,7 +371,7 @@ def landmarks_of(mesh, graph, component, source, table):
                 continue
             low, high = offsets[2 * here], offsets[2 * here + 2]
             while size + high - low > len(heap[0]):
-                heap = (_doubled(heap[0]), _doubled(heap[1]))
+                heap = (grow(heap[0]), grow(heap[1]))
             for other in heads[low:high]:
                 reached = cost + distance(cx[here], cy[here], cx[other], cy[other])
                 if reached < distances[other]:

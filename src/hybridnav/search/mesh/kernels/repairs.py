@@ -23,7 +23,7 @@ from hybridnav.search.mesh.kernels.closures import (
     is_beside,
 )
 from hybridnav.search.mesh.kernels.corner_search import see_from_new
-from hybridnav.search.mesh.kernels.views import class_of, cost_of, touches
+from hybridnav.search.mesh.kernels.views import class_of, cost_of, touches, view_room
 
 _GROUP = 64
 """Corners, neighbours on the map, that have a box in common."""
@@ -339,7 +339,7 @@ def repair(mesh, hierarchy, footing, around, edges, place, room):
     _spoil_all(mesh, hierarchy, footing, around, patches)
 
     # Arcs between the new corners, and to those that they see.
-    view = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    view = view_room(1024)
     polygons = np.empty(len(place[0]), np.int32)
     for corner in range(n_old, n_all):
         x, y, kind = cx[corner], cy[corner], kinds[corner]

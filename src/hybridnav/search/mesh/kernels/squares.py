@@ -10,7 +10,7 @@ import numpy as np
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.search.mesh.kernels.views import axes, has_target, see_from_corner
+from hybridnav.search.mesh.kernels.views import axes, has_target, see_from_corner, view_room
 
 _SHIFT = 0.25
 """Offset of the lines between squares, in cells: points that are centres or corners of cells lie on
@@ -146,7 +146,7 @@ def squares_of_views(mesh, walls, squares, layout, found):
     for square in squares[1]:
         n_polygons[square] += 1
     target = (*squares, (side, n_across), stamps, state, found)
-    room = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
+    room = view_room(1024)
     offset = np.zeros(len(kinds) + 1, np.int64)
     for corner in range(len(kinds)):
         state[0] = corner
@@ -162,8 +162,7 @@ def squares_of_views(mesh, walls, squares, layout, found):
             if see_from_corner(mesh, corner, walls[corner], lobe, target, room, 0) >= 0:
                 lobe += 1
             else:
-                n = 2 * len(room[2])
-                room = np.empty((n, 2), np.int32), np.empty((n, 4)), np.empty(n, np.int32)
+                room = view_room(2 * len(room[2]))
         offset[corner + 1] = state[1]
         for k in range(offset[corner], min(state[1], len(found))):
             square = found[k]

@@ -16,9 +16,8 @@ from numba import types
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import turn_of
-from hybridnav.search.contraction import grow_rows, pack
+from hybridnav.search.contraction import pack
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2
@@ -90,6 +89,12 @@ def _pend(room, n, slot, marks, lx, ly, rx, ry):
     whole[n, 0], whole[n, 1] = slot, marks
     real[n, 0], real[n, 1], real[n, 2], real[n, 3] = lx, ly, rx, ry
     return n + 1
+
+
+@njit(cache=True, nogil=True)
+def view_room(n):
+    """Return the room of `see_from_point` for n pending intervals and corners."""
+    return np.empty((n, 2), np.int32), np.empty((n, 4)), np.empty(n, np.int32)
 
 
 @njit(cache=True, nogil=True)
@@ -189,7 +194,7 @@ def see_quadrant(mesh, corner, slot, lobe, target, room):
     """Return the number of corners seen, see `see_from_corner`, and the room, which may grow."""
     found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
     while found < 0:
-        room = grow_rows(room[0]), grow_rows(room[1]), grow(room[2])
+        room = view_room(2 * len(room[2]))
         found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
     return found, room
 
