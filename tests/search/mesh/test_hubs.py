@@ -16,6 +16,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
+from hybridnav.search.mesh.kernels import squares
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -270,3 +271,37 @@ def test_too_little_memory_and_presets_without_labels_are_named() -> None:
     assert labels_of(planner) is None
     with pytest.raises(InvalidValueError, match="no hub labels"):
         planner_of(hn.example_map("figure1"), "grid-astar").prepare(labels=5)
+
+
+def test_squares_seen_whole_are_those_of_views_that_began_with_more_room(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One corner sees some 1,200 others on a quarter of a circle: its view begins anew."""
+    free = np.ones((950, 950), np.bool_)
+    angles = np.linspace(0.02, np.pi / 2 - 0.02, 613)
+    rows, cols = (np.round(2 + 900 * part(angles)).astype(int) for part in (np.sin, np.cos))
+    free[rows, cols] = free[2, 2] = False
+    mesh = build_mesh(free)
+    walls = np.full(len(mesh.corners), -1, np.int32)
+    slots = np.flatnonzero(mesh.twins < 0)
+    walls[mesh.begins[slots]] = slots
+    walls[(mesh.corners > 3).any(axis=1)] = -1
+    arrays = MeshSearch(mesh).arrays
+    layout = 16.0, 61, 61 * 61
+    parts = squares.squares_of_polygons(arrays, *layout[:2])
+
+    def seen(views: Any) -> list[int]:
+        found = np.empty(1 << 14, np.int32)
+        return found[: views(arrays, walls, parts, layout, found)[-1]].tolist()
+
+    asked, real, found = [], squares.view_room, seen(squares.squares_of_views)
+    python = getattr(squares.squares_of_views, "py_func", squares.squares_of_views)
+    for least in (0, 1 << 15):
+
+        def larger(n: int, least: int = least) -> Any:
+            asked.append(n)
+            return real(max(n, least))
+
+        monkeypatch.setattr(squares, "view_room", larger)
+        assert seen(python) == found
+    assert asked == [1024, 2048, 1024]

@@ -149,9 +149,12 @@ def squares_of_views(mesh, walls, squares, layout, found):
     room = view_room(1024)
     offset = np.zeros(len(kinds) + 1, np.int64)
     for corner in range(len(kinds)):
-        state[0] = corner
         lobe = 0
         while lobe < 2 and kinds[corner] < 4 and walls[corner] >= 0:
+            # A view that there was no room for begins anew, with a stamp of its own: what it has
+            # marked must not count twice.
+            if lobe == 0:
+                state[0], state[1] = state[0] + 1, offset[corner]
             # All polygons round the corner, then what is seen behind them.
             x, y, slot = cx[corner], cy[corner], walls[corner]
             rx, ry, lx, ly = axes(kinds[corner], lobe)
@@ -162,7 +165,7 @@ def squares_of_views(mesh, walls, squares, layout, found):
             if see_from_corner(mesh, corner, walls[corner], lobe, target, room, 0) >= 0:
                 lobe += 1
             else:
-                room = view_room(2 * len(room[2]))
+                room, lobe = view_room(2 * len(room[2])), 0
         offset[corner + 1] = state[1]
         for k in range(offset[corner], min(state[1], len(found))):
             square = found[k]
