@@ -294,7 +294,8 @@ def test_squares_seen_whole_are_those_of_views_that_began_with_more_room(
         found = np.empty(1 << 14, np.int32)
         return found[: views(arrays, walls, parts, layout, found)[-1]].tolist()
 
-    asked, real, found = [], squares.view_room, seen(squares.squares_of_views)
+    asked: list[int] = []
+    real, found = squares.view_room, seen(squares.squares_of_views)
     python = getattr(squares.squares_of_views, "py_func", squares.squares_of_views)
     for least in (0, 1 << 15):
 
