@@ -17,6 +17,7 @@ from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.kernels import squares
+from hybridnav.search.mesh.kernels.views import view_room
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -295,13 +296,13 @@ def test_squares_seen_whole_are_those_of_views_that_began_with_more_room(
         return found[: views(arrays, walls, parts, layout, found)[-1]].tolist()
 
     asked: list[int] = []
-    real, found = squares.view_room, seen(squares.squares_of_views)
+    found = seen(squares.squares_of_views)
     python = getattr(squares.squares_of_views, "py_func", squares.squares_of_views)
     for least in (0, 1 << 15):
 
         def larger(n: int, least: int = least) -> Any:
             asked.append(n)
-            return real(max(n, least))
+            return view_room(max(n, least))
 
         monkeypatch.setattr(squares, "view_room", larger)
         assert seen(python) == found
