@@ -19,6 +19,7 @@ import hybridnav as hn
 from benchmarks.worlds import office_world
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planner import load_preset
+from hybridnav.refine.ompl import client
 from tests.refine.troubled_query import TroubledQuery
 
 pytest.importorskip("ompl")
@@ -41,13 +42,17 @@ REASONS = {
 @pytest.fixture(scope="module")
 def planner() -> Iterator[hn.HybridPlanner]:
     """Its worker finds the troubled query in the tests."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", str(ROOT))
+        yield office_planner()
+
+
+def office_planner() -> hn.HybridPlanner:
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(office_world().grid(robot_radius_m=0.25))
     )
     preset = load_preset("ompl", overrides=[f"planner.ompl.budget_s={BUDGET_S}"])
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PYTHONPATH", str(ROOT))
-        yield hn.HybridPlanner(topology, preset=preset)
+    return hn.HybridPlanner(topology, preset=preset)
 
 
 def worker_of(planner: hn.HybridPlanner) -> Any:
@@ -345,3 +350,33 @@ def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
     assert "is not ready" in late.refinement.steps[0]  # type: ignore[union-attr]
     planner.close()
     assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
+
+
+def test_a_process_that_was_started_ahead_answers_for_the_next_planner() -> None:
+    hn.refine.ompl.start_ahead()
+    hn.refine.ompl.start_ahead()  # one is enough
+    [(ahead, _)] = client._ahead
+    first, second = office_planner(), office_planner()
+    assert [worker_of(first)._running.process is ahead, client._ahead] == [True, []]
+    assert worker_of(second)._running.process is not ahead
+    assert first.plan(*ENDS).solved
+
+
+def test_a_planner_starts_its_own_process_where_the_one_ahead_has_died() -> None:
+    hn.refine.ompl.start_ahead()
+    [(ahead, _)] = client._ahead
+    ahead.kill()
+    ahead.wait()
+    planner = office_planner()
+    assert worker_of(planner)._running.process is not ahead
+    assert planner.plan(*ENDS).solved
+
+
+def test_a_process_that_no_planner_takes_ends_with_the_one_that_started_it() -> None:
+    code = (
+        "import hybridnav as hn; from hybridnav.refine.ompl import client; "
+        "hn.refine.ompl.start_ahead(); print(client._ahead[0][0].pid)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    assert gone(int(ended.stdout), within_s=START_S)
+    assert ended.stderr == ""

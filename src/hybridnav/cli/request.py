@@ -78,6 +78,8 @@ class Request:
         """Plan, print the answer, draw it, and return whether it is solved."""
         seconds: dict[str, float] = {}
         settings = self.settings
+        if settings.planner.method == "ompl":
+            hn.refine.ompl.start_ahead()
         model = load_model(self.map_file, settings, seconds, self.reading)
         grid = model.grid
         check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)

@@ -5,6 +5,7 @@ from .client import (
     Setup as Setup,
     Worker as Worker,
     require_ompl as require_ompl,
+    start_ahead as start_ahead,
 )
 from .problem import Corridors as Corridors
 from .settings import OmplSettings as OmplSettings

@@ -313,10 +313,7 @@ class _Start(threading.Thread):
     def run(self) -> None:
         """Start the process and wait until it is ready."""
         try:
-            ours, theirs = socket.socketpair()
-            self.connection = Connection(ours.detach())
-            with theirs:
-                self.process = _launch(theirs.fileno())
+            self.process, self.connection = _taken() or _launch()
             self.connection.send(self._setup)
             refusal = self.connection.recv() if self.connection.poll(_START_S) else Failure(_SLOW)
             self.problem = "" if refusal is None else getattr(refusal, "reason", _NO_START)
@@ -348,10 +345,35 @@ class _Running:
         return not self.end.alive or self.process.poll() is not None
 
 
-def _launch(descriptor: int) -> subprocess.Popen[bytes]:
+_Launched = tuple[subprocess.Popen[bytes], Connection]
+_ahead: list[_Launched] = []
+"""A process that waits for its map."""
+
+
+def start_ahead() -> None:
+    """Start the process of the next `Worker`, which loads OMPL until its map is known.
+
+    For commands, which plan once: a process that no worker takes ends with this one. Where none
+    starts, nothing happens, and the worker says why.
+    """
+    if importlib.util.find_spec("ompl") is not None and not _ahead:
+        with contextlib.suppress(OSError):
+            _ahead.append(_launch())
+
+
+def _taken() -> _Launched | None:
+    """Return the process that was started ahead, if it runs and no fork has it from its parent."""
+    launched = _ahead.pop() if _ahead else None
+    return None if launched is None or launched[0].poll() is not None else launched
+
+
+def _launch() -> _Launched:
     # With its own command: a spawned process of multiprocessing would run the caller's main module.
     server, pipes = "hybridnav.refine.ompl.server", {"stdin": subprocess.DEVNULL}
-    return start_module(server, str(descriptor), pass_fds=[descriptor], **pipes)
+    ours, theirs = socket.socketpair()
+    connection, descriptor = Connection(ours.detach()), theirs.fileno()
+    with theirs:
+        return start_module(server, str(descriptor), pass_fds=[descriptor], **pipes), connection
 
 
 def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -> None:

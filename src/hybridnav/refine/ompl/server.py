@@ -36,9 +36,12 @@ _ALONE_S = 0.5
 
 def serve(connection: Connection) -> None:
     """Answer queries until the other side closes the connection."""
-    setup: Setup = connection.recv()
-    from ompl import util  # noqa: PLC0415 - after the map, which the other side is waiting to send
+    # Before the map, which the other side may still be reading.
+    from ompl import util  # noqa: PLC0415
 
+    import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
+
+    setup: Setup = connection.recv()
     util.setLogLevel(util.LOG_NONE)
     try:
         base = Base(setup)
@@ -58,8 +61,7 @@ def serve(connection: Connection) -> None:
 
 
 def _warm_up(base: Base) -> None:
-    """Load modules and kernels before the first fork, and let OMPL check the parameters."""
-    import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
+    """Load kernels before the first fork, and let OMPL check the parameters."""
     from hybridnav.refine.ompl.solve import StateSpace, make  # noqa: PLC0415
 
     inside = np.ones(base.setup.grid.shape, dtype=np.bool_)
