@@ -232,7 +232,11 @@ def test_poses_are_refused_where_the_robot_does_not_fit(rooms: hn.TopologicalMap
     made = long_robot(rooms, "se2", "budget_s: 1")
     goal = (17.0, 9.0, 1.0)
     assert made.plan((0.5, 3.0, 0.0), goal).status is hn.PlanStatus.START_OCCUPIED
-    assert made.plan(goal, (0.5, 3.0, 0.0)).status is hn.PlanStatus.GOAL_OCCUPIED
+    refused = made.plan(goal, (0.5, 3.0, 0.0))
+    assert refused.status is hn.PlanStatus.GOAL_OCCUPIED
+    assert refused.reason.startswith("The goal leaves no room for the footprint with this heading.")
+    shut = made.plan(goal, (2.0, 3.0, 0.0), blocked=shapely.box(1.2, 2.9, 1.3, 3.1))
+    assert (shut.status.value, shut.reason[:25]) == ("goal blocked", "The goal leaves no room f")
     with pytest.raises(hn.errors.InvalidValueError, match="start must be three finite numbers"):
         made.plan((2.0, 3.0), goal)
     with pytest.raises(hn.errors.InvalidValueError, match=r"goals .* poses .* shape \(n, 3\)"):

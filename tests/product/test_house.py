@@ -5,10 +5,10 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_459,
-    "lines": 94_497,
+    "code": 59_479,
+    "lines": 94_533,
     "files": 386,
-    "code outside ext": 42_129,
+    "code outside ext": 42_149,
     "lines of a file, median": 272,
     "lines of a file, most": 450,
     "packages": 12,
@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_629,
+    "lines of tests": 61_668,
 }
 
 

@@ -60,6 +60,8 @@ class Explanation:
     """Whether there is a path of this radius, with the closures, that enters unexplored cells."""
     reached_m2: tuple[float, float]
     """Square metres that can be reached from the start, and from the goal."""
+    unfit_end: str = ""
+    """`start` or `goal`, where the planner's footprint does not fit with the heading there."""
     cut: FloatArray | None = field(default=None, repr=False)
     """float64 (n, 2), `(x, y)` in metres, map frame: a closed chain of cells that cannot be
     entered, each beside the next one. It goes round one of the ends; beyond the map it is its rim.
@@ -348,11 +350,16 @@ def explain(
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):
         blocked = as_blocked(blocked)
-    return Case(
+    unfit = ""
+    if now.ompl is not None and radius_m is None:
+        asked = now.read(ends[0], ends[1], None, blocked, "point")
+        unfit = (now.ompl.refused(asked.poses, asked.closed) or unfit).partition(" ")[0]
+    case = Case(
         grid=grid,
         topology=now.topology,
         points=(np.asarray(ends[0])[:2], np.asarray(ends[1])[:2]),
         blocked=blocked,
         costs=now.costs.closed,
         allow_unexplored=now.preset.planner.allow_unexplored,
-    ).explained()
+    )
+    return replace(case.explained(), unfit_end=unfit)

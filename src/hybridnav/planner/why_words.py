@@ -82,6 +82,7 @@ _TABLES = {
         "blocked": "{End} is closed by {closures}.",
         "nearest": "The nearest point for this robot is {point}, {far} m away.",
         "path": "There is a path for a radius of {radius} m.",
+        "unfit": "{End} leaves no room for the footprint with this heading.",
         "path_tight": "A path exists for every radius below {widest} m; it is tightest {place}.",
         "everything": "Nothing on the map limits the radius.",
         "open": "{Closures} {is_are} closed, and there is no other way.",
@@ -121,6 +122,7 @@ _TABLES = {
         "blocked": "{End} ist gesperrt durch {closures}.",
         "nearest": "Der nächste Punkt für diesen Roboter ist {point}, {far} m entfernt.",
         "path": "Für einen Radius von {radius} m gibt es einen Weg.",
+        "unfit": "{End} lässt mit dieser Richtung keinen Platz für den Umriss.",
         "path_tight": "Es gibt einen Weg für jeden Radius unter {widest} m; am engsten ist er "
         "{place}.",
         "everything": "Nichts auf der Karte begrenzt den Radius.",
@@ -163,9 +165,10 @@ def sentences(why: Any, language: str) -> list[str]:
         if 0 < why.widest_m <= why.radius_m:
             lines += writer.tight("radius", why.widest_m, why.tight)
         return lines
+    unfit = [why.unfit_end] if why.unfit_end else []
+    lines = [writer.say("unfit", end=writer.table[end]) for end in unfit]
     if why.has_path:
-        return [writer.say("path"), *writer.tight("path_tight", why.widest_m, why.tight)]
-    lines = []
+        return [*lines, writer.say("path"), *writer.tight("path_tight", why.widest_m, why.tight)]
     if why.to_open:
         lines.append(writer.opening(why.to_open))
     elif why.opened.radius_m > why.radius_m:

@@ -153,7 +153,7 @@ class OmplPlanner:
         the states and trees of the search too.
         """
         began = time.monotonic() - spent_s
-        refused = self._refused(endpoints, closed)
+        refused = self.refused(endpoints, closed)
         if refused is not None:
             return OmplPlan(refused, self._metric, Refinement((), "OMPL"))
         between = _Between(cells, endpoints, closed, least_m)
@@ -259,7 +259,7 @@ class OmplPlanner:
     no_path = Refinement(("inscribed disc: no path",), "inscribed disc")
     """How a query ends where the largest disc in the robot has no path: nothing else is asked."""
 
-    def _refused(
+    def refused(
         self, endpoints: tuple[FloatArray, FloatArray], closed: ClosedCells | None
     ) -> PlanStatus | None:
         """Return the status of a query if the footprint does not fit at one of its endpoints."""
@@ -291,7 +291,7 @@ class OmplPlanner:
             pose = np.append(centre, 0.0)
             path = self._by_line_of_sight(free, (pose, pose), None)
             self._weighted_cost(path)
-            self._refused((pose, pose), None)
+            self.refused((pose, pose), None)
             if self.discs is not None:
                 cell = (int(free[0, 0]), int(free[0, 1]))
                 query = Query((cell, cell), (centre, centre))
