@@ -53,7 +53,7 @@ study: setup
 
 # On all cores, a file of tests to each in turn.
 unit: setup
-	$(BIN)/python -m pytest -m "not full" -n auto --dist loadfile
+	$(BIN)/python -m pytest -m "not full" -n auto --dist loadfile --no-loadscope-reorder
 
 # The kernels as plain Python, on maps of at most 12 x 12 cells: a second reading of the same code.
 nojit: setup
@@ -62,7 +62,7 @@ nojit: setup
 # Four times as many examples as `unit` tries, new ones each time. Bounds checks need a cache of their own: cached code
 # ignores the setting.
 full: setup
-	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest -n auto --dist loadfile
+	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
 setup: $(READY)
