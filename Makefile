@@ -59,7 +59,7 @@ unit: setup
 nojit: setup
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
-# Four times as many examples as `unit` tries, new ones each time. Bounds checks need a cache of their own: cached code
+# Seven times as many examples as `unit` tries, new ones each time. Bounds checks need a cache of their own: cached code
 # ignores the setting.
 full: setup
 	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder

@@ -17,7 +17,7 @@ Classes = NDArray[np.uint8]
 MAX_SIDE = 12 if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0" else 40
 """Largest side of a random map; kernels that run as plain Python get small ones."""
 
-_EXAMPLES = float(os.environ.get("HYBRIDNAV_EXAMPLES", "0.5"))
+_EXAMPLES = float(os.environ.get("HYBRIDNAV_EXAMPLES", "0.3"))
 
 _PROBABILITY = {CellClass.OCCUPIED: 1.0, CellClass.FREE: 0.0, CellClass.UNEXPLORED: 0.5}
 _LETTERS = {"#": CellClass.OCCUPIED, ".": CellClass.FREE, "?": CellClass.UNEXPLORED}
@@ -29,8 +29,8 @@ IS_FULL = "HYBRIDNAV_EXAMPLES" in os.environ
 
 
 def examples(count: int, full: int = 0) -> int:
-    """Return how many random examples a test tries: half of those named, four times as many where
-    `IS_FULL`, or then by the same factor of a number of their own."""
+    """Return how many random examples a test tries: three in ten of those named, twice as many as
+    named where `IS_FULL`, or then by the same factor of a number of their own."""
     return max(5, round((full if full and IS_FULL else count) * _EXAMPLES))
 
 

@@ -21,7 +21,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 48,
     "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_668,
+    "lines of tests": 61_676,
 }
 
 

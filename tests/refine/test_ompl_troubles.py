@@ -352,24 +352,18 @@ def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
     assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
 
 
-def test_a_process_that_was_started_ahead_answers_for_the_next_planner() -> None:
-    hn.refine.ompl.start_ahead()
-    hn.refine.ompl.start_ahead()  # one is enough
+@pytest.mark.parametrize("dies", [False, True])
+def test_a_process_that_was_started_ahead_is_the_next_planners_if_it_lives(*, dies: bool) -> None:
+    for _ in range(2):  # one is enough
+        hn.refine.ompl.start_ahead()
     [(ahead, _)] = client._ahead
+    if dies:
+        ahead.kill()
+        ahead.wait()
     first, second = office_planner(), office_planner()
-    assert [worker_of(first)._running.process is ahead, client._ahead] == [True, []]
-    assert worker_of(second)._running.process is not ahead
+    is_taken = [worker_of(one)._running.process is ahead for one in (first, second)]
+    assert (is_taken, client._ahead) == ([not dies, False], [])
     assert first.plan(*ENDS).solved
-
-
-def test_a_planner_starts_its_own_process_where_the_one_ahead_has_died() -> None:
-    hn.refine.ompl.start_ahead()
-    [(ahead, _)] = client._ahead
-    ahead.kill()
-    ahead.wait()
-    planner = office_planner()
-    assert worker_of(planner)._running.process is not ahead
-    assert planner.plan(*ENDS).solved
 
 
 def test_a_process_that_no_planner_takes_ends_with_the_one_that_started_it() -> None:
