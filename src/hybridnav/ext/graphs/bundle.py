@@ -73,7 +73,7 @@ class _Mask:
             values = mask_on_map(upright, values, self.frame)
         # A value of 0 makes unknown cells of a costmap free for the keepout filter, and an unknown
         # one is an error for the speed filter.
-        unknown = 255 if self.kind == "keepout" else 0
+        unknown = np.int16(255 if self.kind == "keepout" else 0)  # int8 has no 255
         pixels = np.where(values < 0, unknown, values).astype(np.uint8)[::-1]
         head = f"P5\n{pixels.shape[1]} {pixels.shape[0]}\n255\n"
         described = _rendered("bundle_mask.yaml.j2", {"kind": self.kind, "frame": frame})
