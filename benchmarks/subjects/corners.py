@@ -2,8 +2,8 @@
 
 Installs the package with its dependencies into an environment of the first and of the last Python,
 the first with the oldest numpy that is allowed, and runs there the tests of `TESTS`: the kernels,
-every preset, pyramids and rooms, the saved models, the commands, and that answers depend on no
-processor. Exits with 1 where one fails.
+every preset, pyramids and rooms, the saved models, the commands, maps, the files of graphs, and
+that answers depend on no processor. Exits with 1 where one fails.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ OLDEST = "numpy==1.26.*"
 TESTS = (
     *("tests/_base", "tests/planner/test_named_plans.py", "tests/planner/test_results.py"),
     *("tests/pyramid/test_invariants.py", "tests/search/test_search.py", "tests/topology"),
-    "tests/cli/test_commands.py",
+    *("tests/cli/test_commands.py", "tests/cli/test_export.py", "tests/maps"),
+    "tests/ext/graphs/test_bundle.py",
 )
 PACKAGES = ("hypothesis", "pytest", "h11")
 VERSIONS = "import sys, numpy, numba; print(sys.version.split()[0], numpy.__version__)"
