@@ -174,7 +174,7 @@ def is_near_border(row: float, col: float) -> bool:
 
 def write_mask(folder: Path, values: Any, frame: hn.Frame) -> Path:
     """A mask in the mode raw: a pixel holds the value, 255 is unknown."""
-    pixels = np.where(values < 0, 255, values).astype(np.uint8)[::-1]
+    pixels = np.where(values < 0, np.int16(255), values).astype(np.uint8)[::-1]
     rows, cols = pixels.shape
     (folder / "mask.pgm").write_bytes(b"P5 %d %d 255 " % (cols, rows) + pixels.tobytes())
     x, y = frame.origin_m

@@ -209,7 +209,7 @@ def test_a_packed_log_is_unpacked_no_further_than_a_limit(tmp_path: Path, conten
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2**23
-    assert log.bytes_read < log.size_bytes * 0.4
+    assert log.bytes_read < log.size_bytes * 0.5
     assert "\n" not in str(error.value)
     assert "gunzip" in str(error.value)
 
