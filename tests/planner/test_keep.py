@@ -46,9 +46,10 @@ def test_the_rest_is_kept_while_it_is_cheap_enough(classes: Any, seed: int, with
         shut = np.where(is_open, hn.CellClass.FREE, hn.CellClass.OCCUPIED).astype(np.uint8)
         assert segment_faults(occupancy_grid(shut, resolution_m=grid.resolution_m), new.line) == ()
         assert new.lower_bound <= new.cost
-        # Lines are compared: arcs of the rest may add a two-hundredth, new ones save more.
-        bent = planner.plan(here, goal, smooth="line-of-sight")
-        assert new.cost <= (1 + within) * max(fresh.cost, bent.cost) * 1.0051 + 1e-6
+        # Lines are compared; then arcs may add a two-hundredth.
+        kept, anew = (planner.plan(here, goal, keep=k, smooth="line-of-sight") for k in (old, None))
+        assert kept.cost <= (1 + within) * anew.cost + 1e-6
+        assert new.cost <= kept.cost * 1.0051 + 1e-6
         assert is_rest(new.line, old.line) or np.array_equal(new.line, fresh.line)
 
 

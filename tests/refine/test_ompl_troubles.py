@@ -368,8 +368,7 @@ def test_a_process_that_was_started_ahead_is_the_next_planners_if_it_lives(*, di
 
 def test_a_process_that_no_planner_takes_ends_with_the_one_that_started_it() -> None:
     code = (
-        "import hybridnav as hn; from hybridnav.refine.ompl import client; "
-        "hn.refine.ompl.start_ahead(); print(client._ahead[0][0].pid)"
+        "from hybridnav.refine.ompl import client as c; c.start_ahead(); print(c._ahead[0][0].pid)"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
     assert gone(int(ended.stdout), within_s=START_S)

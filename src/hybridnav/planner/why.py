@@ -350,10 +350,10 @@ def explain(
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):
         blocked = as_blocked(blocked)
-    unfit = ""
+    unfit = None
     if now.ompl is not None and radius_m is None:
         asked = now.read(ends[0], ends[1], None, blocked, "point")
-        unfit = (now.ompl.refused(asked.poses, asked.closed) or unfit).partition(" ")[0]
+        unfit = now.ompl.refused(asked.poses, asked.closed)
     case = Case(
         grid=grid,
         topology=now.topology,
@@ -362,4 +362,4 @@ def explain(
         costs=now.costs.closed,
         allow_unexplored=now.preset.planner.allow_unexplored,
     )
-    return replace(case.explained(), unfit_end=unfit)
+    return replace(case.explained(), unfit_end="" if unfit is None else unfit.split()[0])
