@@ -5,23 +5,23 @@ import re
 from tests.product.house import ROOT, SRC, figures, visited_by_paper
 
 LIMITS = {
-    "code": 59_479,
-    "lines": 94_533,
-    "files": 386,
-    "code outside ext": 42_149,
-    "lines of a file, median": 272,
-    "lines of a file, most": 450,
+    "code": 63_500,
+    "lines": 101_000,
+    "files": 400,
+    "code outside ext": 45_000,
+    "lines of a file, median": 290,
+    "lines of a file, most": 600,
     "packages": 12,
     "arrows between packages": 60,
     "arrows, with single modules": 79,
-    "files visited by paper": 52,
-    "lines visited by paper": 12_859,
+    "files visited by paper": 56,
+    "lines visited by paper": 14_000,
     "modules of a plan and a picture": 132,
     "imports, % of the code": 8.9,
     "long kernels without headings": 0,
-    "names at the root": 48,
-    "parameters of commands, shared ones once": 116,
-    "lines of tests": 61_676,
+    "names at the root": 52,
+    "parameters of commands, shared ones once": 126,
+    "lines of tests": 69_000,
 }
 
 
