@@ -6,7 +6,11 @@ centre. All others, and the outside, are *walls*: it may touch them, but not ent
 between two that meet at a corner. Accepted means: the path of the proof is free, it costs what is
 stated, and none costs less than the stated bound, to 1 part in 10^9 (or 10^-6 of a cell, to which
 ends are rounded that are no centres). The rest is decided in whole numbers.
-MAP is a YAML file of ROS beside a PGM image, or a MovingAI map; the proof must be about that map.
+MAP is a MovingAI map, or a YAML file of ROS that names a PGM image of 8 bits; the proof must be
+about that map. It reads lines `KEY: VALUE # COMMENT` of YAML: VALUE is a plain text, a text in
+quotes without backslashes, or a list [x, y, yaw], which may also stand below as lines `- x`.
+What stands below other keys is skipped.
+Exits with 0 if the proof is accepted, 1 if it is rejected, 2 if a file cannot be read.
 """
 
 import base64
@@ -31,16 +35,41 @@ COS, SIN = np.cos(np.arange(17) * math.pi / 64), np.sin(np.arange(17) * math.pi 
 TILTED = np.floor(PLAIN[0] * np.stack([COS, COS + SIN])).astype(int)
 LEVEL = 8  # the tilt that is taken where none is stated
 MOST = 1000  # cells that a radius has, lest a file takes hours
+KEYS = "image", "resolution", "origin", "negate", "mode"
+PLAIN_TEXT = r"""[^]\[\s"'{}?:,#&*!|>%@`](?:[^:#\t]|:(?! |$)|(?<! )#)*"""
+VALUE = rf"""'(?:[^']|'')*'|"[^"\\]*"|\[[^]\["'{{}}#]*\]|{PLAIN_TEXT}"""
+END = r"(?: +#.*)? *"
+ENTRY = re.compile(rf"""(["']?)([\w.-]+)\1 *:(?: +({VALUE}))?{END}""")
+NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|0|[1-9]\d*)(?:[eE][-+]?\d+)?"
+ITEM = re.compile(rf" *- +({NUMBER}){END}")
+NEGATE = {"0": 0, "1": 1, "false": 0, "true": 1, "no": 0, "yes": 1, "off": 0, "on": 1}
 
 
 class Rejected(Exception):
     """The proof does not prove what it states; the text says why."""
 
 
-def need(is_true, why):
-    """Reject a proof unless a condition holds."""
+def need(is_true, why, error=Rejected):
+    """Reject a proof, or a file, unless a condition holds."""
     if not is_true:
-        raise Rejected(why)
+        raise error(why)
+
+
+def read_yaml(text):
+    """Return the text of each value by its key; items of a list have commas between them."""
+    values, key, is_open = {}, "", False
+    for number, line in enumerate(text.splitlines(), 1):
+        entry, item, where = ENTRY.fullmatch(line), ITEM.fullmatch(line), f"line {number}: "
+        if entry:
+            key, is_open, value = entry[2], not entry[3], (entry[3] or "").strip()
+            need(key not in values, f"{where}{key} is given twice", ValueError)
+            quoted = {"'": value[1:-1].replace("''", "'"), '"': value[1:-1]}
+            values[key] = quoted.get(value[:1], value)
+        elif line.strip() and not line.lstrip().startswith("#"):
+            is_below = is_open and line[0] in " -" and (item or key not in KEYS)
+            need(is_below, f"{where}expected KEY: VALUE, got {line[:60]!r}", ValueError)
+            values[key] += f"{item[1]}," if item else ""
+    return values
 
 
 def read_map(path, thresholds):
@@ -48,22 +77,23 @@ def read_map(path, thresholds):
     if path.suffix == ".map":
         rows = path.read_text().partition("\nmap")[2].split()[::-1]
         return np.array([[c in ".GS" for c in row] for row in rows], np.uint8), [1.0, 0.0, 0.0, 0.0]
-    text = re.sub(r"#.*", "", path.read_text())
-    value = dict(re.findall(r"(\w+)\s*:\s*([^,{}\[\]\n]*)", text))
-    pose = re.findall(r"-?[\d.]+(?:e[-+]?\d+)?", text.lower().partition("origin")[2])[:3]
-    data = (path.parent / value["image"].strip(" \"'")).read_bytes()
+    value = dict.fromkeys(KEYS, "") | read_yaml(path.read_text("utf-8-sig"))
+    numbers = [value["resolution"], *value["origin"].strip("[], ").split(",")]
+    is_read = len(numbers) == 4 and all(re.fullmatch(NUMBER, one.strip()) for one in numbers)
+    is_read &= value["negate"].lower() in NEGATE
+    need(is_read, "expected a resolution, origin [x, y, yaw] and negate 0 or 1", ValueError)
+    data = (path.parent / value["image"]).read_bytes()
     gap = rb"(?:\s|#[^\n]*\n)+"
     head = re.match(rb"P([25])" + 2 * (gap + rb"(\d+)") + gap + rb"255\s", data)
-    need(head and "raw" not in value.get("mode", ""), "no PGM of 8 bits: write the map as one")
+    is_pgm = head and value["mode"].lower() != "raw"
+    need(is_pgm, "no PGM of 8 bits: write the map as one", ValueError)
     kind, cols, rows = map(int, head.groups())
     pixels = np.frombuffer(data, np.uint8, offset=head.end())
     pixels = np.array(data[head.end() :].split(), int) if kind == 2 else pixels
-    level = np.arange(256)
-    level = level if value["negate"].strip().lower() in {"1", "true", "yes", "on"} else level[::-1]
+    level = np.arange(256)[:: 1 if NEGATE[value["negate"].lower()] else -1]
     occupancy, (low, high) = (level / 255).astype(np.float32), np.float32(thresholds)
     kinds = np.where(occupancy >= high, 0, np.where(occupancy <= low, 1, 2)).astype(np.uint8)
-    frame = [float(number) for number in (value["resolution"], *pose)]
-    return kinds[pixels[: rows * cols].reshape(rows, cols)[::-1]], frame
+    return kinds[pixels[: rows * cols].reshape(rows, cols)[::-1]], [float(n) for n in numbers]
 
 
 def squares(occupied, reach):
@@ -415,7 +445,8 @@ def check_path(walls, factors, proof, ends):
         line = line[is_turn] + 0.5
     else:
         line = np.array(proof["line"], float) + 1
-    need((line >= 1).all() and (line < walls.shape).all(), "the path leaves the map")
+    inside = (line > 1 - 1e-7).all() and (line < walls.shape).all()  # as `near` rounds
+    need(inside, "the path leaves the map")
     steps = np.hypot(*np.diff(line, axis=0).T)
     need(len(line) <= 10**5 and (steps > 1e-5).all(), "steps too many or too short")
     within = (abs(line[[0, -1]] - ends) <= 0.5 * is_cells + 1e-6).all()  # anywhere in a cell
@@ -436,13 +467,23 @@ def check_path(walls, factors, proof, ends):
 
 
 def main(arguments):
-    """Check the proof of a file; return 0 if it is accepted, 1 if not."""
+    """Check the proof of a file; return 0 if it is accepted, 1 if not, 2 if a file is not read."""
+    if len(arguments) != 2:
+        print("usage: python check_proof.py MAP PROOF")
+        return 2
+    reading = arguments[1]
     try:
-        proof = json.loads(Path(arguments[1]).read_bytes())
-        print("accepted:", check(*read_map(Path(arguments[0]), proof["thresholds"]), proof))
+        proof = json.loads(Path(reading).read_bytes())
+        thresholds = [float(one) for one in proof["thresholds"]]
+        reading = arguments[0]
+        print("accepted:", check(*read_map(Path(reading), thresholds), proof))
     except Rejected as error:
         print("rejected:", error)
         return 1
+    except Exception as error:  # whatever else a file may hold
+        kind = "" if isinstance(error, ValueError | OSError) else type(error).__name__ + ": "
+        print(f"not read: {reading}: {kind}{error} (see the first lines of check_proof.py)")
+        return 2
     return 0
 
 

@@ -3,6 +3,8 @@
 import base64
 import json
 import pickle
+import subprocess
+import sys
 import zlib
 
 import numpy as np
@@ -12,7 +14,7 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.subjects.proofs import false_proofs, frame_of, is_accepted
 from hybridnav import check_proof
-from hybridnav.errors import PlanError
+from hybridnav.errors import HybridNavError, PlanError
 from hybridnav.search.proofs import parting_chain, strings_near
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
@@ -192,6 +194,121 @@ def test_the_checker_reads_other_images_too(kind, negate, tmp_path):
     cells, frame = check_proof.read_map(tmp_path / "m.yaml", [0.25, 0.65])
     assert (cells == grid.measured).all()
     assert frame == frame_of(grid)
+
+
+LINES = {
+    "image": [
+        "image: m.pgm",
+        "image: 'it''s m.pgm' # origin: [9, 9, 9]",
+        '"image": "a, b.pgm"',
+        "image: original.pgm",
+        "image: a#b.pgm",
+    ],
+    "resolution": ["resolution: 5e-2", "'resolution': .5", "resolution: '0.1'", "resolution: 3"],
+    "origin": [
+        "origin: [-1.5, +2, 0.3,]",
+        "origin:\n- 1\n- 2. # y\n\n# yaw\n- -5e-1",
+        "origin:\n  - 1\n  - 2\n  - 3",
+    ],
+    "negate": ["negate: 0", "negate: True", "negate: 'off'"],
+    "more": ["", "mode: Scale", "extra:\n  resolution: 7\n  origin: [9, 9, 9]", "# origin: 3"],
+    "thresholds": ["occupied_thresh: 0.65\nfree_thresh: 0.25"],
+}
+"""Lines of YAML that the checker promises to read."""
+
+
+def read_by_both(folder, text):
+    """Return what the package and the checker read of a file, None where they refuse it."""
+    (folder / "m.yaml").write_text(text)
+    answers: list[object] = []
+    try:
+        grid = hn.load_map(folder / "m.yaml")
+        answers.append((grid.measured.tolist(), frame_of(grid)))
+    except HybridNavError:
+        answers.append(None)
+    try:
+        cells, frame = check_proof.read_map(folder / "m.yaml", [0.25, 0.65])
+        answers.append((cells.tolist(), frame))
+    except (ValueError, OSError):
+        answers.append(None)
+    return answers
+
+
+def test_the_checker_reads_the_yaml_that_it_states_or_says_that_it_does_not(tmp_path):
+    rng = np.random.default_rng(5)
+    for name in ("m.pgm", "it's m.pgm", "a, b.pgm", "original.pgm", "a#b.pgm"):
+        (tmp_path / name).write_bytes(b"P5 2 2 255 " + bytes(rng.integers(256, size=4).tolist()))
+    count = 0
+    for _ in range(examples(400, 5000)):
+        lines = [rng.choice(lines) for lines in LINES.values()]
+        text = "\n".join(rng.permutation(lines)) + "\n"
+        ours, theirs = read_by_both(tmp_path, text)
+        assert ours is not None, text
+        assert ours == theirs, text
+        at, mark = int(rng.integers(len(text))), rng.choice(list("   01\n\n##:'\"-[],.e\t{&|>"))
+        ours, theirs = read_by_both(tmp_path, text[:at] + mark + text[at + rng.integers(2) :])
+        assert None in (ours, theirs) or ours == theirs, (text, at, mark)
+        count += ours is not None and theirs is not None
+    assert count > 5
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["note: |\n  x", "note: 'x\nresolution: 3'", "{a: b}", "origin: [1,\n 2, 3]", "image: m.pgm"],
+)
+def test_yaml_of_another_form_is_not_read_in_one_line(line):
+    with pytest.raises(ValueError, match=r"expected KEY: VALUE|given twice"):
+        check_proof.read_yaml(f"image: m.pgm\n{line}\n")
+
+
+def run_script(*arguments):
+    command = [sys.executable, check_proof.__file__, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert not done.stderr
+    assert done.stdout.count("\n") == 1
+    return done.returncode, done.stdout
+
+
+def test_the_script_says_of_every_file_what_it_makes_of_it(tmp_path):
+    grid = hn.OccupancyGrid(np.zeros((4, 5), np.float32), hn.Frame(0.5), robot_radius_m=0)
+    hn.write_ros_map(grid, file := tmp_path / "original.yaml")
+    proof = hn.HybridPlanner(map_of(grid)).plan((0.1, 0.1), (2.1, 1.1)).proof()
+    good, other = tmp_path / "proof.json", tmp_path / "other.json"
+    good.write_text(json.dumps(proof))
+    code, said = run_script(file, good)
+    assert (code, said[:22]) == (0, "accepted: path from [0")
+    other.write_text(json.dumps({**proof, "cost": 9}))
+    assert run_script(file, other)[0] == 1
+    for text in ("", "[]", "3", "{}", '{"thresholds": 3}', "[" * 100_000):
+        other.write_text(text)
+        assert run_script(file, other)[0] == 2
+    (tmp_path / "bad.yaml").write_text("image: none.pgm\n")
+    (tmp_path / "bad.pgm").write_bytes(b"P5 4 4 255 ...")
+    (tmp_path / "bad.map").write_text("type octile\nmap\n..\n...\n")
+    (tmp_path / "cut.yaml").write_text(file.read_text().replace("original.pgm", "bad.pgm"))
+    (tmp_path / "gone.yaml").write_text(file.read_text().replace("original.pgm", "gone.pgm"))
+    for name in ("bad.yaml", "cut.yaml", "gone.yaml", "bad.map", "none.yaml", "proof.json", "."):
+        code, said = run_script(tmp_path / name, good)
+        assert (code, said[:9]) == (2, "not read:"), said
+        assert name in said
+    assert run_script(file)[0] == 2
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_proofs_of_ends_on_the_edge_of_a_turned_map_are_accepted(preset):
+    rng = np.random.default_rng(3)
+    count = 0
+    for n in range(30):
+        blocked = (rng.random((8, 9)) < 0.15).astype(np.float32)
+        blocked[0], blocked[:, 0] = 0, 0
+        frame = hn.Frame(0.05, origin_m=(3.1 + n, -20.4), yaw_rad=0.3)
+        grid = hn.OccupancyGrid(blocked, frame, robot_radius_m=0)
+        ends = frame.points_of_grid([(int(rng.integers(8)), 0), (0, int(rng.integers(1, 9)))])
+        result = hn.HybridPlanner(map_of(grid), preset=preset).plan(*ends)
+        if result.solved:  # else rounding laid an end outside of the map
+            count += 1
+            assert is_accepted(grid, json.loads(json.dumps(result.proof())))
+    assert count > 15
 
 
 def test_no_proof_is_made_of_what_has_none():
