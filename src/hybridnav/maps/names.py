@@ -119,16 +119,21 @@ def matching(text: str, names: Sequence[str]) -> list[int]:
     return [at for *_, at in sorted(ranked)]
 
 
-def did_you_mean(name: str, known: tuple[str, ...]) -> str:
-    """Return a clause that suggests the nearest names, else some of all."""
-    if not known:
-        return ": the map has no names"
+def nearest(name: str, known: tuple[str, ...]) -> list[str]:
+    """Return the names that are spelt most alike, three at most."""
     called: dict[str, str] = {}
     for each in known:
         called.setdefault(folded(each), each)
     near = difflib.get_close_matches(folded(name[:MAX_NAME]), called, n=3, cutoff=0.5)
-    if near:
-        return f": did you mean {' or '.join(called[each] for each in near)}?"
+    return [called[each] for each in near]
+
+
+def did_you_mean(name: str, known: tuple[str, ...]) -> str:
+    """Return a clause that suggests the nearest names, else some of all."""
+    if not known:
+        return ": the map has no names"
+    if near := nearest(name, known):
+        return f": did you mean {' or '.join(near)}?"
     shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")  # noqa: PLR2004
     return f": there are {shown}"
 

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections import Counter
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.ext.agent import TOOLS, MapAnswers, questions
-from hybridnav.ext.page import Session, Site
+from hybridnav.ext.page import Opening, Session, Site
 from hybridnav.ext.page.kept import RoomsFile
 from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
 from tests.ext.page.server import served
@@ -120,6 +121,8 @@ def test_two_clients_errors_and_a_call_that_is_cancelled(tmp_path):
         async with connected(path, "--allow-edits") as one, connected(path) as other:
             listed = (await one.list_tools()).tools
             assert [tool.name for tool in listed] == [tool.name for tool in TOOLS]
+            reading = [tool.name for tool in TOOLS if not tool.edits]
+            assert [tool.name for tool in (await other.list_tools()).tools] == reading
             for tool in listed:
                 assert tool.description
                 assert tool.input_schema["type"] == "object"
@@ -143,7 +146,7 @@ def test_the_page_gives_the_same_answers_as_json(tmp_path):
     with served(Site.of_map(session), tmp_path) as client:
         described = client.get("openapi.json").value
         assert sorted(described["paths"]) == sorted(
-            f"/floor/{{floor}}/api/{tool.name}" for tool in TOOLS
+            f"/floor/{{floor}}/api/{tool.name}" for tool in TOOLS if not tool.edits
         )
         point, _, room = floor.inner_point()
         found = client.post("floor/0/api/where_am_i", {"point": point})
@@ -164,6 +167,14 @@ def test_the_page_gives_the_same_answers_as_json(tmp_path):
         ("route", {}),
         ("route", {"start": [0, 0], "goal": [1e99, 0]}),
         ("route", {"start": [float("nan"), 0], "goal": [1, 0]}),
+        ("route", {"start": "[NaN, 0]", "goal": [1, 0]}),
+        ("route", {"start": "[" * 190, "goal": [1, 0]}),
+        ("route", {"start": [True, False], "goal": [1, 0]}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "width": True}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "words_from": True}),
+        ("route", {"start": [1, 1], "goal": [1, 1], "avoiding": [True]}),
+        ("close", {"doors": [True]}),
+        ("close", {"doors": [1.0]}),
         ("route", {"start": "../../etc/passwd", "goal": [1, 1]}),
         ("route", {"start": [1, 1], "goal": [1, 1], "avoiding": ["door 99999"]}),
         ("route", {"start": [1, 1], "goal": [1, 1], "language": "xx"}),
@@ -174,7 +185,7 @@ def test_the_page_gives_the_same_answers_as_json(tmp_path):
         ("list_rooms", {"count": 10**9}),
         ("list_rooms", {"unknown": 1}),
         ("nearest", {"of": "\x00", "start": [1, 1]}),
-        ("close", {"doors": ["1"], "rooms": "all"}),
+        ("close", {"doors": ["0"], "rooms": "all"}),
         ("close", {}),
         ("open", {"doors": [1]}),
         ("undo", {}),
@@ -191,6 +202,95 @@ def test_hostile_calls_end_in_one_line(name, arguments, allow_edits, tmp_path):
     assert "\n" not in found["text"]
     assert len(json.dumps(found)) < 2000
     assert not found["ok"] or found["status"] != "solved"
+
+
+def test_lists_come_as_text_and_one_thing_without_a_list(tmp_path):
+    """Language models send "[1.0, 13.2]" for a point, and one name for a list of one."""
+    floor = PaintedFloor(2)
+    answers = MapAnswers(session_of(floor, tmp_path), allow_edits=True)
+    ask = asker(answers)
+    point, _, room = floor.inner_point()
+    assert ask("where_am_i", point=json.dumps(point)) == ask("where_am_i", point=point)
+    goal = floor.names[(room + 1) % len(floor.names)]
+    plain = ask("route", start=point, goal=goal)
+    assert ask("route", start=json.dumps(point), goal=goal) == plain
+    door = plain["doors"][0]
+    shut = ask("can_reach", start=point, goal=goal, avoiding=[f"door {door}"])
+    for avoiding in (f"door {door}", json.dumps([f"door {door}"]), door, [door], f"[{door}]"):
+        assert ask("can_reach", start=point, goal=goal, avoiding=avoiding) == shut
+    for doors in ([door], [f"door {door}"], f"door {door}", [str(door)], f"[{door}]", door):
+        assert ask("close", doors=doors)["closed"] == {"doors": [door], "rooms": []}
+        assert ask("open", doors=doors)["closed"] == {"doors": [], "rooms": []}
+    both = ask("close", doors=[f"door {door}", goal])["closed"]
+    assert both == {"doors": [door], "rooms": [goal]}
+
+
+def test_a_mistake_is_answered_in_words(tmp_path):
+    floor = PaintedFloor(2)
+    answers = MapAnswers(session_of(floor, tmp_path))
+    point = floor.inner_point()[0]
+
+    def text(name: str, **arguments: Any) -> str:
+        return str(answers.call(name, arguments)["text"])
+
+    place = "a place is a name, or a point [x, y] of two numbers"
+    for wrong in ([1, 2, 3], [True, 1], 7, None, "[1]", {"x": 1}):
+        assert place in text("route", start=wrong, goal=point), wrong
+    assert "a point is [x, y], two numbers in metres" in text("where_am_i", point="hall")
+    assert "did you mean avoiding" in text("route", start=point, goal=point, avoid=["door 1"])
+    assert "goal is missing" in text("route", start=point)
+    found = text("route", start=point, goal=point, avoiding=[{}])
+    assert found.startswith("avoiding[0]: ")
+    assert "got {}" in found
+    assert text("route", start=point, goal=point, width="x").startswith("width: expected")
+    refused = text("rout")
+    assert "did you mean route" in refused
+    assert "undo" not in text("und")  # it is not listed here
+
+
+def test_kinds_are_taken_in_the_plural_and_choices_hold_what_was_meant(tmp_path):
+    floor = PaintedFloor(2)
+    answers = MapAnswers(session_of(floor, tmp_path), allow_edits=True)
+    start = floor.inner_point()[0]
+    for kind in ("room", "door", "hall", "corridor"):
+        one, many, loud = (
+            answers.call("nearest", {"of": of, "start": start})
+            for of in (kind, f"{kind}s", f" {kind.upper()}S")
+        )
+        assert many.get("nearest") == one.get("nearest") == loud.get("nearest")
+    assert answers.call("nearest", {"of": "rooms", "start": start})["ok"]
+    for name, arguments in (
+        ("route", {"start": start, "goal": floor.names[0] + "x"}),
+        ("close", {"rooms": [floor.names[0] + "x"]}),
+        ("nearest", {"of": floor.names[0] + "x", "start": start}),
+    ):
+        found = answers.call(name, arguments)
+        checked(name, arguments, found)
+        assert "did you mean" in found["text"]
+        assert found["choices"][0]["name"] == floor.names[0]
+        for choice in found["choices"]:
+            assert choice["name"] in found["text"]
+
+
+def test_a_page_that_prepares_says_when_to_ask_again(tmp_path):
+    session, go_on = session_of(PaintedFloor(1), tmp_path), threading.Event()
+
+    def make(_: Any) -> Site:
+        go_on.wait(60)
+        return Site.of_map(session)
+
+    opening = Opening(session.grid, make)
+    opening.begin()
+    with served(opening, tmp_path) as client:
+        for path, body in (("floor/0/api/describe_map", {}), ("find", {"text": "x"})):
+            found = client.post(path, body)
+            assert found.code == 503
+            assert int(found.headers["retry-after"]) >= 1
+            assert "not yet" in str(found.value)
+        assert client.post("floor/7/api/describe_map", {}).code in {422, 503}
+        go_on.set()
+        opening.wait()
+        assert client.post("floor/0/api/describe_map", {}).code == 200
 
 
 def test_names_of_rooms_are_saved_and_taken_back(tmp_path):

@@ -57,7 +57,7 @@ class MapAnswers:
     """
 
     def __init__(self, session: Session, *, allow_edits: bool = False) -> None:
-        self._session, self._allow_edits = session, allow_edits
+        self._session, self.allow_edits = session, allow_edits
         self._lock = threading.RLock()
         self._closed = Blocked()
         self._before: list[tuple[str, str] | Blocked] = []
@@ -83,9 +83,9 @@ class MapAnswers:
         tool = next((one for one in ask.TOOLS if one.name == name), None)
         try:
             if tool is None:
-                names = tuple(one.name for one in ask.TOOLS)
+                names = tuple(one.name for one in ask.tools(allow_edits=self.allow_edits))
                 raise InvalidValueError(f"no function {name!r:.80}{did_you_mean(name, names)}")
-            if tool.edits and not self._allow_edits:
+            if tool.edits and not self.allow_edits:
                 raise InvalidValueError(
                     f"{name} changes what others see: start the server with --allow-edits"
                 )
@@ -94,9 +94,8 @@ class MapAnswers:
             with self._lock:
                 return {"ok": True, **answer(asked)}
         except ValidationError as error:
-            first = error.errors()[0]
-            at = ".".join(map(str, first["loc"])) or "the arguments"
-            return _refused(f"{at}: {first['msg']}".replace("\n", " ")[:300])
+            assert tool is not None  # noqa: S101 - its model has refused
+            return _refused(ask.mistake(error, tuple(tool.asks.model_fields))[:300])
         except places.UnclearError as error:
             return _refused(str(error)) | {"choices": error.choices}
         except HybridNavError as error:
@@ -116,7 +115,7 @@ class MapAnswers:
     def _places(self) -> places.NamedPlaces:
         return places.NamedPlaces(self._rooms)
 
-    def _shut(self, avoiding: list[str]) -> Blocked:
+    def _shut(self, avoiding: list[int | str]) -> Blocked:
         """Return what is closed in this session with what one question avoids."""
         return self._closed | self._places.blocked(avoiding)
 
@@ -144,7 +143,7 @@ class MapAnswers:
             "doors": len(rooms.listed_doors),
             "robot_radius_m": grid.robot_radius_m,
             "closed": self._closed_now(),
-            "edits_allowed": self._allow_edits,
+            "edits_allowed": self.allow_edits,
         }
 
     def _list_rooms(self, asked: ask.ListRooms) -> dict[str, Any]:
@@ -364,12 +363,11 @@ class MapAnswers:
         now = self._closed_now()
         return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
 
-    def _named(self, asked: ask.Close) -> tuple[list[int], list[str]]:
-        doors = [self._rooms.listed_door(number).number for number in asked.doors]
-        rooms = [self._places.meant(name, list(self._rooms.names)) for name in asked.rooms]
-        if not doors and not rooms:
+    def _named(self, asked: ask.Close) -> tuple[list[Any], list[str]]:
+        named = self._places.blocked(asked.doors, of_doors=True) | self._places.blocked(asked.rooms)
+        if not named.doors and not named.rooms:
             raise InvalidValueError("give doors or rooms")
-        return doors, rooms
+        return list(named.doors), list(named.rooms)
 
     def _close(self, asked: ask.Close) -> dict[str, Any]:
         doors, rooms = self._named(asked)

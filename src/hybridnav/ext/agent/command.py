@@ -82,7 +82,7 @@ async def _serve(answers: MapAnswers) -> None:
     from mcp.server.lowlevel import Server  # noqa: PLC0415
     from mcp.server.stdio import stdio_server  # noqa: PLC0415
 
-    from hybridnav.ext.agent.questions import INSTRUCTIONS, TOOLS, answered, schema_of  # noqa: PLC0415
+    from hybridnav.ext.agent.questions import INSTRUCTIONS, answered, schema_of, tools  # noqa: PLC0415
 
     listed = [
         types.Tool(
@@ -92,7 +92,7 @@ async def _serve(answers: MapAnswers) -> None:
             outputSchema=tool.gives.model_json_schema(),
             annotations=types.ToolAnnotations(readOnlyHint=not tool.edits),
         )
-        for tool in TOOLS
+        for tool in tools(allow_edits=answers.allow_edits)
     ]
 
     async def list_tools(_: Any, __: Any) -> types.ListToolsResult:

@@ -12,7 +12,8 @@ from starlette.routing import Route
 from hybridnav._version import __version__
 from hybridnav.errors import HybridNavError
 from hybridnav.ext.agent.answers import MapAnswers
-from hybridnav.ext.agent.questions import INSTRUCTIONS, TOOLS, Answer, answered, schema_of
+from hybridnav.ext.agent.questions import INSTRUCTIONS, Answer, answered, schema_of, tools
+from hybridnav.ext.page.page import RETRY, PreparingError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.page.session import Session
 
-_UNPROCESSABLE = 422
+_UNPROCESSABLE, _NOT_YET = 422, 503
 
 
 class HttpTools:
@@ -51,7 +52,7 @@ class HttpTools:
         ]
 
     async def _described(self, _: Request) -> JSONResponse:
-        return JSONResponse(description())
+        return JSONResponse(description(allow_edits=self._allow_edits))
 
     async def _called(self, request: Request) -> Any:
         arguments = await self._body_of(request)
@@ -63,7 +64,10 @@ class HttpTools:
         try:
             session = self._session_of(request)
         except HybridNavError as error:
-            return JSONResponse({"ok": False, "text": str(error)}, _UNPROCESSABLE)
+            refused = {"ok": False, "text": str(error)}
+            if isinstance(error, PreparingError):
+                return JSONResponse(refused, _NOT_YET, headers=RETRY)
+            return JSONResponse(refused, _UNPROCESSABLE)
         answers = self._answers.get(session)
         if answers is None:
             answers = MapAnswers(session, allow_edits=self._allow_edits)
@@ -74,8 +78,10 @@ class HttpTools:
         return JSONResponse(found, 200 if found["ok"] else _UNPROCESSABLE)
 
 
-def description() -> dict[str, Any]:
+def description(*, allow_edits: bool = False) -> dict[str, Any]:
     """Return what there is to call, as OpenAPI describes it.
+
+    `allow_edits`: whether that includes what changes something.
 
     Examples
     --------
@@ -94,10 +100,11 @@ def description() -> dict[str, Any]:
                 "responses": {
                     "200": {"description": "The answer.", "content": _content(tool.gives)},
                     "422": {"description": "What to do instead.", "content": _content(Answer)},
+                    "503": {"description": "Not prepared yet.", "content": _content(Answer)},
                 },
             }
         }
-        for tool in TOOLS
+        for tool in tools(allow_edits=allow_edits)
     }
     info = {"title": "hybridnav", "version": __version__, "description": INSTRUCTIONS}
     return {"openapi": "3.1.0", "info": info, "paths": paths}

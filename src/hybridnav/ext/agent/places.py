@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridnav.errors import HybridNavError
 from hybridnav.maps import CellClass
-from hybridnav.maps.names import did_you_mean, folded, matching, natural_key
+from hybridnav.maps.names import did_you_mean, folded, matching, natural_key, nearest
 from hybridnav.planner import Blocked, Explanation, HybridPlanner
 from hybridnav.planner.profile import rebuilt
 
@@ -24,6 +24,13 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 _ARTICLES = {"the", "a", "an", "der", "die", "das", "dem", "den", "ein", "eine", "einen", "einem"}
 _DOOR = re.compile(r"(?:door|tür|tuer)[ :#-]*(\d{1,9})", re.IGNORECASE)
+_KINDS = {
+    "door": {"door", "doors", "tur", "turen"},
+    "room": {"room", "rooms", "raum", "raume", "zimmer"},
+    "corridor": {"corridor", "corridors", "flur", "flure"},
+    "hall": {"hall", "halls", "halle", "hallen"},
+}
+"""Words for each kind of thing, folded."""
 _SIGNS = re.compile(r"[\W_]+")
 _MOST_LETTERS = 900
 """Letters of the words of a route: a whole answer has at most 2 kB."""
@@ -89,13 +96,21 @@ class NamedPlaces:
         if len(found) == 1:
             return found[0]
         if not found:
-            hint = did_you_mean(name, tuple(known))
-            raise UnclearError(f"no room is called {name!r:.80}{hint}")
-        listed = self.rooms.names
+            raise self._nothing(name, "no room", known)
         raise UnclearError(
             f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
-            [self.room(one) if one in listed else {"name": one} for one in found[:SHOWN]],
+            self._choices(found[:SHOWN]),
         )
+
+    def _choices(self, names: Iterable[str]) -> list[dict[str, Any]]:
+        listed = self.rooms.names
+        return [self.room(one) if one in listed else {"name": one} for one in names]
+
+    def _nothing(self, name: str, what: str, known: Iterable[str]) -> UnclearError:
+        """Return the refusal of a name that means nothing, with the names that are like it."""
+        names = tuple(known)
+        text = f"{what} is called {name!r:.80}{did_you_mean(name, names)}"
+        return UnclearError(text, self._choices(nearest(name, names)))
 
     def place(self, place: str | list[float]) -> str | tuple[float, float]:
         """Return a place as planners take it."""
@@ -104,12 +119,17 @@ class NamedPlaces:
         labels = self.rooms.labels
         return self.meant(place, list(dict.fromkeys((*labels.names, *labels.points))))
 
-    def blocked(self, avoiding: list[str]) -> Blocked:
-        """Return what a question avoids."""
+    def blocked(self, things: list[int | str], *, of_doors: bool = False) -> Blocked:
+        """Return what a list names: doors by number or as "door 12", rooms by name.
+
+        `of_doors`: whether "12" is a door too.
+        """
         doors, rooms = [], []
-        for text in avoiding:
-            if number := _DOOR.fullmatch(text.strip()):
-                doors.append(self.rooms.listed_door(int(number[1])).number)
+        for thing in things:
+            text = str(thing).strip()
+            number = _DOOR.fullmatch(text)
+            if number or isinstance(thing, int) or (of_doors and text.isdecimal()):
+                doors.append(self.rooms.listed_door(int(number[1] if number else text)).number)
             else:
                 rooms.append(self.meant(text, list(self.rooms.names)))
         return Blocked(doors=doors, rooms=rooms)
@@ -118,20 +138,20 @@ class NamedPlaces:
         self, of: str, start: str | tuple[float, float]
     ) -> list[tuple[dict[str, Any], tuple[float, float]]]:
         """Return rooms or doors of a kind or name, each with a point to go to."""
-        rooms = self.rooms
-        if folded(of) in {"door", "doors", "tur", "turen"}:
+        rooms, word = self.rooms, folded(of).strip()
+        kind = next((one for one, words in _KINDS.items() if word in words), None)
+        if kind == "door":
             return [
                 ({"number": door.number, "rooms": list(door.rooms)}, self._beside(door))
                 for door in rooms.listed_doors
                 if door.passable and not door.is_opening
             ]
         names = [name for name in self.listed() if name != start]
-        if of in {"room", "corridor", "hall"}:
-            found = [name for name in names if self.kind(name) == of]
-        else:
-            found = [names[at] for at in matching(of, names)]
+        found = [name for name in names if self.kind(name) == kind]
+        # A map without halls may have a room called "hall 3".
+        found = found or [names[at] for at in matching(kind or of, names)]
         if not found:
-            raise UnclearError(f"nothing is called {of!r:.80}{did_you_mean(of, tuple(names))}")
+            raise self._nothing(of, "nothing", names)
         return [(self.room(name), rooms.point_of(name)) for name in found]
 
     def _beside(self, door: Door) -> tuple[float, float]:

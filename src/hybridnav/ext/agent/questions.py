@@ -3,23 +3,87 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+    WrapValidator,
+)
+from pydantic_core import PydanticCustomError
+
+from hybridnav.errors import brief
+from hybridnav.maps.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+
+# Language models send lists as their JSON text, one thing for a list of one, and true for a number.
+
+
+def _decoded(value: object) -> Any:
+    """Return the list that a text is the JSON of; every other value as it is."""
+    if isinstance(value, str) and value.lstrip().startswith("["):
+        try:
+            return json.loads(value)
+        except (ValueError, RecursionError):
+            return value
+    return value
+
+
+def _as_list(value: object) -> Any:
+    value = _decoded(value)
+    return [value] if isinstance(value, str) or type(value) is int else value
+
+
+def _no_truth(value: object) -> Any:
+    if isinstance(value, bool):
+        raise PydanticCustomError("number", "expected a number")
+    return value
+
+
+def _said(expected: str) -> WrapValidator:
+    """Return a validator that decodes lists, and states in words what it expects."""
+
+    def checked(value: object, check: Callable[[Any], Any]) -> Any:
+        try:
+            return check(_decoded(value))
+        except ValidationError:
+            raise PydanticCustomError("place", expected) from None
+
+    return WrapValidator(checked)
+
+
+_NUMBER = BeforeValidator(_no_truth)
 _FAR_M = 1e6
-_Metres = Annotated[float, Field(ge=-_FAR_M, le=_FAR_M, allow_inf_nan=False)]
-Point = Annotated[list[_Metres], Field(min_length=2, max_length=2, description="x, y in metres")]
+_Metres = Annotated[float, _NUMBER, Field(ge=-_FAR_M, le=_FAR_M, allow_inf_nan=False)]
+_Pair = Annotated[list[_Metres], Field(min_length=2, max_length=2, description="x, y in metres")]
+Point = Annotated[_Pair, _said("a point is [x, y], two numbers in metres")]
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
-Place = Annotated[Text | Point, Field(description="a room, a named point, or x, y in metres")]
-Width = Annotated[
-    float, Field(gt=0, le=100, description="width in metres of who goes; the map's robot if null")
+Place = Annotated[
+    Text | _Pair,
+    _said("a place is a name, or a point [x, y] of two numbers"),
+    Field(description="a room, a named point, or x, y in metres"),
 ]
+Width = Annotated[
+    float,
+    _NUMBER,
+    Field(gt=0, le=100, description="width in metres of who goes; the map's robot if null"),
+]
+_Things = Annotated[
+    list[Annotated[int, _NUMBER, Field(ge=1, strict=True)] | Text],
+    BeforeValidator(_as_list),
+    Field(max_length=1000),
+]
+Doors = Annotated[_Things, Field(description='doors by number or as "door 12"')]
 Avoiding = Annotated[
-    list[Text], Field(max_length=100, description='rooms by name, doors as "door 12"')
+    _Things, Field(max_length=100, description='rooms by name, doors as "door 12" or by number')
 ]
 Language = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}$")]
 
@@ -38,8 +102,8 @@ class ListRooms(_Strict):
     kind: Literal["room", "corridor", "hall"] | None = None
     name: Annotated[str, StringConstraints(max_length=200)] = ""
     """Part of a name, in any case."""
-    first: Annotated[int, Field(ge=0, le=100_000)] = 0
-    count: Annotated[int, Field(ge=1, le=200)] = 10
+    first: Annotated[int, _NUMBER, Field(ge=0, le=100_000)] = 0
+    count: Annotated[int, _NUMBER, Field(ge=1, le=200)] = 10
 
 
 class WhereAmI(_Strict):
@@ -61,7 +125,7 @@ class RouteBetween(Journey):
     """The shortest path between two places, with a proof, the rooms and doors passed, and words."""
 
     words: bool = True
-    words_from: Annotated[int, Field(ge=0, le=10_000)] = 0
+    words_from: Annotated[int, _NUMBER, Field(ge=0, le=10_000)] = 0
     """Lines to leave out, for the rest of a long description."""
     points: bool = False
     """Whether the points of the path are wanted too, at most 200."""
@@ -83,16 +147,16 @@ class Nearest(_Strict):
     """The nearest rooms or doors by the way one goes, not by the crow."""
 
     of: Text
-    """`room`, `door`, `corridor`, `hall`, or part of a name."""
+    """`rooms`, `doors`, `corridors`, `halls`, or part of a name."""
     start: Place
-    count: Annotated[int, Field(ge=1, le=5)] = 1
+    count: Annotated[int, _NUMBER, Field(ge=1, le=5)] = 1
 
 
 class Close(_Strict):
     """Close doors or rooms for this session; `undo` takes it back."""
 
-    doors: Annotated[list[int], Field(max_length=1000)] = []
-    rooms: Annotated[list[Text], Field(max_length=1000)] = []
+    doors: Doors = []
+    rooms: Annotated[_Things, Field(description="rooms by name")] = []
 
 
 class Open(Close):
@@ -328,6 +392,28 @@ async def answered(
         return await asyncio.wait_for(asyncio.to_thread(call, name, arguments), LIMIT_S)
     except asyncio.TimeoutError:
         return {"ok": False, "text": f"no answer within {LIMIT_S:g} s: ask again, and for less"}
+
+
+def tools(*, allow_edits: bool) -> tuple[Tool, ...]:
+    """Return the functions that a client may call."""
+    return tuple(tool for tool in TOOLS if allow_edits or not tool.edits)
+
+
+def mistake(error: ValidationError, known: Sequence[str]) -> str:
+    """Return what is wrong with arguments: the argument, what was expected, what was given.
+
+    `known`: the names of the arguments.
+    """
+    first = error.errors()[0]
+    # Names of arguments and places in lists; the rest are pydantic's names of kinds.
+    name, *rest = [*first["loc"], ""]
+    at = "".join([str(name), *(f"[{part}]" for part in rest if isinstance(part, int))])
+    if first["type"] == "extra_forbidden":
+        return f"no argument {name!r:.80}{did_you_mean(str(name), tuple(known))}"
+    if first["type"] == "missing":
+        return f"{at} is missing: the arguments are {', '.join(known)}"
+    message = first["msg"].replace("Input should be", "expected").replace("\n", " ")
+    return f"{at or 'arguments'}: {message}, got {brief(first['input'])}"
 
 
 def schema_of(asks: Any) -> dict[str, Any]:

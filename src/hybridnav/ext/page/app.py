@@ -220,7 +220,7 @@ async def _done(work: Callable[[], Any]) -> Any:
     except ConflictError as error:
         return _error(str(error), _CONFLICT)
     except pages.PreparingError as error:
-        return _error(str(error), _NOT_YET)
+        return JSONResponse({"error": str(error)}, _NOT_YET, headers=pages.RETRY)
     except MapError as error:
         return _error(str(error), _FULL)
     except HybridNavError as error:

@@ -247,6 +247,10 @@ def _content(kind: str, write: Callable[[Path], None], folder: Path) -> tuple[st
 _LOG = logging.getLogger("hybridnav.ext.page")
 
 
+RETRY = {"retry-after": "1"}
+"""Header of answers to requests that come too early: the seconds until the next one."""
+
+
 class PreparingError(HybridNavError):
     """Something was asked for that is not there yet."""
 
