@@ -35,7 +35,8 @@ KINDS = {
     "bad-id": "ids that Nav2 cannot hold",
     "unknown-node": "edges to nodes that are not there",
     "bad-cost": "costs that are negative or no number",
-    "null": "facts that are null, which Nav2's loader refuses",
+    "stops-loader": "values at which Nav2's loader stops: it takes nothing of the file",
+    "fails-later": "values that Nav2 loads, and fails at later or takes for others",
     "line-elsewhere": "lines that do not run from node to node of their edge",
     "node-outside": "nodes outside the map",
     "node-in-wall": "nodes where the robot does not fit",
@@ -73,7 +74,7 @@ _WARNINGS = frozenset(
     {
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
         *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
-        *("link-missing", "link-kind", "stop-missing"),
+        *("link-missing", "link-kind", "stop-missing", "fails-later"),
     }
 )
 _NOTES = frozenset({"missing-door", "missing-room", "missing-part"})

@@ -14,7 +14,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
 from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
-from hybridnav.ext.graphs.files.json_graphs import MOST_ID
+from hybridnav.ext.graphs.files.nav2_rules import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
 from hybridnav.ext.graphs.route_messages import ids_of

@@ -39,6 +39,7 @@ def write_nav2(path, plain):
         }
         for node, point in plain.points.items()
     ]
+    operation = {"type": "go", "trigger": "ON_EXIT"}
     for number, (tail, head) in enumerate(plain.edges, start=len(ids)):
         line = [plain.points[tail], plain.points[head]]
         kind = "MultiLineString" if number % 2 else "LineString"
@@ -46,7 +47,8 @@ def write_nav2(path, plain):
         features.append(
             {
                 "type": "Feature",
-                "properties": properties | {"operations": {"go": plain.facts}},
+                "properties": properties
+                | {"operations": {"go": operation | {"metadata": plain.facts}}},
                 "geometry": {"type": kind, "coordinates": [line] if number % 2 else line},
             }
         )

@@ -6,6 +6,7 @@ import pytest
 import hybridnav as hn
 from hybridnav.ext.fleet import (
     BuildingGraph,
+    FloorGraph,
     Link,
     LinkEnd,
     align_floors,
@@ -17,6 +18,7 @@ from hybridnav.ext.fleet import (
 from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.harness.judges import judge_line, segment_faults
 from hybridnav.harness.scenes import sample_pairs
+from tests.nav2_reader import read_nav2
 
 ANCHOR = hn.ext.graphs.Anchor(30.2862, -97.7366, heading_deg=12)
 
@@ -98,6 +100,35 @@ def test_the_graph_of_both_floors_is_judged_as_if_no_file_lay_between(gdc, tmp_p
     assert report.contradictions == ()
     assert set(report.counts["all"].answers) <= {"solved", "no path, right", "no node in sight"}
     assert report.counts["two floors"].answers["solved"] > 10
+
+
+def _graphs_of(file, folder):
+    """The graph of a file, and the same through the formats of fleets; none if it is no graph."""
+    try:
+        graph = hn.ext.graphs.load_graph(file)
+    except hn.errors.MapError:
+        return []
+    house = BuildingGraph(name="a", floors=(FloorGraph(name="0", graph=graph),))
+    hn.ext.graphs.export_rmf(house, folder / "a.yaml")
+    hn.ext.graphs.export_osm(house, folder / "a.osm", anchor=ANCHOR)
+    hn.ext.graphs.export_lif(house, folder / "a.json", vehicle_types=["A.B"])
+    return [
+        graph,
+        *(hn.ext.graphs.load_graph(folder / f"a.{end}") for end in ("yaml", "osm", "json")),
+    ]
+
+
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
+def test_nav2_takes_every_graph_that_can_be_written_of_the_reference_data(data, tmp_path):
+    endings = (".geojson", ".json", ".tplg", ".tpl", ".tmap", ".tmap2", ".graphml", ".osm", ".gml")
+    taken = 0
+    for file in sorted(each for each in data.rglob("*") if each.suffix in endings):
+        for graph in _graphs_of(file, tmp_path):
+            hn.ext.graphs.export_nav2(graph, tmp_path / "nav2.geojson")
+            read_nav2(tmp_path / "nav2.geojson", costs=False, lines=False)
+            assert hn.ext.graphs.load_graph(tmp_path / "nav2.geojson").findings == ()
+            taken += 1
+    assert taken >= 4 * 12
 
 
 FITS = {

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import MapError
+from hybridnav.ext.graphs.files import nav2_rules as rules
 from hybridnav.ext.graphs.gather import Gathered, edge_text, name_of, pair_of, point_of, shown
 from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-MOST_ID = 2**32 - 1
-"""Nav2 holds ids as unsigned integers of 32 bits."""
 _LINES = ("LineString", "MultiLineString")
 _OF_NODE = ("id",)
 _OF_EDGE = ("id", "startid", "endid", "cost")
-_READ = ("frame", "metadata", "operations", "cost", "overridable")
-"""What Nav2 reads beside ids; all else may be null."""
 _LINKS = ("links", "edges")
 
 
@@ -30,7 +28,7 @@ def read_json_graph(text: str, where: str, name: str) -> WaypointGraph:
     `where`: what messages begin with; `name`: name of a graph that has none. Raises `MapError` when
     it is in neither form.
     """
-    features, plain = Features(where), NodeLink(where)
+    features, plain = Features(where, may_stop=rules.may_stop(text)), NodeLink(where)
     has: set[str] = set()
     for key, index, value in members_of(text, where):
         has.add(key)
@@ -45,6 +43,8 @@ def read_json_graph(text: str, where: str, name: str) -> WaypointGraph:
         elif index is None:
             name = value if key == "name" and isinstance(value, str) and value else name
             plain.set(key, value)
+        if key != "features":
+            features.check_json(value, key)
     if "features" in has:
         return WaypointGraph(**features.fields(name))
     if "nodes" in has and has & set(_LINKS):
@@ -63,11 +63,19 @@ def _check_object(value: Any, index: int | None, where: str, what: str) -> None:
 class Features:
     """Features of a route graph as Nav2's loader takes them: points are nodes, lines are edges."""
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, where: str, *, may_stop: bool) -> None:
         self._gathered = Gathered(where)
+        self._may_stop = may_stop
         self._frame = ""
         self._node_ids: set[Any] = set()
         self._others: list[dict[str, Any]] = []
+        self._has_edges = False
+
+    def check_json(self, value: Any, text: str, nodes: tuple[Any, ...] = ()) -> None:
+        """Add a finding, at some nodes, on what Nav2's parser refuses anywhere in a file."""
+        if self._may_stop:
+            for words in rules.no_json(value, text):
+                self._gathered.findings.add("stops-loader", f"{words:.200}", nodes=nodes)
 
     def add(self, feature: dict[str, Any], where: str) -> None:
         """Add one feature."""
@@ -78,58 +86,77 @@ class Features:
         # Tables of drawing programs give every feature all columns, null where it has none.
         has_endpoints = facts.get("startid") is not None or facts.get("endid") is not None
         if kind in _LINES or (kind is None and has_endpoints):
-            self._add_edge(facts, geometry, where)
+            self._add_edge(feature, facts, where)
         elif kind == "Point" or (kind is None and "id" in facts):
-            self._add_node(facts, geometry, where)
+            self._add_node(feature, facts, where)
         else:
             self._others.append(feature)
+            at = where.rpartition(", ")[2]
+            self.check_json(feature, at)
+            if kind is None:
+                self._gathered.findings.add("stops-loader", f"{at}: no geometry")
 
-    def _add_node(self, facts: dict[str, Any], geometry: Mapping[str, Any], where: str) -> None:
+    def _add_node(self, feature: dict[str, Any], facts: dict[str, Any], where: str) -> None:
         if "id" not in facts:
             raise MapError(f"{where}: a node has no id")
-        point = pair_of(geometry.get("coordinates"))
+        known = rules.held_id(facts["id"])
+        geometry = feature.get("geometry")
+        point = pair_of(geometry.get("coordinates")) if isinstance(geometry, dict) else None
         text = f"node {shown(name_of(facts['id']))}"
-        self._check(facts, text, _OF_NODE, (facts["id"],))
-        self._gathered.add_node(facts["id"], point, _without(facts, _OF_NODE))
-        self._node_ids.add(name_of(facts["id"]))
+        self._check(feature, text, {"id": facts["id"]}, (known,))
+        self._gathered.add_node(known, point, _without(facts, _OF_NODE))
+        self._node_ids.add(name_of(known))
         if not self._frame and isinstance(facts.get("frame"), str):
             self._frame = facts["frame"]
 
-    def _add_edge(self, facts: dict[str, Any], geometry: Mapping[str, Any], where: str) -> None:
+    def _add_edge(self, feature: dict[str, Any], facts: dict[str, Any], where: str) -> None:
         for key in ("startid", "endid"):
             if key not in facts:
                 raise MapError(f"{where}: an edge has no {key}")
-        endpoints = facts["startid"], facts["endid"]
-        text = edge_text(name_of(facts.get("id")), *map(name_of, endpoints))
-        self._check(facts, text, _OF_EDGE[:1], endpoints)
+        ids = {key: facts.get(key) for key in _OF_EDGE[:3]}
+        name, *endpoints = map(rules.held_id, ids.values())
+        text = edge_text(*map(name_of, ids.values()))
+        self._check(feature, text, ids, tuple(endpoints))
         if "id" in facts:
-            self._gathered.check_edge_name(facts["id"], endpoints)
-        line = geometry.get("coordinates")
+            self._gathered.check_edge_name(name, (endpoints[0], endpoints[1]))
+        geometry, cost = feature.get("geometry"), facts.get("cost")
+        line = geometry.get("coordinates") if isinstance(geometry, dict) else None
+        is_cost = isinstance(cost, int | float) and cost == cost and abs(cost) != math.inf  # noqa: PLR0124
         self._gathered.add_edge(
-            endpoints,
+            (endpoints[0], endpoints[1]),
             _without(facts, _OF_EDGE),
-            name=facts.get("id"),
-            cost=facts.get("cost"),
+            name=name,
+            cost=float(cost) if isinstance(cost, bool) else cost if is_cost else None,
             line=_points_of(line) if isinstance(line, list) else None,
         )
+        self._has_edges = True
 
     def _check(
-        self, facts: dict[str, Any], text: str, ids: tuple[str, ...], at: tuple[Any, ...]
+        self, feature: dict[str, Any], text: str, ids: dict[str, Any], at: tuple[Any, ...]
     ) -> None:
-        """Add findings at some nodes on ids, and on null, which stops Nav2's loader."""
-        nodes = tuple(map(name_of, at))
-        for key in ids:
-            value = facts.get(key)
-            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MOST_ID:
-                self._gathered.findings.add("bad-id", text, nodes=nodes)
-        if any(_holds_null(facts[key]) for key in _READ if key in facts):
-            self._gathered.findings.add("null", text, nodes=nodes)
+        """Add findings at some nodes on ids, and on what Nav2 stops at, or takes otherwise."""
+        nodes, findings = tuple(map(name_of, at)), self._gathered.findings
+        for key, value in ids.items():
+            if not rules.is_id(value):
+                findings.add("bad-id", f"{text}: {key} is no number", nodes=nodes)
+            elif rules.held_id(value) != value:
+                held = f"{text}: Nav2 holds {key} as {rules.held_id(value)}"
+                findings.add("fails-later", held, nodes=nodes)
+        facts = feature.get("properties")
+        facts, is_edge = facts if isinstance(facts, dict) else {}, len(ids) > 1
+        for words in rules.stops(feature, facts, is_edge=is_edge):
+            findings.add("stops-loader", f"{text}: {words:.200}", nodes=nodes)
+        for words in rules.fails_later(facts, is_edge=is_edge):
+            findings.add("fails-later", f"{text}: {words:.200}", nodes=nodes)
+        self.check_json(feature, text, nodes)
 
     def fields(self, name: str) -> dict[str, Any]:
         """Return the fields of the graph."""
         for both in self._gathered.edge_ids & self._node_ids:
             text = f"node and edge {shown(both)}"
             self._gathered.findings.add("repeated-id", text, nodes=(both,))
+        if not self._has_edges:
+            self._gathered.findings.add("stops-loader", "the graph has no edge")
         return self._gathered.fields("nav2", name, self._frame) | {"others": tuple(self._others)}
 
 

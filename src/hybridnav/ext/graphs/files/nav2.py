@@ -6,12 +6,10 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from hybridnav._base.files import NewFile
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs import RouteGraph, WaypointGraph
-from hybridnav.ext.graphs.files.json_graphs import MOST_ID
+from hybridnav.ext.graphs.files import nav2_rules as rules
 from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
 
@@ -33,7 +31,9 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
 
     A `WaypointGraph` keeps its own ids, costs, lines and facts; ids that occur twice or that Nav2
     cannot hold are replaced by free ones. Facts of a graph that is not from Nav2 become `metadata`,
-    with the id as `name`.
+    with the id as `name`, and a `speed_limit` in m/s becomes `abs_speed_limit`, as TimeScorer reads
+    it. Nav2's loader and scorers take all that is written: lists of lists or objects become JSON in
+    a text, and numbers that scorers read have a point.
 
     Parameters
     ----------
@@ -80,10 +80,10 @@ def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[st
             f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: give it "
             "more nodes"
         )
-    if graph.n_nodes + graph.n_edges > MOST_ID:
+    if graph.n_nodes + graph.n_edges > rules.MOST_ID:
         raise InvalidValueError(
             f"the route graph has {graph.n_nodes + graph.n_edges} nodes and edges, more than the "
-            f"{MOST_ID} ids of Nav2: build it with fewer nodes"
+            f"{rules.MOST_ID} ids of Nav2: build it with fewer nodes"
         )
     if isinstance(graph, WaypointGraph):
         return features_of(graph, frame)
@@ -93,9 +93,11 @@ def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[st
 def nav2_bytes(name: str, features: Sequence[dict[str, Any]]) -> bytes:
     """Return the content of a GeoJSON file, one feature a line, so that people can read and compare
     files."""
-    lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
-    head = f'{{"type": "FeatureCollection", "name": {json.dumps(name)}, "features": ['
-    return f"{head}\n{lines}\n]}}\n".encode()
+    dump = json.JSONEncoder(allow_nan=False, ensure_ascii=False).encode
+    head = f'{{"type": "FeatureCollection", "name": {dump(name)}, "features": ['
+    lines = ",\n".join(map(dump, features))
+    # Half a letter, which Nav2's parser refuses, becomes a question mark.
+    return f"{head}\n{lines}\n]}}\n".encode(errors="replace")
 
 
 def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
@@ -133,16 +135,12 @@ def _feature(properties: dict[str, Any], geometry: dict[str, Any]) -> dict[str, 
 
 # Features of a GeoJSON file for Nav2, of a graph that others have made.
 
-_DEEPEST = 64
-_LARGEST = 2**1023
-"""Integers beyond have more digits than readers take."""
-
 
 def features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
     """Return the features of a graph.
 
     Facts of a graph that is from Nav2 stay where they are; those of others go to `metadata`, with
-    the id as `name`. Nothing is null and no number infinite: such facts are left out.
+    the id as `name`. They are such that Nav2's loader and scorers take them: see `nav2_rules`.
 
     `frame`: name of the frame of nodes that state none. Raises `InvalidValueError` when a fact is
     nested deeper than 64 levels, as one that contains itself.
@@ -150,27 +148,29 @@ def features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
     used: set[int] = set()
     nodes = _ids(graph.names, used)
     edges = _ids(graph.edge_names, used)
-    is_own = graph.format == "nav2"
     features = []
     for node, point in enumerate(graph.points.tolist()):
-        facts = _properties(graph.node_facts.get(node, {}), graph.names[node], is_own=is_own)
+        facts = _properties(graph, graph.node_facts.get(node, {}), graph.names[node])
         geometry = {"type": "Point", "coordinates": point}
         features.append(_feature({"id": nodes[node], "frame": frame} | facts, geometry))
     points, costs = graph.points, graph.costs.tolist()
     for edge, (tail, head) in enumerate(graph.edges.tolist()):
-        facts = _properties(graph.edge_facts.get(edge, {}), graph.edge_names[edge], is_own=is_own)
+        known = graph.edge_facts.get(edge, {})
+        facts = _properties(graph, known, graph.edge_names[edge], is_edge=True)
         ends = {"id": edges[edge], "startid": nodes[tail], "endid": nodes[head]}
         cost = {} if math.isnan(costs[edge]) else {"cost": costs[edge]}
+        if not costs[edge] > 0:  # Nav2 plans with such a cost only where scorers override it
+            facts.pop("overridable", None)
         line = graph.lines.get(edge, points[[tail, head]])
         geometry = {"type": "LineString", "coordinates": line.tolist()}
         features.append(_feature(ends | cost | facts, geometry))
-    return features + [_plain(other, 0) for other in graph.others]
+    return features + [rules.plain(other) for other in graph.others if rules.is_drawn(other)]
 
 
 def _ids(names: Sequence[int | str | None], used: set[int]) -> list[int]:
     """Return an id for each name, the name itself where it is an id that nothing else has."""
     ids: list[int] = []
-    wanted = {name for name in names if isinstance(name, int) and 0 <= name <= MOST_ID}
+    wanted = {name for name in names if isinstance(name, int) and 0 <= name <= rules.MOST_ID}
     following = 0
     for name in names:
         if isinstance(name, int) and name in wanted and name not in used:
@@ -184,32 +184,14 @@ def _ids(names: Sequence[int | str | None], used: set[int]) -> list[int]:
     return ids
 
 
-def _properties(facts: dict[str, Any], name: int | str | None, *, is_own: bool) -> dict[str, Any]:
-    plain: dict[str, Any] = _plain(facts, 0)
-    if is_own:
-        return plain
-    known = {"name": name} if isinstance(name, str) else {}
-    return {"metadata": known | plain} if known or plain else {}
-
-
-def _plain(value: Any, depth: int) -> Any:
-    """Return a value as JSON has it, None for what is left out."""
-    if depth > _DEEPEST:
-        raise InvalidValueError(
-            f"a fact is nested more than {_DEEPEST} deep, or contains itself: leave it out"
-        )
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, dict):
-        items = ((str(key), _plain(item, depth + 1)) for key, item in value.items())
-        return {key: item for key, item in items if item is not None}
-    if isinstance(value, list | tuple):
-        listed = (_plain(item, depth + 1) for item in value)
-        return [item for item in listed if item is not None]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    if isinstance(value, int):
-        return value if abs(value) < _LARGEST else None
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value)
+def _properties(
+    graph: WaypointGraph, facts: dict[str, Any], name: int | str | None, *, is_edge: bool = False
+) -> dict[str, Any]:
+    if graph.format == "nav2":
+        return rules.held_properties(facts, is_edge=is_edge)
+    known = ({"name": name} if isinstance(name, str) else {}) | facts
+    if is_edge and "speed_limit" in known:
+        # In m/s, as in other formats; Nav2's key of this name is in per cent.
+        known["abs_speed_limit"] = known.pop("speed_limit")
+    held = rules.held_metadata(known, is_edge=is_edge)
+    return {"metadata": held} if held else {}
