@@ -190,6 +190,31 @@ class UnknownRegions(SoundPlaces):
         return replace(answer, nodes=(answer.nodes[0], 10**6, answer.nodes[-1]), arcs=None)
 
 
+class Liar(SoundPlaces):
+    """A method that tells the truth or one of ten lies, at random."""
+
+    def __init__(self, grid: OccupancyGrid, *, seed: int) -> None:
+        super().__init__(grid)
+        self._rng = np.random.default_rng(seed)
+        if seed % 2:
+            self.region_of = None  # type: ignore[assignment]
+        kinds = (Sound, ThroughWall, CutsCorners, TooLong, Jumps, StopsShort, WalksThroughAll)
+        self._others = [kind(grid) for kind in kinds]
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        truth, lie = super().solve(start, goal), int(self._rng.integers(12))
+        if lie < len(self._others):
+            return self._others[lie].solve(start, goal)
+        nodes = truth.nodes and (truth.nodes[0], truth.nodes[-1])
+        return [
+            truth,
+            MethodResult(None),
+            replace(self._others[0].solve(start, goal), bound=math.nan, nodes=nodes),
+            replace(truth, nodes=nodes and nodes[::-1], arcs=None),
+            replace(truth, any_angle=None, nodes=nodes, arcs=None),
+        ][lie - len(self._others)]
+
+
 class TornRegion(Sound):
     """The map's first and last free column of cells are one region, all between another."""
 

@@ -1,6 +1,8 @@
 """Methods with a planted fault are caught by a run of the harness; sound ones are not."""
 
 import csv
+import json
+import math
 import re
 import shlex
 import sys
@@ -8,15 +10,20 @@ from collections import Counter
 from dataclasses import replace
 from html import unescape
 
+import numpy as np
 import pytest
 
 import hybridnav as hn
 from hybridnav.harness.analysis import load_study, to_frame
-from hybridnav.harness.columns import MEANINGS, consistency_row, rows_of_study
+from hybridnav.harness.baselines import MethodResult
+from hybridnav.harness.columns import MEANINGS, consistency_row, figures, rows_of_study
+from hybridnav.harness.judging import Judge
+from hybridnav.harness.methods import Prepared
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.report import command_of
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import KINDS
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import (
@@ -172,7 +179,11 @@ def test_nothing_is_found_that_was_not_planted(study):
 def test_all_that_is_lost_by_a_lie_is_counted(study):
     outcome = outcome_of(study, faulty.TooLong)
     assert len(outcome.faults) == N_PAIRS
-    assert (outcome.losses >= 0.05 - 1e-9).all()
+    # A path that breaks its bound is no solved pair: it has no loss.
+    row = figures([outcome], [], set())
+    assert (row["solved"], row["solved %"], row["pairs"]) == (0, 0, N_PAIRS)
+    honest = outcome_of(study, faulty.HonestlyLong)
+    assert (honest.losses >= 0.05 - 1e-9).all()
 
 
 def test_a_failing_method_leaves_records_and_the_run_goes_on(study):
@@ -232,7 +243,10 @@ def test_a_data_frame_holds_what_the_tables_say(study):
     common = solved == frame[frame["length_m"].notna()]["method"].nunique()
     for label, part in frame.groupby("method"):
         row = rows[str(label)]
-        assert (len(part), part["length_m"].count()) == (row["pairs"], row["solved"])
+        assert part["octile_optimum_m"].count() == row["pairs"]
+        assert part["length_m"].count() == row["solved"]
+        asked = sum(len(outcome.records) for outcome in study.of_method(str(label)))
+        assert len(part) == asked == N_PAIRS + 2
         there = common.reindex(part.set_index(ends).index, fill_value=False)
         shared = part[there.to_numpy(bool)]
         shared = shared[shared["length_m"].notna()]
@@ -251,8 +265,66 @@ def test_a_data_frame_holds_what_the_tables_say(study):
     lengths = frame["octile_optimum_m"] * (1 + frame["octile_loss"])
     known = frame["octile_loss"].notna()
     assert lengths[known].to_numpy() == pytest.approx(frame["length_m"][known].to_numpy())
-    queries = frame.groupby(["start_row", "start_col", "goal_row", "goal_col"])
+    queries = frame[frame["octile_optimum_m"].notna()].groupby(ends)
     assert (queries["octile_optimum_m"].nunique() == 1).all()
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("costs", [(), ("clearance",)])
+def test_head_tables_records_and_data_frame_count_alike(tmp_path, cli, costs):
+    liar = f"class: '{name_of(faulty.Liar)}'"
+    entries = [f"{{name: liar {seed}, {liar}, settings: {{seed: {seed}}}}}" for seed in range(6)]
+    file = tmp_path / "methods.yaml"
+    file.write_text(f"methods: [{', '.join(entries)}, {{class: '{name_of(faulty.TornRegion)}'}}]")
+    run, by = tmp_path / "run", [f"--costs={cost}" for cost in costs]
+    words = [str(write_map(tmp_path, ROOMS)), "--methods", str(file), "--pairs", "20", *by]
+    said = cli("evaluate", *words, "-o", str(run))
+    assert said.code == 1
+
+    def number(pattern, text):
+        return int(re.findall(pattern, text)[0])
+
+    records = read_records(run)
+    found = Counter(record["method"] for record in records for _ in record["faults"])
+    count = sum(found.values())
+    assert count > 100
+    assert number(r"checked, (\d+) counter-examples", said.out) == count
+    assert number(r"counter-examples: (\d+)", said.err) == count
+    assert number(r"(\d+) counter-examples in", (run / "report.html").read_text()) == count
+    study = load_study(run)
+    kinds = Counter(kind for record in records for kind in record.get("fault_kinds", ()))
+    rows = rows_of_study(study)
+    for kind in KINDS:
+        assert sum(int(row[f"{kind} wrong"]) for row in rows) == kinds[kind], kind
+    frame = to_frame(study)
+    for row in rows:
+        method = str(row["method"])
+        mine = frame[frame["method"] == method]
+        of_pairs = int(mine["faults"].sum())
+        known = found[name_of(faulty.TornRegion) if method == "TornRegion" else method]
+        assert (row["faults"], of_pairs + int(row["regions wrong"])) == (known, known)
+        assert mine["length_m"].count() == row["solved"]
+        assert mine.loc[mine["faults"] > 0, "length_m"].isna().all()
+    for record in records:
+        kinds_there = record.get("fault_kinds", [])
+        assert len(record["faults"]) == len(set(kinds_there)) == len(kinds_there)
+
+
+def test_a_false_no_path_of_a_method_with_regions_counts_once(folder, study):
+    outcome = outcome_of(study, faulty.MissingDoor)
+    wrong = [one for one in outcome.records if one["status"] == "no path" and one["faults"]]
+    lines = map(json.loads, (folder / "records.jsonl").read_text().splitlines())
+    written = [one for one in lines if one["method"] == name_of(faulty.MissingDoor)]
+    assert len(wrong) == len(outcome.faults) == sum(len(one["faults"]) for one in written) > 5
+
+
+@pytest.mark.parametrize("bound", [math.nan, 0.5, -math.inf, 0.0])
+def test_a_bound_that_is_no_factor_is_a_contradiction(bound):
+    grid = hn.OccupancyGrid(np.zeros((2, 3), np.float32), robot_radius_m=0)
+    prepared = Prepared(faulty.Sound(grid), None, 0.0, 0.0)
+    answer = MethodResult(np.array([[0, 0], [0, 1]]), bound=bound)
+    _, found, _ = Judge(grid, prepared, reference=False).faults(Pair((0, 0), (0, 1)), answer)
+    assert found == [("bounds", f"a bound is a factor of 1 or more, got {bound}")]
 
 
 def test_a_data_frame_without_pandas_is_refused_in_one_line(study, monkeypatch):

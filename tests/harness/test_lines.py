@@ -20,9 +20,8 @@ from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.methods import preset_spec
-from hybridnav.harness.outcome import query_key
 from hybridnav.harness.output import write_outputs
-from hybridnav.harness.records import read_records
+from hybridnav.harness.records import query_key, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from hybridnav.harness.tables import compare_runs
 from hybridnav.harness.yardstick import Yardstick, contradiction
@@ -179,11 +178,13 @@ def test_a_line_below_the_optimum_is_a_contradiction():
     reference = {"status": "solved", "length_m": 11.0, "any_angle_m": 10.0}
     line = {"status": "solved", "metric": "any-angle", "length_m": 9.99, "lower_bound_m": 9.0}
     assert contradiction(line, reference) == (
-        "length 9.990000 m is below the any-angle optimum 10.000000 m"
+        "bounds",
+        "length 9.990000 m is below the any-angle optimum 10.000000 m",
     )
     assert contradiction({**line, "length_m": 10.0 - 1e-9}, reference) is None
     assert contradiction({**line, "length_m": 10.5, "lower_bound_m": 10.1}, reference) == (
-        "the lower bound 10.100000 m is above the any-angle optimum 10.000000 m"
+        "bounds",
+        "the lower bound 10.100000 m is above the any-angle optimum 10.000000 m",
     )
     assert contradiction(line, {"status": "solved", "length_m": 11.0}) is None
 

@@ -8,10 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
-from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.records import commands_of, latest_sources, read_records
+from hybridnav.harness.outcome import Outcome
+from hybridnav.harness.records import commands_of, latest_sources, query_key, read_records
 from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
@@ -205,20 +207,20 @@ def to_frame(study: Study) -> pd.DataFrame:
     Parameters
     ----------
     study
-        The study. Pairs are those of different cells that the method answered and the reference
-        solved.
+        The study.
 
     Returns
     -------
     pandas.DataFrame
-        Columns `map`, `method`, `metric`, `kind`, `start_row`, `start_col`, `goal_row` and
-        `goal_col`. `length_m` is NaN where the method found no path without a fault itself.
-        `octile_optimum_m` and `any_angle_optimum_m` follow, and as shares `loss` over the reference
-        of the study, `octile_loss` and `any_angle_loss`. Then `seconds` of the query and
-        `reference_seconds` of A* on the whole grid, and `expanded` cells, intervals and nodes
-        together. A run with costs also has `costs`, their text, `cost_m`, `weighted_optimum_m` and
-        `cost_lower_bound_m`. Any-angle paths with a bound on paths of cells have
-        `cost_grid_bound_m`. `weighted_loss`, `gap` and `grid_gap` are shares.
+        Columns `map`, `method`, `metric`, `kind`, `start_row`, `start_col`, `goal_row`, `goal_col`,
+        `status` of the record, and `faults`, the number of its contradictions. `length_m` is NaN
+        where the method found no path without a fault itself; it and what follows is NaN for equal
+        cells, and where the reference found no path. `octile_optimum_m` and `any_angle_optimum_m`
+        follow, and as shares `octile_loss` and `any_angle_loss` over them. Then `seconds` of the
+        query and `reference_seconds` of A* on the whole grid, and `expanded` cells, intervals and
+        nodes together. A run with costs also has `costs`, their text, `cost_m`,
+        `weighted_optimum_m` and `cost_lower_bound_m`. Any-angle paths with a bound on paths of
+        cells have `cost_grid_bound_m`. `weighted_loss`, `gap` and `grid_gap` are shares.
 
     Raises
     ------
@@ -239,27 +241,22 @@ def to_frame(study: Study) -> pd.DataFrame:
         raise InvalidValueError(
             "a data frame needs pandas: pip install 'hybridnav[study]'"
         ) from error
-    parts = [pd.DataFrame(_columns(outcome)) for outcome in study.outcomes if outcome.references]
+    parts = [pd.DataFrame(_columns(outcome)) for outcome in study.outcomes if outcome.records]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
 
 def _columns(outcome: Outcome) -> dict[str, object]:
-    pairs, frame = outcome.references, outcome.frame
+    """Return the columns of a data frame; those of numbers are NaN where an outcome has none."""
+    pairs, frame = outcome.records, outcome.frame
     ends = {
         f"{end}_{axis}": [record[end][at] for record in pairs]
         for end in ("start", "goal")
         for at, axis in enumerate(("row", "col"))
     }
-    columns: dict[str, object] = {
-        "map": outcome.map_name,
-        "method": outcome.label,
-        "metric": outcome.metric,
-        "kind": [record["kind"] for record in pairs],
-        **ends,
+    figures = {
         "length_m": frame["lengths_m"],
         "octile_optimum_m": frame["optima_m"],
         "any_angle_optimum_m": frame["any_angle_optima_m"],
-        "loss": frame["losses"],
         "octile_loss": frame["octile_losses"],
         "any_angle_loss": frame["any_angle_losses"],
         "seconds": frame["seconds"],
@@ -267,8 +264,7 @@ def _columns(outcome: Outcome) -> dict[str, object]:
         "expanded": frame["expansions"],
     }
     if outcome.costs:
-        columns |= {
-            "costs": outcome.costs,
+        figures |= {
             "cost_m": frame["costs_m"],
             "weighted_optimum_m": frame["weighted_optima_m"],
             "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
@@ -277,7 +273,19 @@ def _columns(outcome: Outcome) -> dict[str, object]:
             "gap": frame["gaps"],
             "grid_gap": frame["grid_gaps"],
         }
-    return columns
+    places = {query_key(record): at for at, record in enumerate(outcome.references)}
+    at = [places.get(query_key(record), -1) for record in pairs]
+    return {
+        "map": outcome.map_name,
+        "method": outcome.label,
+        "metric": outcome.metric,
+        "kind": [record["kind"] for record in pairs],
+        **ends,
+        "status": [record["status"] for record in pairs],
+        "faults": [len(record["faults"]) for record in pairs],
+        **{name: np.append(values, np.nan)[at] for name, values in figures.items()},
+        **({"costs": outcome.costs} if outcome.costs else {}),
+    }
 
 
 def _own_names(records: Iterable[Record]) -> dict[str, str]:

@@ -16,14 +16,13 @@ import numpy as np
 from hybridnav.harness.analysis import not_everywhere, pairs_in_common
 from hybridnav.harness.judges import summarise
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile, query_key
+from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile
+from hybridnav.harness.records import query_key
 from hybridnav.harness.tables import METHOD_COLUMNS, text_of
 from hybridnav.harness.yardstick import (
     ANSWERED,
     KINDS,
     OPTIMA,
-    contradiction,
-    kind_of_contradiction,
 )
 
 if TYPE_CHECKING:
@@ -164,7 +163,7 @@ def consistency_row(outcomes: Sequence[Outcome]) -> Row:
     for outcome in outcomes:
         for record in (outcome.preparation, *outcome.records):
             reference = outcome.optimum.get(query_key(record)) if "start" in record else None
-            found = kinds_of(record, reference)
+            found: set[Kind] = set(record.get("fault_kinds", ()))
             wrong.update(found)
             checked.update(_checked(record, reference) | found)
             rightly += record["status"] == "no path" and "no path" not in found
@@ -175,15 +174,6 @@ def consistency_row(outcomes: Sequence[Outcome]) -> Row:
     row[RIGHTLY] = rightly
     row["without an answer"] = sum(outcome.failures for outcome in outcomes)
     return row
-
-
-def kinds_of(record: Record, reference: Record | None) -> set[Kind]:
-    """Return the kinds of contradictions of a record, by the judge and by the optima."""
-    kinds: set[Kind] = set(record.get("fault_kinds", ()))
-    if record.get("faults") and not kinds:  # of a preparation, or of an older version
-        kinds.add("regions" if record["type"] == "preparation" else "paths")
-    text = None if reference is None else contradiction(record, reference)
-    return kinds if text is None else kinds | {kind_of_contradiction(text)}
 
 
 def _checked(record: Record, reference: Record | None) -> set[Kind]:

@@ -103,9 +103,8 @@ class Judge:
             wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
             faults += [Fault("plan to path", wrong)] if wrong else []
         if not answer.gave_up and answer.is_path != checks.joined(pair.start, pair.goal):
-            found = "a path" if answer.is_path else "no path"
-            text = f"solvability: {found} was found, which moves on the grid contradict"
-            faults.append(Fault("no path", text))
+            here, there = ("solved", "no path") if answer.is_path else ("no path", "solved")
+            faults.append(Fault("no path", f"solvability: {here}, but on the whole grid: {there}"))
         if answer.is_path and not faults:
             checked.append("path to plan")
             wrong = checks.check_walk(self._cells_of(answer))
@@ -125,7 +124,10 @@ class Judge:
         if answer.cells is None:
             return None, []
         verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
-        return verdict.length_m, [Fault("paths", text) for text in verdict.faults]
+        faults = [Fault("paths", text) for text in verdict.faults]
+        if not answer.bound >= 1 - SLACK:  # negated, so that it holds for NaN too
+            faults.append(Fault("bounds", f"a bound is a factor of 1 or more, got {answer.bound}"))
+        return verdict.length_m, faults
 
     def _chords_of(self, line: AnyAngleResult) -> Chords | None:
         """Return a path with arcs as a polyline, None for one of lines."""

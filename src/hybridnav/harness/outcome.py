@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.harness.judges import thrun_count
-from hybridnav.harness.records import path_steps
+from hybridnav.harness.records import QueryKey, path_steps, query_key
 from hybridnav.harness.yardstick import (
     ANSWERED,
     ANY_ANGLE_SLACK,
     NOT_ASKED,
     SLACK,
     TOO_SLOW,
-    contradiction,
     is_any_angle,
     octile_optimum_m,
 )
@@ -38,13 +37,7 @@ EXPANSIONS = {
 
 _FINE = ("ready", NOT_ASKED, *ANSWERED)
 
-QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 MapQuery = tuple[str, QueryKey]
-
-
-def query_key(record: Record) -> QueryKey:
-    """Return the key that the records of all methods share for one query on a map."""
-    return record["kind"], tuple(record["start"]), tuple(record["goal"])
 
 
 @dataclass
@@ -244,15 +237,9 @@ class Outcome:
 
     @cached_property
     def faults(self) -> list[tuple[Record, str]]:
-        """Every contradiction: what the judge found, lengths below the optimum, broken bounds."""
-        found = [(self.preparation, fault) for fault in self.preparation.get("faults", ())]
-        for record in self.records:
-            found += [(record, fault) for fault in record.get("faults", ())]
-            reference = self.optimum.get(query_key(record))
-            wrong = None if reference is None else contradiction(record, reference)
-            if wrong:
-                found.append((record, wrong))
-        return found
+        """Every contradiction, one of each kind in a record; see `read_records`."""
+        every = (self.preparation, *self.records)
+        return [(record, fault) for record in every for fault in record.get("faults", ())]
 
     @property
     def checks(self) -> int:

@@ -17,6 +17,8 @@ import numpy as np
 import hybridnav
 from hybridnav._base.moves import STEPS
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.yardstick import Fault, contradiction
 from hybridnav.maps.cells import MAX_CELLS
 
 if TYPE_CHECKING:
@@ -35,8 +37,10 @@ if TYPE_CHECKING:
 
     from hybridnav.harness.methods import MethodSpec
     from hybridnav.harness.scenes import Pair
+    from hybridnav.harness.yardstick import Kind
 
 Record = dict[str, Any]
+QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 
 RECORDS_FILE, RUNS_FILE = "records.jsonl", "runs.jsonl"
 
@@ -52,6 +56,20 @@ def pair_id(map_sha: str, spec: MethodSpec, pair: Pair) -> str:
 def preparation_id(map_sha: str, spec: MethodSpec) -> str:
     """Return the id of the record of a method's preparation for a map."""
     return f"{map_sha[:12]}/{spec.name}-{spec.digest}/preparation"
+
+
+def query_key(record: Record) -> QueryKey:
+    """Return the key that the records of all methods share for one query on a map."""
+    return record["kind"], tuple(record["start"]), tuple(record["goal"])
+
+
+def fault_fields(faults: Iterable[Fault]) -> Record:
+    """Return the fields that hold the faults of a record, one text for each kind, and the kinds."""
+    of_kind: dict[str, list[str]] = {}
+    for kind, text in faults:
+        of_kind.setdefault(kind, []).append(text)
+    texts = ["; ".join(found) for found in of_kind.values()]
+    return {"faults": texts, **({"fault_kinds": list(of_kind)} if texts else {})}
 
 
 def environment() -> dict[str, str]:
@@ -175,6 +193,10 @@ def commands_of(folder: Path) -> list[str]:
 def read_records(folder: Path) -> list[Record]:
     """Return all whole records of a run in the order written; none without a file.
 
+    Their faults are all that is known: what the judge found of the answer, and what the reference
+    of the same run contradicts, one text for each kind. All counts of contradictions are counts of
+    them.
+
     Raises `InvalidValueError` when the file cannot be read, or a line of it is no record, or one of
     an older version whose any-angle length is not proved to be shortest.
     """
@@ -201,7 +223,29 @@ def read_records(folder: Path) -> list[Record]:
                 "no optimum: take a new folder"
             )
         records.append(record)
+    optima = {
+        (record["map_sha"], query_key(record)): record
+        for record in records
+        if record["type"] == "pair" and record["method"] == REFERENCE
+    }
+    for record in records:
+        if record["type"] == "pair":
+            _lay_contradiction(record, optima.get((record["map_sha"], query_key(record))))
+        elif record["type"] == "preparation":
+            _lay_contradiction(record, None)
     return records
+
+
+def _lay_contradiction(record: Record, reference: Record | None) -> None:
+    """Add the contradiction by the reference to the faults of a record, unless there is one of that
+    kind; records of older versions have several texts of a kind, or no kinds."""
+    texts = record.get("faults", ())
+    usual: Kind = "regions" if record["type"] == "preparation" else "paths"
+    found = list(map(Fault, record.get("fault_kinds") or [usual] * len(texts), texts))
+    wrong = None if reference is None else contradiction(record, reference)
+    if wrong is not None and wrong.kind not in {fault.kind for fault in found}:
+        found.append(wrong)
+    record |= fault_fields(found)
 
 
 # One for each direction, counter-clockwise from east; anything else is written as cells.

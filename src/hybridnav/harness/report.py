@@ -22,8 +22,7 @@ from PIL import Image
 from hybridnav.errors import MapError
 from hybridnav.harness.judges import chords_of
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.records import decode_path
+from hybridnav.harness.records import decode_path, query_key
 from hybridnav.harness.scenes import MapSpec, map_digest, read_map
 from hybridnav.maps import MAX_CELLS, Frame
 from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.records import Record
     from hybridnav.harness.tables import Table
     from hybridnav.maps import OccupancyGrid

@@ -15,7 +15,8 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.judges import paired_difference
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import loss_of, nanmean, query_key
+from hybridnav.harness.outcome import loss_of, nanmean
+from hybridnav.harness.records import query_key
 from hybridnav.harness.yardstick import OPTIMA
 from hybridnav.planner import Preset
 from hybridnav.refine.ompl import OmplSettings

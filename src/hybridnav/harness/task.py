@@ -15,7 +15,13 @@ from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapErr
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
-from hybridnav.harness.records import encode_path, environment, pair_id, preparation_id
+from hybridnav.harness.records import (
+    encode_path,
+    environment,
+    fault_fields,
+    pair_id,
+    preparation_id,
+)
 from hybridnav.harness.scenes import (
     SAMPLER_VERSION,
     map_digest,
@@ -29,7 +35,7 @@ from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.files import example_map
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from hybridnav.harness.baselines import AnyAngleResult, MethodResult
     from hybridnav.harness.records import Record
@@ -150,7 +156,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
         "n_edges": int(method.n_edges),
         "memory_bytes": int(method.memory_bytes),
         **({} if method.region_of is None else {"checked": ["regions"]}),
-        "faults": [text for text, _ in judge.region_faults],
+        **fault_fields(Fault("regions", text) for text, _ in judge.region_faults),
         "fault_cells": [cells for _, cells in judge.region_faults],
     }
 
@@ -289,7 +295,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
         # The answer names no cells, regions or arcs of this map.
         reason = _reason(error)
         wrong = Fault("paths", f"no answer to judge: {reason}")
-        return {"status": "error", "error": reason, **_of_faults([wrong])}
+        return {"status": "error", "error": reason, **fault_fields([wrong])}
 
 
 def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
@@ -320,14 +326,8 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         **costs,
         **known,
         **({"checked": checked} if checked else {}),
-        **_of_faults(faults),
+        **fault_fields(faults),
     }
-
-
-def _of_faults(faults: Sequence[Fault]) -> Record:
-    """Return the fields that hold the faults of an answer, texts and kinds."""
-    texts = [fault.text for fault in faults]
-    return {"faults": texts, **({"fault_kinds": [fault.kind for fault in faults]} if texts else {})}
 
 
 def _of_line(line: AnyAngleResult) -> Record:

@@ -24,7 +24,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import prepare
-from hybridnav.harness.outcome import query_key
+from hybridnav.harness.records import query_key
 from hybridnav.harness.scenes import read_scene
 from hybridnav.harness.task import warm_up
 

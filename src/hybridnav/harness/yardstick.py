@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshSearch, build_mesh
 
 if TYPE_CHECKING:
-    from hybridnav.harness.records import Record
     from hybridnav.maps import OccupancyGrid
 
 
 Cell = tuple[int, int]
+Record = dict[str, Any]
 
 Yardstick = Literal["both", "any-angle", "octile", "weighted"]
 """What losses refer to: each path's own metric, in a run with costs `weighted`; for all paths the
@@ -135,26 +135,22 @@ def is_any_angle(record: Record) -> bool:
     return bool(record.get("metric") == "any-angle")
 
 
-def contradiction(record: Record, reference: Record) -> str | None:
+def contradiction(record: Record, reference: Record) -> Fault | None:
     """Return the contradiction of an answer by the optima, None if there is none.
 
     `reference`: the reference's record of the same pair, which holds both optima.
     """
     if {record["status"], reference["status"]} == set(ANSWERED):
-        return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
+        text = f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
+        return Fault("no path", text)
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None
     wrong = _cost_contradiction(record, reference.get("weighted_m"))
-    if wrong:
-        return wrong
-    if is_any_angle(record):
-        return _any_angle_contradiction(record, reference.get("any_angle_m"))
-    return _cells_contradiction(record, reference)
-
-
-def kind_of_contradiction(text: str) -> Kind:
-    """Return the kind of a contradiction by the optima."""
-    return "no path" if text.startswith("solvability") else "bounds"
+    if not wrong and is_any_angle(record):
+        wrong = _any_angle_contradiction(record, reference.get("any_angle_m"))
+    elif not wrong:
+        wrong = _cells_contradiction(record, reference)
+    return Fault("bounds", wrong) if wrong else None
 
 
 def octile_optimum_m(reference: Record) -> float:
