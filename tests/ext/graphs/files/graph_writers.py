@@ -102,3 +102,7 @@ def write_graphml(path, plain):
 
 def write_node_link(path, plain):
     path.write_text(json.dumps(nx.node_link_data(plain.directed, edges="links")))
+
+
+def write_gml(path, plain):
+    nx.write_gml(plain.directed, path)

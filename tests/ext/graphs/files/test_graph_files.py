@@ -79,12 +79,14 @@ def test_nav2(folder, plain):
 
 
 _ANY_NAMES = st.one_of(_TEXTS, st.integers())
+_GML_NAMES = st.text("abäc<>&' ]#", min_size=1, max_size=8)
 _XML_NAMES = st.text("abc<>&'\" ]", min_size=1, max_size=8)
 FORMATS = {
     "a.tplg": (writers.write_strands, "strands", "drawn", _WORDS),
     "a.tmap2": (writers.write_tmap2, "tmap2", "drawn", _WORDS),  # with anchors and aliases
     "a.tmap": (writers.write_text, "strands-text", "a", _WORDS),
     "a.graphml": (writers.write_graphml, "graphml", "drawn", _XML_NAMES),
+    "a.gml": (writers.write_gml, "gml", "drawn", _GML_NAMES),
     "a.json": (writers.write_node_link, "node-link", "drawn", _ANY_NAMES),
 }
 
@@ -287,6 +289,62 @@ def test_columns_of_drawing_programs_that_are_null_are_no_facts(tmp_path):
     hn.ext.graphs.export_nav2(graph, path)
     assert len(read_nav2(path, costs=False).edges) == 2
     assert hn.ext.graphs.load_graph(path).findings == ()
+
+
+# The form is that of SWAGGER 0.1.0 (nvidia-isaac/SWAGGER): waypoint_graph_generator.py gives nodes
+# `world` (x, y, z) and `pixel`, nx.write_gml writes lists as repeated keys; its own converter takes
+# nodes without labels too (integration/nav2/tools/gml_to_geojson.py).
+SWAGGER = """graph [
+  # a "graph
+  node [
+    id 0
+    {0}
+    world 1.5
+    world 2.E-05
+    world 0.0
+    pixel 30
+    pixel 40
+  ]
+  node [
+    id 1
+    {1}
+    world 1e1
+    world -2.5e-3
+    world 0.0
+    pixel 10
+    pixel 3
+    node_type "1e5 walls"
+  ]
+  edge [
+    source 0
+    target 1
+    weight 1.2E+1
+    edge_type "skeleton"
+  ]
+]
+"""
+
+
+@pytest.mark.parametrize(
+    ("labels", "names"),
+    [
+        (('label "0"', 'label "1"'), (0, 1)),
+        (('label "dock"', 'label "1"'), ("dock", 1)),
+        (('label "a"', 'label "a"'), (0, 1)),
+        (("", ""), (0, 1)),
+    ],
+)
+def test_gml_of_swagger(tmp_path, labels, names):
+    path = tmp_path / "graph.gml"
+    path.write_text(SWAGGER.format(*labels))
+    graph = hn.ext.graphs.load_graph(path)
+    assert (graph.format, graph.names, graph.findings) == ("gml", names, ())
+    assert graph.points.tolist() == [[1.5, 2e-5], [10.0, -0.0025]]
+    assert graph.edges.tolist() == [[0, 1], [1, 0]]
+    assert graph.costs.tolist() == [12.0, 12.0]
+    assert graph.node_facts[1]["node_type"] == "1e5 walls"
+    hn.ext.graphs.export_nav2(graph, tmp_path / "a.geojson")
+    read_nav2(tmp_path / "a.geojson")
 
 
 def feature(at=None, **properties):

@@ -60,6 +60,13 @@ def read(tmp_path):
         ("a.graphml", "<graphml><graph><node/></graph></graphml>", "a node has no id"),
         ("a.graphml", "<graphml><graph><edge/></graph></graphml>", "an edge has no source"),
         ("a.graphml", "<graphml></graphml>", "no node has a point"),
+        ("a.gml", "", "no GML"),
+        ("a.gml", "<gml/>", "no GML"),
+        ("a.gml", "graph [ node [ id 0 ] ]", "no node has a point"),
+        ("a.gml", "graph [ node [ id 0 x 1 y nan ] ]", "no GML"),
+        ("a.gml", "graph [ node [ id 0 x 1.0 y 2.0 ] edge [ source 0 ] ]", "no GML"),
+        ("a.gml", "graph [ node [ id 0 x 1 y 1e999999 ] ]", "no node has a point"),
+        ("a.gml", "graph " + "[ a " * 100_000, "nested deeper"),
         ("a.tmap2", "", "expected a topological map"),
         ("a.tmap2", "nodes: 7", "expected a topological map"),
         ("a.tmap2", "- 1", "expected a mapping 'node'"),
@@ -105,6 +112,7 @@ WRITERS = {
     "a.tmap2": writers.write_tmap2,
     "a.tmap": writers.write_text,
     "a.graphml": writers.write_graphml,
+    "a.gml": writers.write_gml,
     "a.json": writers.write_node_link,
 }
 

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""
 JSON, XML = (".geojson", ".json", ".lif"), (".graphml", ".osm", ".xml")
+GML = ".gml"
 
 
 def load_building_graph(
@@ -108,6 +109,8 @@ def read_graph_text(path: PathLike) -> str:
         kind, most = "JSON", graph_json.MOST_BYTES
     elif suffix in XML:
         kind, most = "XML", _MOST_XML
+    elif suffix == GML:
+        kind, most = "GML", graph_yaml.MOST_GML
     return read_text(
         path, what="graph", error=MapError, missing=MapNotFoundError, max_bytes=most, kind=kind
     )

@@ -1,15 +1,16 @@
-"""Readers of topological maps in YAML: those of STRANDS, and LCAS's tmap2."""
+"""Readers of topological maps of STRANDS and LCAS, of GraphML and of GML."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav._base.yaml_file import Limits
-from hybridnav.errors import MapError
+from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs.files.osm_xml import XmlReader
 from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, point_of
 from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
@@ -211,6 +212,49 @@ def _value(text: str, kind: str) -> Any:
     except ValueError:
         return text
     return text.strip().lower() in _TRUE if kind == "boolean" else text
+
+
+# Reader of GML, by networkx.
+
+MOST_GML = 2**24
+"""Bytes of a file: networkx takes some 2 s for each million."""
+_NOT_PLAIN = re.compile(
+    r'#.*|"[^"]*"|(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d{1,6})(?![\w.])'
+)
+
+
+def _plain_gml(found: re.Match[str]) -> str:
+    if found[1]:
+        return f"{float(found[1]):.17E}"
+    return "" if found[0].startswith("#") else found[0]
+
+
+def read_gml(text: str, where: str, name: str) -> WaypointGraph:
+    """Read a graph, as SWAGGER of NVIDIA writes it: `graph [`, nodes with a point as for GraphML.
+
+    Nodes are called by their labels if all have one of their own, else by their ids. `where`: what
+    messages begin with; `name`: name of a graph that has none. Raises `MapError` when it is no GML.
+    """
+    import networkx as nx  # noqa: PLC0415 - on demand
+
+    # networkx reads 1e-05 as 1, and -5 as the attribute e; a quote in a comment begins a text.
+    plain = _NOT_PLAIN.sub(_plain_gml, text)
+    try:
+        read = nx.parse_gml(plain.replace("\r", "\n"), label="id")
+    except (nx.NetworkXError, ValueError, TypeError, LookupError, AttributeError) as error:
+        cause = " ".join(str(error).split())
+        raise MapError(f"{where}: no GML that networkx can read: {cause:.200}") from None
+    except RecursionError:
+        raise MapError(f"{where}: GML nested deeper than anything meant") from None
+    labels = {node: facts.get("label") for node, facts in read.nodes(data=True)}
+    if len({each for each in labels.values() if isinstance(each, str)}) == len(labels):
+        names = {node: node if each == str(node) else each for node, each in labels.items()}
+        read = nx.relabel_nodes(read, names)
+    try:
+        found = WaypointGraph.from_networkx(read, name=str(read.graph.get("name") or name))
+    except InvalidValueError as error:
+        raise MapError(f"{where}: {str(error).partition(': ')[2]}") from None
+    return replace(found, format="gml")
 
 
 # Reader of STRANDS's older topological maps: plain text, indented by tabs.

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _TEXTS = (".yaml", ".yml", ".tmap", ".tmap2", ".tplg", ".tpl")
 _KNOWN = (
-    "GeoJSON of Nav2, node-link JSON, GraphML, topological maps of STRANDS and LCAS, Open-RMF, "
-    "OpenStreetMap, LIF"
+    "GeoJSON of Nav2, node-link JSON, GraphML, GML, topological maps of STRANDS and LCAS, "
+    "Open-RMF, OpenStreetMap, LIF"
 )
 
 
@@ -34,13 +34,13 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
         A file of one of these formats:
 
         * `.geojson`, `.json`: a route graph of Nav2, or the node-link form of networkx;
-        * `.graphml`, `.xml`: GraphML;
+        * `.graphml`, `.xml`: GraphML; `.gml`: GML, as of SWAGGER;
         * any other name (`.tmap2`, `.tmap`, `.tplg`, `.yaml`, ...): a topological map of LCAS or
           STRANDS, in YAML or the older text;
         * one floor of a file that `load_building_graph` reads.
 
-        Coordinates are metres in the map frame. Nodes in node-link form and GraphML have theirs in
-        attributes, as `WaypointGraph.from_networkx` describes them.
+        Coordinates are metres in the map frame. Nodes in node-link form, GraphML and GML have
+        theirs in attributes, as `WaypointGraph.from_networkx` describes them.
     floor
         Which floor to read of a file with several. `load_building_graph` reads them all.
 
@@ -88,7 +88,12 @@ def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGr
     try:
         return _read_known(path, suffix, where)
     except MapError as error:
-        if isinstance(error, MapNotFoundError) or suffix in (*floors.JSON, *floors.XML, *_TEXTS):
+        if isinstance(error, MapNotFoundError) or suffix in (
+            *floors.JSON,
+            *floors.XML,
+            *_TEXTS,
+            floors.GML,
+        ):
             raise
         ending = printable(repr(suffix))[:20]
         raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
@@ -103,6 +108,8 @@ def _read_known(path: PathLike, suffix: str, where: str) -> WaypointGraph | Buil
         return read_json_graph(text, where, name)
     if suffix in floors.XML:
         return graph_yaml.read_graphml(text, where, name)
+    if suffix == floors.GML:
+        return graph_yaml.read_gml(text, where, name)
     if graph_yaml.is_text_graph(text):
         return graph_yaml.read_text_graph(text, where, name)
     data = parse_document(text, where, MapError, graph_yaml.LIMITS)
