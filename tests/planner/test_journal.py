@@ -105,6 +105,51 @@ def test_a_folder_or_an_empty_file_is_no_journal(tmp_path: Path) -> None:
             act()
 
 
+@pytest.mark.parametrize("mark", ["x", '"', "\\", "\U0001f600", "\u0301"])
+def test_what_is_written_can_be_read_and_changed(mark: str, tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "a.yaml")
+    rooms = [f"{number}:room:{number}".ljust(200, mark) for number in range(1000)]
+    items = [OutOfOrder(what, mark * 200, mark * 200, mark * 200) for what in rooms]
+    journal._write(items[1:])  # as 999 calls would
+    journal.close(rooms[0], why=mark * 200, by=mark * 200)
+    assert {item.what for item in Journal(tmp_path / "a.yaml").items()} == set(rooms)
+    with pytest.raises(InvalidValueError, match="at most 1000 things"):
+        journal.close("door:1")
+    assert Journal(tmp_path / "a.yaml").open(rooms[1])
+
+
+def test_every_character_of_a_line_survives(tmp_path: Path) -> None:
+    every = "".join(filter(str.isprintable, map(chr, range(sys.maxunicode + 1))))
+    texts = [every[at : at + 200] for at in range(0, len(every), 200)]
+    journal = Journal(tmp_path / "a.yaml")
+    for first in range(0, len(texts), 3000):
+        parts = [[*texts[at : at + 3], "", "", ""] for at in range(first, first + 3000, 3)]
+        items = [OutOfOrder(f"door:{n}", *part[:3]) for n, part in enumerate(parts)]
+        journal._write(items)
+        assert Journal(tmp_path / "a.yaml").items() == tuple(items)
+
+
+def test_who_changes_a_journal_does_not_read_it_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads: list[int] = []
+    entries = Journal._entries
+
+    def counted(self: Journal) -> tuple[OutOfOrder, ...]:
+        reads.append(1)
+        return entries(self)
+
+    monkeypatch.setattr(Journal, "_entries", counted)
+    journal = Journal(tmp_path / "a.yaml")
+    for number in range(200):
+        journal.close(f"door:{number}", why="x" * 200)
+    assert len(journal.items()) == 200
+    assert not reads
+    Journal(tmp_path / "a.yaml").open("door:3")
+    assert len(journal.items()) == 199
+    assert len(reads) == 2
+
+
 def _change(file: Path, number: int) -> None:
     journal = Journal(file)
     for turn in range(10):

@@ -32,22 +32,24 @@ _MOST_SHOWN_OF_PATH, _MOST_SHOWN_OF_NAME = 255, 80
 _unfinished: set[Path] = set()
 
 
-def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
+def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> os.stat_result:
     """Write a file whole or not at all: the old content survives an interrupt and a full disc.
 
     `path`: the file; an existing one is replaced and keeps its mode, a link stays a link;
-    `content`: the whole content, at once or in parts. Raises `OSError` when the file cannot be
-    written.
+    `content`: the whole content, at once or in parts. Returns the state of what was written, even
+    if another program replaces it at once. Raises `OSError` when the file cannot be written.
     """
     if _is_no_file(path):
         _write(path, content)
-        return
+        return path.stat()
     path = path.resolve()
     with _beside(path) as beside:
         _write(beside, content)
         if path.exists():
             shutil.copymode(path, beside)
+        state = beside.stat()
         beside.replace(path)
+    return state
 
 
 def _write(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:

@@ -32,8 +32,9 @@ _ENDING = ".closed.yaml"
 _WHAT = re.compile(
     r"link:(?P<link>.+)|(?:(?P<floor>.+?):)?(?:door:(?P<door>[0-9]{1,9})|room:(?P<room>.+))"
 )
-_LIMITS = Limits(max_bytes=2**19, max_values=10_000)
 _MOST_ITEMS, _MOST_TEXT = 1000, 200
+_LIMITS = Limits(max_bytes=2**22, max_values=10_000)
+"""More than is ever written: 4 bytes for each character, 9 values for each item."""
 _KEYS = ("what", "since", "why", "by")
 _WAIT_S, _STEP_S = 10.0, 0.02
 _HEADER = "# Out of order until it is opened again; hybridnav closed writes it, without comments.\n"
@@ -110,6 +111,11 @@ class OutOfOrder:
         self.blocked.cells_of(topology)
 
 
+def _mark(state: os.stat_result) -> tuple[int, int, int]:
+    """Return what tells one file of a name from the next."""
+    return state.st_ino, state.st_mtime_ns, state.st_size
+
+
 class Journal:
     """Things out of order in a building or on a map, in `NAME.closed.yaml` beside its file.
 
@@ -155,9 +161,8 @@ class Journal:
             return ()
         except OSError as error:
             raise MapError(f"closed {printable(self.path)}: {error.strerror}") from None
-        mark = state.st_ino, state.st_mtime_ns, state.st_size
-        if self._read[0] != mark:
-            self._read = mark, self._entries() if state.st_size else ()
+        if self._read[0] != _mark(state):
+            self._read = _mark(state), self._entries() if state.st_size else ()
         return self._read[1]
 
     def closures(self, floor: str | None = None) -> Blocked:
@@ -247,7 +252,8 @@ class Journal:
                 for key, text in asdict(item).items()
             ]
             lines.append(f"- {{{', '.join(pairs)}}}")
-        replace_file(self.path, [(_HEADER + "\n".join(lines) + "\n").encode()])
+        content = (_HEADER + "\n".join(lines) + "\n").encode()
+        self._read = _mark(replace_file(self.path, [content])), tuple(items)
 
     @contextmanager
     def _alone(self) -> Iterator[tuple[OutOfOrder, ...]]:

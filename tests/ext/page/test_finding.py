@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.ext.page import kept
+from hybridnav.ext.page.requests import Favour, Find
 from tests.ext.page.server import building_site_of, query_of, served, site_of, write_building
 
 if TYPE_CHECKING:
@@ -148,3 +150,28 @@ def test_favourites_are_not_written_through_a_link(folder: Path) -> None:
         assert answer.code == 422
         assert "link" in answer.value["error"]
     assert (folder.parent / "secret.txt").read_text("utf-8") == "secret"
+
+
+def test_no_more_favourites_are_written_than_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "_MOST_OF_FAVOURITES", 100)
+    places = [(0, f"a room {number}") for number in range(9)]
+    finder, site = kept.Finder(tmp_path), kept.Named("site", ("ground",), places)
+    with pytest.raises(hn.errors.InvalidValueError, match="is full: remove favourites"):
+        [finder.favour(site, Favour(floor=0, name=name, kept=True)) for _, name in places]
+    found = finder.find(site, Find(text=""))["found"]
+    assert kept.Finder(tmp_path).find(site, Find(text=""))["found"] == found
+    assert sum(each["favourite"] for each in found) > 1
+    finder.favour(site, Favour(floor=0, name="a room 0", kept=False))
+
+
+def test_no_more_changes_are_kept_than_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "_MOST_BYTES", 200)
+    file = kept.RoomsFile(tmp_path, "rooms.yaml")
+    few, many = [{"name": "x" * 50}], [{"name": "x" * 200}]
+    assert file.keep(few) is None
+    assert file.keep(many) == "more than 200 bytes are not read again"
+    assert file.kept() == few

@@ -135,6 +135,8 @@ class RoomsFile:
                 self.journal.unlink(missing_ok=True)
             else:
                 text = json.dumps({"rooms": self._seen, "changes": list(changes)})
+                if len(text) > _MOST_BYTES:
+                    return f"more than {_MOST_BYTES} bytes are not read again"
                 replace_file(self.journal, [text.encode()])
         except OSError as error:
             return str(error.strerror)
@@ -218,10 +220,14 @@ class Finder:
         named = [site.floors[asked.floor], asked.name]
         with self._lock:
             others = [each for each in self._kept.get(site.name, []) if each != named]
-            self._kept[site.name] = [*others, named] if asked.kept else others
+            kept = {**self._kept, site.name: [*others, named] if asked.kept else others}
+            content = json.dumps(kept, ensure_ascii=False).encode()
+            if asked.kept and len(content) > _MOST_OF_FAVOURITES:
+                raise InvalidValueError(f"{_FILE} is full: remove favourites that nobody needs")
+            self._kept = kept
             if self._file.is_symlink():
                 raise InvalidValueError(f"{_FILE} is a link: the page writes through none")
-            replace_file(self._file, json.dumps(self._kept, ensure_ascii=False).encode())
+            replace_file(self._file, content)
         return {}
 
 
