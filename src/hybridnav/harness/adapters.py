@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.maps import CellClass
 from hybridnav.planner import HybridPlanner, PlanStatus
@@ -209,6 +210,16 @@ def _nbytes(thing: Any, seen: set[int]) -> int:
     return _nbytes(getattr(thing, "__dict__", {}), seen)
 
 
+def checked(answer: object) -> MethodResult:
+    """Return the answer of a method; raise `InvalidValueError` for what is none."""
+    if not isinstance(answer, MethodResult):
+        raise InvalidValueError(
+            f"solve must return a MethodResult, got {brief(answer)}: return MethodResult(cells), "
+            "or MethodResult(None) for no path"
+        )
+    return answer
+
+
 class OnOwnGrid:
     """A method on a grid of its own.
 
@@ -233,7 +244,7 @@ class OnOwnGrid:
         """Plan between two cells that are free on the grid of the run."""
         if not (self._free[start] and self._free[goal]):
             return MethodResult(None, gave_up="start or goal is not free on its own grid")
-        answer = self._method.solve(start, goal)
+        answer = checked(self._method.solve(start, goal))
         line, claim = answer.any_angle, answer.by_costs
         return replace(
             answer,

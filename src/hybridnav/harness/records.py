@@ -272,9 +272,9 @@ def encode_path(cells: LongArray) -> str:
 
 
 def path_steps(text: str) -> int:
-    """Return the steps of a path written by `encode_path`."""
+    """Return the steps of a path written by `encode_path`; a cell that comes twice is none."""
     runs = _RUN.finditer(text)
-    return sum(int(run.group(2)) if run.group(1) else 1 for run in runs)
+    return sum(int(run[2]) if run[1] else run[0] != "(0,0)" for run in runs)
 
 
 def decode_path(start: tuple[int, int], text: str) -> LongArray:

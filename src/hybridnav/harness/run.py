@@ -6,13 +6,14 @@ import json
 import math
 import shlex
 import sys
+import warnings
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from hybridnav._base.files import MODEL_SUFFIX
+from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav._base.progress import no_progress
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, MapWarning, brief
 from hybridnav.harness.methods import (
     REFERENCE,
     MethodSpec,
@@ -39,7 +40,7 @@ from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW
-from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.maps.files.movingai import load_scenarios
 
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.names import NamedMethod
     from hybridnav.harness.records import Record
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps.files.movingai import Scenario
     from hybridnav.planner import Preset
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
@@ -376,13 +378,37 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
 
 def _pairs_of(settings: RunSettings, grid: OccupancyGrid, scenarios: str) -> list[Pair]:
     if scenarios:
-        pairs = scenario_pairs(grid, load_scenarios(scenarios))
+        stated = load_scenarios(scenarios, shape=grid.shape)
+        pairs = scenario_pairs(grid, stated)
+        _warn_of(stated, grid, scenarios)
         return evenly_spread(pairs, settings.pairs or len(pairs))
     if settings.lattice_step_m is not None:
         return lattice_pairs(grid, settings.lattice_step_m)
     return sample_pairs(
         grid, _PAIRS if settings.pairs is None else settings.pairs, seed=settings.seed
     )
+
+
+def _warn_of(stated: Sequence[Scenario], grid: OccupancyGrid, file: str) -> None:
+    """Warn of scenarios that are left out, and of those that name another map."""
+    found = []
+    ends = [(one.start, one.goal) for one in stated]
+    blocked = [end for pair in ends for end in pair if grid.classes[end] != CellClass.FREE]
+    lost = sum(any(grid.classes[end] != CellClass.FREE for end in pair) for pair in ends)
+    if lost:
+        found.append(
+            f"{lost:,} of {len(ends):,} start or end in a cell that is not free, such as "
+            f"{blocked[0]}: they are left out"
+        )
+    names = {Path(one.map_name.replace("\\", "/")).stem for one in stated}
+    others = sorted(name for name in names if name.casefold() != grid.name.casefold())
+    if others:
+        found.append(
+            f"they are for map {brief(others[0])}, and this is {brief(grid.name)}, of the same "
+            "size: check that it is the same map"
+        )
+    for text in found:
+        warnings.warn(f"scenarios {printable(file)}: {text}", MapWarning, stacklevel=2)
 
 
 def _sources(tasks: Sequence[Task]) -> dict[str, str]:

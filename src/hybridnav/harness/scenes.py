@@ -264,7 +264,7 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
     """Return the pairs of a MovingAI scenario file, with their optima as stated there.
 
     The stated optima do not hold on an inflated map, or if diagonals may cut corners: there pairs
-    have none, and pairs with an endpoint that is not free are left out.
+    have none. Pairs with an endpoint that is not free are left out.
 
     Raises `InvalidValueError` when a scenario was made for a map of another size.
     """
@@ -277,10 +277,9 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
                 f"{grid.name} has {grid.shape[0]} x {grid.shape[1]}"
             )
         endpoints = scenario.start, scenario.goal
-        if as_stated:
-            pairs.append(Pair(*endpoints, "scenario", scenario.optimum_cells))
-        elif all(grid.classes[end] == CellClass.FREE for end in endpoints):
-            pairs.append(Pair(*endpoints, "scenario"))
+        if all(grid.classes[end] == CellClass.FREE for end in endpoints):
+            stated = scenario.optimum_cells if as_stated else None
+            pairs.append(Pair(*endpoints, "scenario", stated))
     return list(dict.fromkeys(pairs))
 
 

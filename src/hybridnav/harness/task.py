@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
+from hybridnav.harness.adapters import checked
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
@@ -109,6 +110,7 @@ def run_task(task: Task) -> Iterator[Record]:
     head = {"id": task.ids[0], "type": "preparation", **common, **source_fields(task.method)}
     try:
         prepared, judge = _ready(scene, task)
+        about = _about(scene, task) | _of_preparation(prepared, judge)
     except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
         status, why = _of_refusal(error)
         yield {**head, "status": status, **why, **_about(scene, task)}
@@ -117,7 +119,7 @@ def run_task(task: Task) -> Iterator[Record]:
             yield {**_of_pair(name, pair, common), **why}
         return
     with closing(prepared):
-        yield {**head, "status": "ready", **_about(scene, task), **_of_preparation(prepared, judge)}
+        yield {**head, "status": "ready", **about}
         spent = prepared.pyramid_seconds + prepared.method_seconds
         for done, (name, pair) in enumerate(zip(task.ids[1:], task.pairs, strict=True)):
             if task.limit_s is not None and spent > task.limit_s:
@@ -299,7 +301,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
 
 
 def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
-    length_m, faults, checked = judge.faults(pair, answer)
+    length_m, faults, checks = judge.faults(pair, checked(answer))
     known: Record = {}
     costs: Record = {}
     if not faults:
@@ -322,12 +324,19 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         "expanded_nodes": int(answer.expanded_nodes),
         "expanded_intervals": int(answer.expanded_intervals),
         "seconds": seconds,
-        "stages": {stage: float(value) for stage, value in answer.seconds.items()},
+        "stages": {stage: _finite(value) for stage, value in answer.seconds.items()},
         **costs,
         **known,
-        **({"checked": checked} if checked else {}),
+        **({"checked": checks} if checks else {}),
         **fault_fields(faults),
     }
+
+
+def _finite(value: float) -> float:
+    """Return a number; raise `InvalidValueError` for what JSON has no number for."""
+    if not math.isfinite(value):
+        raise InvalidValueError(f"seconds of a stage are a finite number, got {value}")
+    return float(value)
 
 
 def _of_line(line: AnyAngleResult) -> Record:

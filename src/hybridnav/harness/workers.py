@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 _FLUSH_S = 0.2
 _ATTEMPTS = 2
+_ENDING_S = 5.0
+"""Seconds in which a process that closed its pipe ends."""
 
 CONNECT_S = 10.0
 """Seconds within which a scheduler must answer."""
@@ -102,6 +105,17 @@ class _Worker:
         """Return whether its process runs."""
         return self._process.is_alive()
 
+    def ending(self) -> str:
+        """Return how its process ended, in words."""
+        self._process.join(_ENDING_S)
+        code = self._process.exitcode
+        if code is None:
+            return "its process no longer answers"
+        if code >= 0:
+            return f"its process ended with exit code {code}"
+        named = {one.value: f" ({one.name})" for one in signal.Signals}
+        return f"its process was ended by signal {-code}{named.get(-code, '')}"
+
     def stop(self) -> None:
         self.connection.close()
         self._process.kill()
@@ -167,6 +181,7 @@ def _listen(worker: _Worker, *, heard: bool) -> tuple[list[Record], bool]:
 
 def _give_up(worker: _Worker, waiting: list[Work], status: str) -> list[Record]:
     """Record the query that a worker failed at; the rest of its task waits for another."""
+    ended = {"error": worker.ending()} if status == "lost" else {}
     worker.stop()
     task = worker.task
     if task is None:
@@ -176,7 +191,7 @@ def _give_up(worker: _Worker, waiting: list[Work], status: str) -> list[Record]:
         waiting.append(replace(task, attempt=task.attempt + 1))
         return []
     if index == 0:  # it never becomes ready, and no other would
-        return [task.failed_record(at, status) for at in range(len(task.ids))]
+        return [task.failed_record(at, status) | ended for at in range(len(task.ids))]
     left = tuple(
         pair
         for pair, name in zip(task.pairs, task.ids[1:], strict=True)
@@ -184,7 +199,7 @@ def _give_up(worker: _Worker, waiting: list[Work], status: str) -> list[Record]:
     )
     if left or task.ids[0] in worker.missing:
         waiting.append(replace(task, pairs=left, attempt=0))
-    return [task.failed_record(index, status)]
+    return [task.failed_record(index, status) | ended]
 
 
 def _whole(task: Work) -> list[Record]:

@@ -104,7 +104,7 @@ def judge_path(
     free[inside] = free_of[grid.classes[path[inside, 0], path[inside, 1]]]
     # As floats, so that no number from a faulty planner overflows.
     steps = np.diff(path.astype(np.float64), axis=0)
-    near = np.abs(steps).max(axis=1, initial=0.0) == 1
+    near = np.abs(steps).max(axis=1, initial=0.0) <= 1  # a cell may come twice: no length
     # Halves are exact in float64, and so are the tests of segments between centres.
     centres = np.clip(path.astype(np.float64), -_OUTERMOST, _OUTERMOST) + 0.5
     codes = kernels.segment_codes(grid.classes, free_of, centres)[: len(steps)]
@@ -197,7 +197,8 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
     path = np.asarray(cells)
     if path.ndim != 2 or path.shape[1] != 2 or path.dtype.kind not in "iu":  # noqa: PLR2004
         raise InvalidValueError(
-            f"cells must be whole numbers of shape (n, 2), got {path.dtype} of shape {path.shape}"
+            f"cells must be whole numbers of shape (n, 2), got {path.dtype} of shape {path.shape}: "
+            "convert them by astype(int); points in metres go into AnyAngleResult"
         )
     return path.astype(np.int64)
 

@@ -219,13 +219,16 @@ def _misfit(body: bytes, shape: tuple[int, int], first_line: int) -> str:
     return f": {found} rows, expected {rows} (the height)"
 
 
-def load_scenarios(path: PathLike) -> list[Scenario]:
+def load_scenarios(path: PathLike, *, shape: tuple[int, int] | None = None) -> list[Scenario]:
     r"""Read a scenario file.
 
     Parameters
     ----------
     path
-        The .scen file, version 1; columns separated by tabs or spaces.
+        The .scen file, version 1, or version 0, which may lack its first line and states no size of
+        the map; columns separated by tabs or spaces.
+    shape
+        Rows and columns of the map, which a file of version 0 needs: it counts rows from the top.
 
     Returns
     -------
@@ -254,22 +257,33 @@ def load_scenarios(path: PathLike) -> list[Scenario]:
         raise MapError(f"{where}: more than {_MAX_SCENARIO_BYTES} bytes")
     # Any byte is a character of latin-1; words that are no numbers are noticed below.
     lines = content.decode("latin-1").split("\n")
-    if lines[0].split() not in (["version", "1"], ["version", "1.0"]):
+    first = lines[0].split()
+    is_old = first in (["version", "0"], ["version", "0.0"])
+    if len(first) == _COLUMNS - 2:  # HOG2's loader takes a file without a version for version 0
+        is_old, lines = True, ["", *lines]
+    elif not is_old and first not in (["version", "1"], ["version", "1.0"]):
         raise MapError(f"{where}, line 1: expected 'version 1', got {lines[0][:30]!a}")
+    if is_old and shape is None:
+        raise MapError(f"{where}: version 0 states no size of its map: state it as shape")
+    size = shape if is_old else None
     scenarios = []
-    for number, line in enumerate(lines[1:], start=2):
+    for number, line in enumerate(lines[1:], start=2 if lines[0] else 1):
         if line.strip():
             try:
-                scenarios.append(_parse(line))
+                scenarios.append(_parse(line, size))
             except ValueError as failure:
                 raise MapError(f"{where}, line {number}: {failure}") from None
     return scenarios
 
 
-def _parse(line: str) -> Scenario:
-    words = line.split("\t") if line.count("\t") == _COLUMNS - 1 else line.split()
-    if len(words) != _COLUMNS:
-        raise ValueError(f"{len(words)} columns, expected {_COLUMNS}")
+def _parse(line: str, size: tuple[int, int] | None) -> Scenario:
+    """Return the scenario of a line, which states the size of the map unless it is given."""
+    expected = _COLUMNS if size is None else _COLUMNS - 2
+    words = line.split("\t") if line.count("\t") == expected - 1 else line.split()
+    if len(words) != expected:
+        raise ValueError(f"{len(words)} columns, expected {expected}")
+    if size is not None:
+        words[2:2] = [str(size[1]), str(size[0])]
     bucket, cols, rows, x, y, goal_x, goal_y = (
         _natural(words[column]) for column in (0, 2, 3, 4, 5, 6, 7)
     )
@@ -280,7 +294,7 @@ def _parse(line: str) -> Scenario:
     except ValueError:
         optimum = math.nan
     if not (math.isfinite(optimum) and optimum >= 0):
-        raise ValueError(f"expected a length in column {_COLUMNS}, got {words[8][:30]!a}")
+        raise ValueError(f"expected a length in column {expected}, got {words[8][:30]!a}")
     start, goal = (rows - 1 - y, x), (rows - 1 - goal_y, goal_x)
     return Scenario(bucket, words[1].strip(), rows, cols, start, goal, optimum)
 
