@@ -90,9 +90,9 @@ def read_map(path, thresholds):
     kind, cols, rows = map(int, head.groups())
     pixels = np.frombuffer(data, np.uint8, offset=head.end())
     pixels = np.array(data[head.end() :].split(), int) if kind == 2 else pixels
-    level = np.arange(256)[:: 1 if NEGATE[value["negate"].lower()] else -1]
-    occupancy, (low, high) = (level / 255).astype(np.float32), np.float32(thresholds)
-    kinds = np.where(occupancy >= high, 0, np.where(occupancy <= low, 1, 2)).astype(np.uint8)
+    level, (low, high) = np.arange(256, dtype=np.float32) / np.float32(255), np.float32(thresholds)
+    occupancy = level if NEGATE[value["negate"].lower()] else 1 - level
+    kinds = np.where(occupancy <= low, 1, np.where(occupancy >= high, 0, 2)).astype(np.uint8)
     return kinds[pixels[: rows * cols].reshape(rows, cols)[::-1]], [float(n) for n in numbers]
 
 

@@ -76,10 +76,10 @@ def checked_thresholds(free: Any, occupied: Any) -> tuple[float, float]:
         low, high = float(free), float(occupied)
     except (TypeError, ValueError):
         low = high = math.nan
-    if 0 <= low < high <= 1:
+    if 0 <= low <= high <= 1:
         return low, high
     raise InvalidValueError(
-        "thresholds must satisfy 0 <= free < occupied <= 1, "
+        "thresholds must satisfy 0 <= free <= occupied <= 1, "
         f"got free {brief(free)} and occupied {brief(occupied)}"
     )
 

@@ -107,7 +107,7 @@ def percentages(
     values = np.full(probability.shape, _UNKNOWN, dtype=np.int8)
     allowed_by = {
         CellClass.FREE: occupancy <= low,
-        CellClass.OCCUPIED: occupancy >= high,
+        CellClass.OCCUPIED: (occupancy >= high) & (occupancy > low),
         CellClass.UNEXPLORED: (occupancy > low) & (occupancy < high),
     }
     for kind, is_allowed in allowed_by.items():

@@ -62,7 +62,7 @@ class OccupancyGrid:
     frame
         Resolution and pose in the map frame.
     free_threshold, occupied_threshold
-        U1 and U2, `0 <= U1 < U2 <= 1`.
+        U1 and U2, `0 <= U1 <= U2 <= 1`; where they are equal, a cell on both is free.
     robot_radius_m
         Radius in metres by which occupied cells are inflated; 0, for a robot that is a point,
         blocks the occupied cells alone. None is the default, 0.25 m.
@@ -135,8 +135,8 @@ class OccupancyGrid:
                 f"got {self.least_island_m2}"
             )
         measured = np.full(probability.shape, CellClass.UNEXPLORED, dtype=np.uint8)
-        measured[probability <= np.float32(low)] = CellClass.FREE
         measured[probability >= np.float32(high)] = CellClass.OCCUPIED
+        measured[probability <= np.float32(low)] = CellClass.FREE
         classes = measured
         if self.robot_radius_m > 0:
             radius_cells = self.robot_radius_m / self.frame.resolution_m

@@ -16,6 +16,7 @@ from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brie
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs.files import load_keepout_mask
 from hybridnav.maps.files.image import read_raster
+from hybridnav.maps.files.ros import occupancy_of_greys
 from hybridnav.planner.areas import parts_on
 from hybridnav.planner.blocked import Blocked
 
@@ -137,10 +138,7 @@ def _image(path: PathLike, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
             )
 
     raster = read_raster(path, what="blocked", check_size=check_size)
-    level = raster.level[::-1]
-    darkness = (raster.white - np.arange(raster.white + 1)) / raster.white
-    closes = darkness.astype(np.float32) >= np.float32(grid.occupied_threshold)
-    closed = closes[level]
+    closed = (occupancy_of_greys() >= np.float32(grid.occupied_threshold))[raster.grey[::-1]]
     if raster.opaque is not None:
         closed &= raster.opaque[::-1]
     if not closed.any():

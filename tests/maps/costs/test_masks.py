@@ -52,7 +52,7 @@ def values_by_nav2(mode: str) -> list[int]:
         elif occupancy <= 0.196:
             found.append(0)
         elif mode == "scale":
-            found.append(round((occupancy - 0.196) / (0.65 - 0.196) * 100))
+            found.append(math.floor((occupancy - 0.196) / (0.65 - 0.196) * 100 + 0.5))
         else:
             found.append(-1)
     return found
@@ -63,6 +63,16 @@ def test_values_are_those_of_map_server(tmp_path: Path, mode: str) -> None:
     values, frame = read_mask(mask_file(tmp_path, mode), max_cells=100)
     assert values.tolist() == [values_by_nav2(mode)]
     assert frame == hn.Frame(1.0)
+
+
+def test_mode_scale_spreads_over_0_to_100_and_rounds_half_away(tmp_path: Path) -> None:
+    # Printed by the code of nav2_map_server/src/map_io.cpp (jazzy), Eigen 3.4.0.
+    path = mask_file(tmp_path, "scale", free_thresh=0.0, occupied_thresh=1.0)
+    expected = [100, 80, 65, 65, 61, 60, 50, 20, 20, 19, 0, 0]
+    assert read_mask(path, max_cells=100)[0].tolist() == [expected]
+    path = mask_file(tmp_path, "scale", free_thresh=0.25, occupied_thresh=0.75)
+    expected = [100, 100, 80, 79, 72, 71, 50, 0, 0, 0, 0, 0]
+    assert read_mask(path, max_cells=100)[0].tolist() == [expected]
 
 
 def test_masks_become_layers_of_the_map(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import csv
 import math
 import re
+import struct
 import warnings
 from functools import partial
 from pathlib import Path
@@ -121,11 +122,85 @@ def test_maxval_is_white(write):
         np.testing.assert_allclose(grid.probability, [[1, 0.5, 0]], atol=0.002)
 
 
-def test_a_colour_is_the_mean_of_its_channels(write):
-    colours = [[[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]]]
-    grid = load_map(write(Image.fromarray(np.array(colours, dtype=np.uint8))))
-    np.testing.assert_allclose(grid.probability, [[2 / 3, 2 / 3, 2 / 3, 1 / 3]], atol=1e-6)
-    np.testing.assert_array_equal(grid.classes, [[OCCUPIED, OCCUPIED, OCCUPIED, UNEXPLORED]])
+def test_a_colour_has_the_grey_of_graphicsmagick(write):
+    # Printed by Nav2's calls (navigation2, branch jazzy, nav2_map_server/src/map_io.cpp) with
+    # GraphicsMagick 1.3.40 (Debian 12): Rec. 601 in 16 bits, cut off to 8 bits.
+    greys = {
+        (255, 0, 0): 76,
+        (0, 255, 0): 149,
+        (0, 0, 255): 29,
+        (255, 255, 0): 225,
+        (10, 20, 30): 18,
+        (200, 100, 50): 124,
+        (205, 205, 205): 205,
+        (128, 127, 126): 127,
+    }
+    grid = load_map(write(Image.fromarray(np.array([list(greys)], dtype=np.uint8))))
+    np.testing.assert_allclose(255 * (1 - grid.probability), [list(greys.values())], atol=1e-4)
+
+
+def test_arithmetic_is_that_of_nav2(write):
+    # map_io.cpp (jazzy): 1.0f - grey / 255.0f in float32; 1 - 153/255 is 0.39999998, below 0.4f.
+    grid = load_map(write(_picture([[153, 152, 204]])), free_threshold=0.1, occupied_threshold=0.4)
+    np.testing.assert_array_equal(grid.classes, [[UNEXPLORED, OCCUPIED, UNEXPLORED]])
+    grid = load_map(write(_picture([[204, 203, 255]])), free_threshold=0, occupied_threshold=0.2)
+    np.testing.assert_array_equal(grid.classes, [[UNEXPLORED, OCCUPIED, FREE]])
+
+
+def test_where_thresholds_are_equal_a_cell_on_both_is_free(write):
+    # map_io.cpp (jazzy) marks occupied cells, then free ones.
+    path = write(_picture([[127, 128, 51]]), free_thresh=0.5, occupied_thresh=0.5)
+    grid = load_map(path)
+    np.testing.assert_array_equal(grid.classes, [[OCCUPIED, FREE, OCCUPIED]])
+    grid = load_map(path, free_threshold=0.8, occupied_threshold=0.8)
+    np.testing.assert_array_equal(grid.classes, [[FREE, FREE, FREE]])
+    hn.write_ros_map(grid, path.parent / "again.yaml")
+    np.testing.assert_array_equal(load_map(path.parent / "again.yaml").classes, grid.classes)
+
+
+@pytest.mark.parametrize("samples", [2, 4])
+def test_the_extra_sample_of_a_tiff_is_opacity(write, samples):
+    # GraphicsMagick, and so map_saver, writes ExtraSamples (338) as 0, which Pillow drops.
+    values = np.array([[[127, 0], [255, 255], [0, 255], [255, 254]]], dtype=np.uint8)
+    mode = {2: "LA", 4: "RGBA"}[samples]
+    path = write(Image.fromarray(values, "LA").convert(mode), "i.tif")
+    image = path.parent / "i.tif"
+    tag = struct.pack("<HHI", 338, 3, 1)
+    data = image.read_bytes()
+    assert data.count(tag) == 1
+    image.write_bytes(data.replace(tag + b"\2", tag + b"\0"))
+    np.testing.assert_array_equal(
+        load_map(path).classes, [[UNEXPLORED, FREE, OCCUPIED, UNEXPLORED]]
+    )
+
+
+def test_a_threshold_may_be_stated_by_the_option_alone(write):
+    path = write(_picture(GREYS), free_thresh=None)
+    with pytest.raises(MapError, match="lacks free_thresh"):
+        load_map(path)
+    np.testing.assert_array_equal(load_map(path, free_threshold=0.196).classes, GREY_CLASSES)
+
+
+@pytest.mark.parametrize("image", ["/home/someone/maps/i.png", "C:\\maps\\i.png"])
+def test_an_image_that_lies_beside_the_file_is_named(write, image):
+    path = write(_picture(GREYS))
+    path.write_text(path.read_text().replace("image: i.png", f"image: {image}"))
+    with pytest.raises(MapError, match=r"lies beside the map: write `image: i\.png`"):
+        load_map(path)
+
+
+@pytest.mark.parametrize(
+    ("greys", "words"),
+    [
+        ([[255, 255]], "no cell is occupied at the thresholds 0.196 and 0.65"),
+        ([[0, 128]], "no cell is free"),
+        # Cartographer's probabilities: unknown is 128.
+        ([[128] * 9, [150, 160, 170, 180, 190, 100, 110, 255, 0]], "7 cells have greys between"),
+    ],
+)
+def test_doubtful_thresholds_warn(write, greys, words):
+    with pytest.warns(MapWarning, match=words):
+        load_map(write(_picture(greys)))
 
 
 def _palette():
@@ -187,14 +262,17 @@ def test_raw_values_are_percent_and_know_neither_negate_nor_opacity(write, name,
     np.testing.assert_array_equal(grid.classes, [classes])
 
 
-def test_raw_values_of_16_bits_are_rounded(write):
-    values = np.array([[50 * 257 + 128, 50 * 257 + 129, 65535]], dtype=np.uint16)
+def test_16_bits_are_cut_off_to_8(write):
+    # GraphicsMagick 1.3.40, magick/image.h: ScaleQuantumToChar is the quantum / 257, whole.
+    values = np.array([[50 * 257 + 256, 51 * 257, 65535]], dtype=np.uint16)
     grid = load_map(write(Image.fromarray(values), mode="RAW"))
     np.testing.assert_allclose(grid.probability, [[0.5, 0.51, math.nan]], atol=1e-6)
+    grid = load_map(write(Image.fromarray(values)))
+    np.testing.assert_allclose(255 * (1 - grid.probability), [[50, 51, 255]], atol=1e-4)
 
 
 def test_thresholds_are_inclusive(write):
-    # 1 - 204/255 is 0.2 and 1 - 51/255 is 0.8, on paper.
+    # 1 - 204/255 is 0.2 and 1 - 51/255 is 0.8, on paper and in float32.
     with pytest.warns(MapWarning):
         grid = load_map(
             write(_picture([[203, 204, 205, 51, 52]]), free_thresh=0.2, occupied_thresh=0.8)
@@ -314,8 +392,7 @@ def test_a_map_is_named_after_its_file_or_else_its_folder(write, tmp_path, monke
         ({"mode": "binary"}, "mode must be one of trinary, scale, raw, got 'binary'"),
         ({"mode": ""}, "mode must"),
         ({"mode": "[raw]"}, "mode must"),
-        ({"free_thresh": "0.7"}, "free_thresh must be less than occupied_thresh"),
-        ({"free_thresh": "0.65"}, "free_thresh must be less than occupied_thresh"),
+        ({"free_thresh": "0.7"}, "free_thresh must be at most occupied_thresh"),
         ({"free_thresh": "-0.1"}, "free_thresh must"),
         ({"free_thresh": ".nan"}, "free_thresh must"),
         ({"occupied_thresh": "65"}, "occupied_thresh must"),

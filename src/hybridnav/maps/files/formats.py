@@ -17,7 +17,7 @@ from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.files.movingai import load_movingai_map
-from hybridnav.maps.files.ros import load_ros_map
+from hybridnav.maps.files.ros import load_ros_map, occupancy_of_greys
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -176,11 +176,11 @@ def _number(value: float) -> str:
 
 def _pixels(grid: OccupancyGrid, where: str) -> ByteArray:
     """Return the image, uint8 (rows, cols), row 0 at the top."""
-    occupancy = ((_WHITE - np.arange(_WHITE + 1)) / _WHITE).astype(np.float32)
+    occupancy = occupancy_of_greys()
     low, high = np.float32(grid.free_threshold), np.float32(grid.occupied_threshold)
     greys = {
         CellClass.FREE: np.flatnonzero(occupancy <= low),
-        CellClass.OCCUPIED: np.flatnonzero(occupancy >= high),
+        CellClass.OCCUPIED: np.flatnonzero((occupancy >= high) & (occupancy > low)),
         CellClass.UNEXPLORED: np.flatnonzero((occupancy > low) & (occupancy < high)),
     }
     pixels = np.zeros(grid.shape, dtype=np.uint8)

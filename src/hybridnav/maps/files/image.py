@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from PIL import ImageFile
 
-    from hybridnav._base.typing import BoolArray, PathLike
+    from hybridnav._base.typing import BoolArray, ByteArray, PathLike
 
 
 _FORMATS = ("PNG", "PPM", "BMP", "TIFF", "GIF", "JPEG", "WEBP", "TGA", "PCX")
@@ -42,14 +42,18 @@ _OPENING = threading.Lock()
 class Raster:
     """Brightness of an image.
 
-    `level`: brightness as an integer in [0, white], shape `(rows, cols)`, the top row first;
-    `white`: level of white: 255, 3 * 255 (a colour is the sum of its channels) or 65535; `opaque`:
-    mask of the fully opaque pixels, same shape; None if all are opaque.
+    `level`: the grey of the file, of 8 or 16 bits by its type, shape `(rows, cols)`, the top row
+    first; `opaque`: mask of the fully opaque pixels, same shape; None if all are opaque.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16]
-    white: int
     opaque: BoolArray | None
+
+    @property
+    def grey(self) -> ByteArray:
+        """The grey in 8 bits, 255 for white, cut off as GraphicsMagick does for map_server."""
+        step = 1 if self.level.dtype == np.uint8 else 257
+        return (self.level // step).astype(np.uint8)
 
 
 def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], None]) -> Raster:
@@ -71,6 +75,7 @@ def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], N
         image = _open(stream, where)
         _check_extent(image, stream, where)
         check_size(*image.size)
+        _keep_opacity(image)
         try:
             if image.format == "PNG":
                 check_png(stream)
@@ -145,15 +150,36 @@ def _decode(image: Image.Image) -> Raster:
     transparent = image.has_transparency_data
     if image.mode in ("1", "L", "LA", "La"):
         if not transparent:
-            return Raster(np.asarray(image.convert("L")), white=255, opaque=None)
+            return Raster(np.asarray(image.convert("L")), opaque=None)
         grey = np.asarray(image.convert("LA"))
-        return Raster(grey[..., 0], white=255, opaque=_opaque(grey[..., 1] == 255))  # noqa: PLR2004
+        return Raster(grey[..., 0], opaque=_opaque(grey[..., 1] == 255))  # noqa: PLR2004
     pixels = np.asarray(image.convert("RGBA" if transparent else "RGB"))
-    level = pixels[..., 0].astype(np.uint16)
-    level += pixels[..., 1]
-    level += pixels[..., 2]
+    level = np.empty(pixels.shape[:2], np.uint8)
+    for row, of_row in zip(level, pixels, strict=True):
+        # GraphicsMagick weighs 16 bits a channel, rounds, and cuts the sum off to 8 bits.
+        deep = 257 * (of_row[:, :3] @ _WEIGHTS) + 500
+        row[:] = deep // 1000 // 257
     opaque = _opaque(pixels[..., 3] == 255) if transparent else None  # noqa: PLR2004
-    return Raster(level, white=3 * 255, opaque=opaque)
+    return Raster(level, opaque=opaque)
+
+
+_WEIGHTS = np.array([299, 587, 114])
+"""Thousandths of red, green and blue in a grey (Rec. 601)."""
+
+
+def _keep_opacity(image: ImageFile.ImageFile) -> None:
+    """Read the extra sample of a TIFF as opacity, as GraphicsMagick does.
+
+    map_saver writes it unspecified, and Pillow drops such a sample.
+    """
+    names = {"LX", "RGBX", "RGBX;16L", "RGBX;16B", "RGBX;16N"}
+    raw = [tile.args for tile in image.tile if isinstance(tile.args, tuple)]
+    if image.format == "TIFF" and raw and all(args[0] in names for args in raw):
+        image._mode = "LA" if image.mode == "L" else "RGBA"  # noqa: SLF001 - no public way
+        image.tile = [
+            tile._replace(args=(args[0].replace("X", "A"), *args[1:]))
+            for tile, args in zip(image.tile, raw, strict=True)
+        ]
 
 
 def _decode_deep(image: Image.Image) -> Raster:
@@ -163,7 +189,7 @@ def _decode_deep(image: Image.Image) -> Raster:
     level = np.asarray(image).astype(np.uint16)
     transparent = image.info.get("transparency")
     opaque = None if transparent is None else _opaque(level != transparent)
-    return Raster(level, white=65535, opaque=opaque)
+    return Raster(level, opaque=opaque)
 
 
 def _opaque(mask: BoolArray) -> BoolArray | None:

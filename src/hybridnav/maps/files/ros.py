@@ -6,7 +6,7 @@ import math
 import warnings
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +14,13 @@ import numpy as np
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
-from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.files.image import Raster, read_raster
 from hybridnav.maps.files.movingai import check_max_cells, check_size
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import PathLike
@@ -42,9 +44,10 @@ def load_ros_map(
 ) -> OccupancyGrid:
     """Load a map of ROS's map_server.
 
-    In the modes trinary and scale a pixel of brightness v in [0, 1] (the mean of its colour
-    channels) has the occupancy 1 - v, or v with `negate`. Pixels that are not fully opaque were
-    never measured. In the mode raw the 8-bit values 0 to 100 are percentages, all others unknown.
+    In the modes trinary and scale a pixel of brightness v in [0, 1] has the occupancy 1 - v, or v
+    with `negate`. Pixels that are not fully opaque were never measured. In the mode raw the 8-bit
+    values 0 to 100 are percentages, all others unknown. Numbers are those of Nav2 in ROS Jazzy and
+    later: colours weigh 0.299, 0.587 and 0.114, grey has 8 bits, and the arithmetic is float32.
 
     Parameters
     ----------
@@ -76,7 +79,8 @@ def load_ros_map(
     Warns
     -----
     MapWarning
-        When the thresholds call grey 205, the usual mark of unknown cells, free.
+        When the thresholds call grey 205, the usual mark of unknown cells, free; leave no cell
+        free, or none occupied; or call most greys of probabilities unexplored.
 
     Examples
     --------
@@ -101,15 +105,8 @@ def load_ros_map(
         robot_radius_m=robot_radius_m,
         name=_name_of(Path(path)),
     )
-    count = _unknown_called_free(raster, description)
-    if count:
-        warnings.warn(
-            f"{description.where}: {count} cells have grey {_UNKNOWN_GREY}, the usual mark of "
-            f"unknown, and count as free at a free threshold of {description.free_threshold:g}; "
-            "to make them unexplored set free_threshold to 0.196",
-            MapWarning,
-            stacklevel=3,
-        )
+    for doubt in _doubts(raster, description, grid):
+        warnings.warn(f"{description.where}: {doubt}", MapWarning, stacklevel=3)
     return grid
 
 
@@ -125,12 +122,22 @@ def read_mask(path: PathLike, *, max_cells: int) -> tuple[NDArray[np.int8], Fram
     occupancy = _probability(_read_image(description, max_cells), description)
     low, high = np.float32(description.free_threshold), np.float32(description.occupied_threshold)
     if description.mode == "raw":
-        between = np.rint(occupancy * 100)
-    elif description.mode == "scale":
-        between = np.clip(np.rint((occupancy - low) / (high - low) * 100), 0, 100)
+        values = np.rint(occupancy * 100)
     else:
-        between = np.where(occupancy >= high, 100, np.where(occupancy <= low, 0, math.nan))
-    return np.where(np.isnan(between + occupancy), -1, between).astype(np.int8), description.frame
+        values = np.full_like(occupancy, math.nan)
+        if description.mode == "scale" and low < high:
+            width = np.float32(description.occupied_threshold - description.free_threshold)
+            scaled = (occupancy - low) / width * np.float32(100)
+            values = np.floor(scaled) + (scaled % 1 >= 0.5)  # noqa: PLR2004 - C's round
+        values[occupancy >= high] = 100
+        values[occupancy <= low] = 0
+    return np.where(np.isnan(values + occupancy), -1, values).astype(np.int8), description.frame
+
+
+def occupancy_of_greys(*, negate: bool = False) -> NDArray[np.float32]:
+    """Return the occupancy of each grey of 8 bits, float32 (256,), step by step as Nav2 does."""
+    brightness = np.arange(256, dtype=np.float32) / np.float32(255)
+    return brightness if negate else np.float32(1) - brightness
 
 
 def _read_image(description: _Description, max_cells: int) -> Raster:
@@ -179,18 +186,20 @@ def _read_description(
             f"{where}: a building, expected one map: name that of a floor, or load it with "
             "load_building"
         )
+    options = {"free_thresh": free_threshold, "occupied_thresh": occupied_threshold}
+    given = {key: value for key, value in options.items() if value is not None}
+    if any(not 0 <= value <= 1 for value in given.values()):
+        raise InvalidValueError(f"{where}: thresholds must be within [0, 1], got {brief(given)}")
+    values |= given
     absent = [key for key in required if key not in values]
     if absent:
         raise MapError(f"{where}: lacks {', '.join(absent)}")
     low = _threshold(values, "free_thresh", where)
     high = _threshold(values, "occupied_thresh", where)
-    low = low if free_threshold is None else free_threshold
-    high = high if occupied_threshold is None else occupied_threshold
-    if not 0 <= low < high <= 1:
+    if low > high:
         kind = MapError if free_threshold is occupied_threshold is None else InvalidValueError
         raise kind(
-            f"{where}: free_thresh must be less than occupied_thresh and both within [0, 1], "
-            f"got {low} and {high}"
+            f"{where}: free_thresh must be at most occupied_thresh, got {low:g} and {high:g}"
         )
     return _Description(
         where=where,
@@ -259,7 +268,14 @@ def _image_path(value: Any, path: Path, where: str) -> Path:
         image = Path(value).expanduser()
     except RuntimeError:  # no such user: an ordinary name
         image = Path(value)
-    return path.parent / image
+    image = path.parent / image
+    beside = path.parent / PurePath(value.replace("\\", "/")).name
+    if not image.exists() and beside.is_file():
+        raise MapError(
+            f"{where}: image {brief(value)} does not exist, the file lies beside the map: "
+            f"write `image: {printable(beside.name)}`"
+        )
+    return image
 
 
 def _name_of(path: Path) -> str:
@@ -268,31 +284,52 @@ def _name_of(path: Path) -> str:
 
 def _probability(raster: Raster, description: _Description) -> NDArray[np.float32]:
     """Return the occupancy, from a table over the levels, row 0 at the bottom of the image."""
-    level = np.arange(raster.white + 1)
     if description.mode == "raw":
-        percent = np.rint(level * 255 / raster.white)
+        percent = np.arange(256)
         table = np.where(percent <= 100, percent / 100, math.nan)  # noqa: PLR2004
-    elif description.negate:
-        table = level / raster.white
     else:
-        table = (raster.white - level) / raster.white
-    probability = np.empty(raster.level.shape, np.float32)
-    for row, of_row in zip(probability, raster.level[::-1], strict=True):
+        table = occupancy_of_greys(negate=description.negate)
+    grey = raster.grey
+    probability = np.empty(grey.shape, np.float32)
+    for row, of_row in zip(probability, grey[::-1], strict=True):
         row[:] = table[of_row]  # for all at once, numpy makes indices of 8 bytes a cell
     if raster.opaque is not None and description.mode != "raw":  # Nav2: raw ignores opacity
         probability[~raster.opaque[::-1]] = math.nan
     return probability
 
 
-def _unknown_called_free(raster: Raster, description: _Description) -> int:
-    """Return the cells of the grey that means unknown, if the thresholds call it free."""
-    value = _UNKNOWN_GREY / 255 if description.negate else 1 - _UNKNOWN_GREY / 255
-    if description.mode == "raw" or np.float32(value) > np.float32(description.free_threshold):
-        return 0
-    unknown = raster.level == _UNKNOWN_GREY * raster.white // 255
-    if raster.opaque is not None:
-        unknown &= raster.opaque
-    return int(np.count_nonzero(unknown))
+def _doubts(raster: Raster, description: _Description, grid: OccupancyGrid) -> Iterator[str]:
+    """Yield what looks wrong about the thresholds, one text each."""
+    low, high = description.free_threshold, description.occupied_threshold
+    is_grey = description.mode != "raw"
+    occupancy = occupancy_of_greys(negate=description.negate)
+    if is_grey and occupancy[_UNKNOWN_GREY] <= np.float32(low):
+        unknown = raster.grey == _UNKNOWN_GREY
+        if raster.opaque is not None:
+            unknown &= raster.opaque
+        if count := np.count_nonzero(unknown):
+            yield (
+                f"{count} cells have grey {_UNKNOWN_GREY}, the usual mark of unknown, and count as "
+                f"free at a free threshold of {low:g}; to make them unexplored set free_threshold "
+                "to 0.196"
+            )
+    counts = np.bincount(grid.measured.ravel(), minlength=3)
+    for kind in (CellClass.FREE, CellClass.OCCUPIED):
+        if not counts[kind]:
+            yield (
+                f"no cell is {kind.name.lower()} at the thresholds {low:g} and {high:g}: look at "
+                "them, at `negate` and at `mode`"
+            )
+    levels = np.bincount(raster.grey.ravel(), minlength=256)
+    levels[(occupancy <= np.float32(low)) | (occupancy >= np.float32(high))] = 0
+    doubtful = int(levels.sum() - levels.max())  # the most common grey marks the unknown
+    known = counts[CellClass.FREE] + counts[CellClass.OCCUPIED]
+    if description.mode == "trinary" and raster.opaque is None and 3 * doubtful > known:
+        yield (
+            f"{doubtful} cells have greys between the thresholds and count as unexplored; if greys "
+            "are probabilities, as in Cartographer's maps, try a free threshold of 0.45 and an "
+            "occupied threshold of 0.55"
+        )
 
 
 # The project's own maps, which come with the package.
