@@ -294,6 +294,8 @@ def _pose_after(
     if event.kind != "cross" or event.door is None:
         return None
     way = landmarks.way_out_rad(event.door, is_forward=event.leads_forward)
+    if math.isnan(way):
+        return line.at(event.at_m), way
     x, y = event.door.position
     return (x + _INSIDE_M * cos(way), y + _INSIDE_M * sin(way)), way
 

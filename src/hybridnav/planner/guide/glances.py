@@ -88,11 +88,13 @@ class DoorsInSight:
 
     @cached_property
     def _doors_of(self) -> dict[str | None, list[Door]]:
-        """The doors that a person notices, by the room on each side."""
+        """The doors that a person notices, by the room on each side: no boundary all round, as that
+        of a zone inside a hall."""
         found: dict[str | None, list[Door]] = {}
         for door in self._rooms.listed_doors:
             is_wide = door.width_m >= NARROWEST_M or door.passable
-            if is_wide and door.passage_m >= NARROWEST_M:
+            is_ring = math.isnan(self.way_out_rad(door, is_forward=True))
+            if is_wide and door.passage_m >= NARROWEST_M and not is_ring:
                 for room in set(door.rooms):
                     found.setdefault(room, []).append(door)
         return found
@@ -102,7 +104,7 @@ class DoorsInSight:
 
         `is_forward`: whether one comes from the first of its rooms. Result: radians, map frame: the
         mean of the steps across its boundary, which does not depend on how the boundary winds
-        between its ends; NaN for one that closes into a ring.
+        between its ends; NaN for one that closes into a ring: its steps cancel.
         """
         way = self._way_through_rad.get(door.number)
         if way is None:
@@ -205,8 +207,9 @@ class DoorsInSight:
         ]
         told = self._told(door, room)
         rivals = [one for one in others if told is None or self._told(one, room) == told]
-        only = None if rivals or self._is_corridor(room) else Glance(None, None)
-        if away_m > _FARTHEST_M or not self._is_seen(list(point), door):
+        is_ring = math.isnan(self.way_out_rad(door, is_forward=True))
+        only = None if rivals or is_ring or self._is_corridor(room) else Glance(None, None)
+        if is_ring or away_m > _FARTHEST_M or not self._is_seen(list(point), door):
             return only
         across, up = door.position[0] - point[0], door.position[1] - point[1]
         way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
@@ -302,18 +305,22 @@ class DoorsInSight:
         return self._is_free(point, list(door.position))
 
     def _is_free(self, point: list[float], end: list[float]) -> bool:
-        """Return whether no occupied cell lies between two points."""
+        """Return whether no occupied cell, nor what is off the map, lies between two points."""
         frame = self._rooms.grid.frame
         count = 1 + math.ceil(2 * math.dist(point, end) / frame.resolution_m)
         shares = np.arange(1, count) / count
         (row, col), (to_row, to_col) = frame.position_of(*point), frame.position_of(*end)
-        rows = (row + (to_row - row) * shares).astype(np.intp)
-        cols = (col + (to_col - col) * shares).astype(np.intp)
+        cells = np.floor([row + (to_row - row) * shares, col + (to_col - col) * shares])
+        limits = np.reshape(self._rooms.grid.shape, (2, 1))
+        rows, cols = np.clip(cells.astype(np.intp), -1, limits)
         return not self._is_hidden[rows, cols].any()
 
     @cached_property
     def _is_hidden(self) -> BoolArray:
-        return self._rooms.grid.measured != CellClass.FREE
+        """Whether nobody looks over a cell; row and column -1, and those after the last, are off
+        the map."""
+        hidden = self._rooms.grid.measured != CellClass.FREE
+        return np.pad(hidden, (0, 1), constant_values=True)
 
 
 def is_named(room: str | None) -> bool:

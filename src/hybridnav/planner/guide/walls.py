@@ -130,7 +130,7 @@ class RoomWalls:
         `begin`: the wall, and where one begins; `hand`: that at which one has it.
         """
         lengths, sign = self._lengths[begin[0]], 1 if hand == "right" else -1
-        length = float(lengths[-1])
+        length = float(lengths[-1]) or math.inf  # round a cell nobody walks
         found = []
         for number, first, last in self.walls[begin[0]]:
             at = first if hand == "right" else last
