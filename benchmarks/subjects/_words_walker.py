@@ -639,7 +639,8 @@ class Walker:
         A wall that an opening interrupts leads out of the space, unless the words have it passed,
         or one looks for a name at a door.
         """
-        doors, passed, past, trail = self._doors_beside(), 0, 0, [self.point]
+        doors, passed, past = self._doors_beside(), 0, 0
+        trail: list[FloatArray] = []
         is_read = self._is_readable(step.into)
         cell = begin = self.place.cell(self.point)
         ways = ((0, 1), (1, 0), (0, -1), (-1, 0))
@@ -678,7 +679,7 @@ class Walker:
                 passed += is_alike
                 is_there = past == step.past and passed == step.ordinal
                 if step.far_m is not None:
-                    near_m, far_m = self._window(step.far_m)
+                    near_m, far_m = self._window(step.far_m, slack_m=0.5)
                     is_there = near_m <= self._walked_m(trail) <= far_m
                 for door in here:
                     is_meant = is_there and is_alike and self._is_meant(door, step)
@@ -829,9 +830,10 @@ class Walker:
 
     # Steps.
 
-    def _window(self, metres: float) -> tuple[float, float]:
+    def _window(self, metres: float, slack_m: float = 1.0) -> tuple[float, float]:
         """Return from where to where a distance may lie for one who guesses it."""
-        return max(0.0, 0.8 * metres - 1.0) * self.stride, (1.2 * metres + 1.5) * self.stride
+        near_m, far_m = 0.8 * metres - slack_m, 1.2 * metres + 1.5 * slack_m
+        return max(0.0, near_m) * self.stride, far_m * self.stride
 
     def _ahead(self, metres: float) -> None:
         for walked in self._steps():

@@ -48,3 +48,24 @@ def test_openings_have_no_numbers_and_nobody_counts_past_five(walks):
     for tour in walks[1]:
         assert not any("opening 1" in line or "past" in line for line in tour.words())
         assert all((read_words(line, "en").ordinal or 0) <= 5 for line in tour.words())
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_metres_along_the_wall_opposite_lead_to_the_door(language):
+    """Two doors of a wall may lead to one corridor: the metres tell which is meant."""
+    grid = read(OFFICE)
+    rooms = hn.load_rooms(OFFICE.parents[1] / "building" / "rooms-1.yaml", grid)
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms)))
+    place = Place(planner.topology)
+    ways = {
+        "reception": ("seminar room", "lift lobby", "office 4"),
+        "stairwell": ("office 2", "lift lobby"),
+        "lift lobby": ("stairwell", "seminar room"),
+        "seminar room": ("office 1", "office 2"),
+        "office 5": ("stairwell",),
+    }
+    for name, others in ways.items():
+        for other in others:
+            tour = hn.plan_tour(planner, [name, other], at="point")
+            assert any("opposite wall" in line and "about" in line for line in tour.words())
+            assert failure(place, tour, tour.words(language), language) is None

@@ -95,3 +95,27 @@ def test_a_path_inside_one_room_has_a_direction():
         result = hall.plan((2.25, 2.25), goal)
         assert result.words()[0] == f"start in the hall heading {compass}"
         assert result.instructions[0].to_dict()["heading_rad"] is not None
+
+
+# A hall 3 m broad with a door to the kitchen, and opposite it those to four rooms.
+OPPOSITE = (
+    "#######################################",
+    "#aaaaaaaaaaaa#bbbbbbb#ddddddd#llllllll#",
+    "#aaaaaaaaaaaa#bbbbbbb#ddddddd#llllllll#",
+    "#####aa##########bb#######dd######ll###",
+    *("#ooooooooooooooooooooooooooooooooooooo#",) * 6,
+    "#####kk################################",
+    *("#kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk#",) * 6,
+    "#######################################",
+)
+
+
+def test_the_metres_along_the_wall_opposite_begin_at_that_wall():
+    """They lead to the second door, six metres on; nine with the way across end near the third."""
+    tour = hn.plan_tour(hn.HybridPlanner(topology_of(OPPOSITE)), ["kitchen", "bath"])
+    assert tour.words()[2].startswith(
+        "go straight across to the opposite wall, turn right along it for about 6 m and go through"
+    )
+    assert ", dort nach rechts an ihr entlang, etwa 6 m weit, und" in tour.words("de")[2]
+    wall = tour.to_dict()["instructions"][2]["doorway"]["wall"]
+    assert abs(wall["length_m"] - 6.0) <= 0.5

@@ -127,7 +127,7 @@ class Wall:
     is_opposite: bool = False
     """Whether it is the wall opposite the door at one's back."""
     length_m: float = field(default=0.0, compare=False)
-    """How far one walks, in metres."""
+    """How far one walks along it, in metres, without the way to the wall opposite."""
     via: Wall | None = None
     """The wall by which one goes to another door first, and turns one's back to it."""
 

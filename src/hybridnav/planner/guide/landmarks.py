@@ -177,7 +177,7 @@ class Landmarks(DoorsInSight):
                     break
                 if not is_clear or (wall.ordinal or 0) > MANY:
                     wall = replace(wall, ordinal=None, past=0)
-                wall = replace(wall, length_m=length_m)
+                wall = replace(wall, length_m=length_m - across_m)
                 yield length_m + _PASSED_M * wall.past, number, wall
 
     def _opposite(

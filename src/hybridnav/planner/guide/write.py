@@ -251,7 +251,7 @@ class _Writer:
                 past=past,
                 ordinal=words.ordinals[(wall.via.ordinal or 1) - 1],
             )
-        metres = "" if wall.ordinal else words.along_for.format(metres=round(wall.length_m))
+        metres = "" if wall.ordinal else words.along_for.format(metres=max(round(wall.length_m), 1))
         return via + self._side_of(wall) + metres + words.past[wall.past]
 
     def _side_of(self, wall: Wall) -> str:
