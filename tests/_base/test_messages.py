@@ -280,7 +280,8 @@ def test_spacing_of_path_messages_is_checked() -> None:
 def test_poses_are_found_again_in_the_message(poses: Any, spacing: float) -> None:
     """Yaw by the rotation of the x axis: (1 - 2 z z, 2 z w)."""
     points, headings = np.array(poses)[:, :2], np.array(poses)[:, 2]
-    path = hn.Path(np.zeros((1, 2), np.int64), points, 1.0, headings)
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    path = hn.Path(np.zeros((1, 2), np.int64), points, length, headings)
     found = json.loads(json.dumps(path.to_message(spacing_m=spacing)))["poses"]
     expected = path.poses(spacing)
     assert len(found) == len(expected)

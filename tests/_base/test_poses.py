@@ -30,8 +30,8 @@ def curve_path(start: Any, goal: Any, radius_m: float, *, reverses: bool = True)
     """As the planner makes one of a Reeds-Shepp or Dubins curve: poses a cell apart."""
     curve = shortest_curve(start, goal, radius_m=radius_m, reverses=reverses)
     poses = curve.poses(min(0.1, radius_m))
-    path = path_of(poses[:, :2], poses[:, 2], is_curved=True)
-    return hn.Path(path.cells, path.points, curve.length_m, path.headings_rad, is_curved=True)
+    points, headings = poses[:, :2].copy(), poses[:, 2].copy()
+    return hn.Path(np.zeros((1, 2), np.int64), points, curve.length_m, headings, is_curved=True)
 
 
 def gaps(poses: Any) -> Any:

@@ -47,7 +47,7 @@ def features_of(path: Path) -> Any:
 def planned(points: Any, headings: Any = None, *, curved: bool = False) -> hn.PlanResult:
     """A result whose path has these points."""
     points = np.array(points, dtype=np.float64)
-    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    length = math.pi if curved else float(np.hypot(*np.diff(points, axis=0).T).sum())
     headings = None if headings is None else np.array(headings, dtype=np.float64)
     path = hn.Path(np.zeros((1, 2), np.int64), points, length, headings, is_curved=curved)
     ends = tuple(points[0].tolist()), tuple(points[-1].tolist())

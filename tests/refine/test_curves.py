@@ -9,6 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.subjects.curves import drawn, faults
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.footprint import MAX_CORNERS, Footprint
@@ -102,6 +103,26 @@ def test_poses_and_radii_that_make_no_sense_are_refused(wrong: float) -> None:
     for step_m in (0, -1, math.nan, 1e-12):
         with pytest.raises(InvalidValueError, match="step must be a length"):
             curve.poses(step_m)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_curve_is_longer_than_a_word_driven_with_50_digits(seed: int) -> None:
+    """`python -m benchmarks curves` asks for a million; poses that touch, and arcs near full
+    circles, are the half of them."""
+    rng = np.random.default_rng(seed)
+    drives = [drawn(rng) for _ in range(examples(1500))]
+    wrong = [(drive, *found) for drive in drives if (found := faults(drive)[0])]
+    assert wrong == []
+
+
+def test_an_arc_is_no_full_circle() -> None:
+    """OMPL 2.0.1, DubinsStateSpace(1.0).distance: 0.19796880276413198. The circles' centres are a
+    rounding error apart, so that the direction from one to the other may be any."""
+    start = (26.01560671128445, 31.674434869113384, -2.388290507987202)
+    goal = (25.885503756946083, 31.525649666643357, -2.190321705223072)
+    curve = shortest_curve(start, goal, radius_m=1.0, reverses=False)
+    assert curve.length_m == pytest.approx(goal[2] - start[2], abs=1e-12)
+    assert len(curve.poses(0.05)) < 8
 
 
 TRUCK = [[1.5, 0.5], [1.5, -0.5], [-0.25, -0.5], [-0.25, 0.5]]

@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, filled, frozen, on_demand
 from hybridnav._base.messages import path_message
 from hybridnav._base.poses import Motion
+from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,6 +73,8 @@ class Path:
                 array.flags.writeable = False
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
+        if not callable(vars(self)["points"]):
+            _check_length(self.length_m, float(self._motion.lengths_m.sum()))
 
     @cached_property
     def _motion(self) -> Motion:
@@ -228,12 +231,31 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     """Return the path that a method found; cells and their centres are found when they are read."""
     points: Any = found.points
     cells, length_m = found.cells_on_demand, found.cost_m
-    if points is None:
-        # Compiled: a copy of a result needs none.
-        from hybridnav.maps.geometry import centres  # noqa: PLC0415
+    # Compiled: a copy of a result needs none.
+    from hybridnav.maps.geometry import centres, polyline_length  # noqa: PLC0415
 
+    if points is None:
         points = partial(centres, found.cells, frame.for_kernels)
     else:
+        # A copy, because read-only arrays would compile the kernel again.
+        _check_length(length_m, polyline_length(np.array(points, np.float64)))
         points = frozen(points if is_of_cells or length_m > 0 else points[:1])
     cells = cells if callable(cells) else frozen(cells)
     return filled(Path, cells=cells, points=points, length_m=length_m)
+
+
+_SHARE = 1e-6
+"""Share of the length, and of a metre, that the rounding of points far away may amount to."""
+
+
+def is_length(stated_m: float, driven_m: float) -> bool:
+    """Return whether a path is as long as stated, but for the rounding of its points."""
+    return abs(stated_m - driven_m) <= _SHARE * (1 + driven_m)
+
+
+def _check_length(stated_m: float, driven_m: float) -> None:
+    if not is_length(stated_m, driven_m):
+        raise InvalidValueError(
+            f"a path states a length of {stated_m:.6g} m, expected that of its points, "
+            f"{driven_m:.6g} m: correct what made it"
+        )

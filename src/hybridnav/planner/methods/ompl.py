@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.result import Answer
     from hybridnav.planner.settings import OmplPlannerSettings
+    from hybridnav.refine.curves import Curve, Pose
     from hybridnav.refine.ompl import Reply, Search
     from hybridnav.search.found import ClosedCells, Found, Method
 
@@ -224,7 +225,7 @@ class OmplPlanner:
             steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
             if by_line is not None:
                 path, status, by = by_line, PlanStatus.SOLVED, "grid"
-        cost, bound = None, max(math.dist(*(end[:2] for end in endpoints)), reply.bound_m, least_m)
+        cost, bound = None, max(self._straight_m(endpoints), least_m)
         how = Refinement(tuple(steps), by, reply.trace, reply.iterations)
         if path is not None and status is PlanStatus.SOLVED:
             if self._costs is not None:
@@ -312,18 +313,33 @@ class OmplPlanner:
 
     def _path(self, cells: LongArray, reply: Reply) -> Path:
         """Return the path of a reply; along curves its poses are one cell apart."""
-        states, radius_m = reply.points, self.ompl.turning_radius_m
-        if radius_m is not None:
-            reverses = self.ompl.space == "reeds-shepp"
-            segments = [states[:1]]
-            for first, second in itertools.pairwise(states.tolist()):
-                curve = shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
-                step_m = min(self._grid.resolution_m, radius_m)  # so that no arc is half a circle
-                segments.append(curve.poses(step_m)[1:])
-            states = np.concatenate(segments)
+        states, is_curved = reply.points, self.ompl.turning_radius_m is not None
+        length_m = polyline_length(states[:, :2].copy())
+        if is_curved:
+            curves = [self._curve(*pair) for pair in itertools.pairwise(states.tolist())]
+            length_m = math.fsum(curve.length_m for curve in curves)
+            segments = [
+                curve.poses(min(self._grid.resolution_m, curve.radius_m)) for curve in curves
+            ]
+            states = np.concatenate([states[:1], *(poses[1:] for poses in segments)])
         headings = states[:, 2].copy() if self.ompl.has_heading else None
-        points, is_curved = states[:, :2].copy(), radius_m is not None
-        return self._path_through(points, headings, cells, reply.length_m, is_curved=is_curved)
+        points = states[:, :2].copy()
+        return self._path_through(points, headings, cells, length_m, is_curved=is_curved)
+
+    def _curve(self, first: Pose, second: Pose) -> Curve:
+        """Return the shortest curve between two poses."""
+        radius_m, reverses = self.ompl.turning_radius_m, self.ompl.space == "reeds-shepp"
+        assert radius_m is not None  # noqa: S101 - the space has curves
+        return shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
+
+    def _straight_m(self, endpoints: tuple[FloatArray, FloatArray]) -> float:
+        """Return the length of the shortest path without obstacles, a bound; never by OMPL, whose
+        Reeds-Shepp distance is too long for some straight drives."""
+        first, last = endpoints
+        straight_m = math.dist(first[:2], last[:2])
+        if self.ompl.turning_radius_m is None:
+            return straight_m
+        return max(self._curve(tuple(first.tolist()), tuple(last.tolist())).length_m, straight_m)
 
     def _path_through(
         self,

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import PresetError, brief
+from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner.methods.grid import round_closed
 from hybridnav.planner.methods.own_refiner import class_of, one_line, refused
+from hybridnav.planner.path import is_length
 from hybridnav.search.found import Found, Method
 
 if TYPE_CHECKING:
@@ -74,7 +77,7 @@ class OwnMethod(Method):
         """Find a path, and time it if the method does not; see `Method`.
 
         Raises `PresetError` when the answer is no `Found`, or its path does not lead from start to
-        goal.
+        goal, or is not as long as stated.
         """
         if not self._is_prepared:
             self.prepare()
@@ -89,14 +92,21 @@ class OwnMethod(Method):
         ends = [tuple(cell) for cell in np.asarray(found.cells)[[0, -1]].tolist()]
         if ends != [tuple(cell) for cell in query.cells]:
             raise self._wrong(f"a path from {ends[0]} to {ends[1]}")
+        if self.metric != "weighted" and not is_length(found.cost_m, self._driven_m(found)):
+            raise self._wrong(f"{found.cost_m:.6g} m for a path of {self._driven_m(found):.6g} m")
         if self.metric != "any-angle":
             return round_closed(found, query, self._refiner)
         if query.closed is not None and query.closed.meets(found.cells, self._refiner.grid):
             raise self._wrong("a path through closed cells")
         return found
 
+    def _driven_m(self, found: Found) -> float:
+        if found.points is not None:
+            return polyline_length(np.array(found.points, np.float64))
+        return path_length_in_cells(np.asarray(found.cells)) * self._refiner.grid.resolution_m
+
     def _wrong(self, what: str) -> PresetError:
         return PresetError(
             f"planner.method: {self._name}: find returned {what}, expected a Found with a path "
-            "from the first cell of the query to the last, or without one"
+            "from the first cell of the query to the last and its length, or without one"
         )

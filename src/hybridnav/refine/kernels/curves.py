@@ -15,24 +15,23 @@ from hybridnav._base.jit import njit
 from hybridnav._base.trig import acos, asin, atan2, cos, sin
 
 _FULL = 2 * math.pi
-_ROUNDING = 1e-9
-"""Angles and lengths below this count as 0: rounding could turn an empty arc into a full turn."""
+_ROUNDING, _RELATIVE = 1e-9, 1e-14
+"""Turning radii, and share of the distance, by which a word may miss the goal: rounding turns an
+empty arc into a full turn, and a square root of rounding is far above it."""
 LARGEST_HEADING = 1e6
 """Headings in radians above which too few digits remain."""
 
 
 @njit(cache=True, nogil=True)
 def _forward(angle):
-    """Bring an angle to [0, 2 pi)."""
-    angle -= _FULL * math.floor(angle / _FULL)
-    return 0.0 if angle > _FULL - _ROUNDING else angle
+    """Bring an angle to [0, 2 pi]; rounding brings one just below 0 to 2 pi."""
+    return angle - _FULL * math.floor(angle / _FULL)
 
 
 @njit(cache=True, nogil=True)
 def _wrapped(angle):
-    """Bring an angle to [-pi, pi]; for the two endpoints, return the upper one."""
-    angle -= _FULL * np.rint(angle / _FULL)
-    return angle + _FULL if angle < -math.pi + _ROUNDING else angle
+    """Bring an angle to [-pi, pi]."""
+    return angle - _FULL * np.rint(angle / _FULL)
 
 
 @njit(cache=True, nogil=True)
@@ -67,30 +66,60 @@ def _take(kinds, lengths, best, mirror, flip, back, word, segments):
 
 
 @njit(cache=True, nogil=True)
-def _dubins(x, y, phi, kinds, lengths):
+def _two_segments(x, y, phi, reverses, kinds, lengths):
+    """Try the words of at most two segments, which meet few poses, but these by rounding only:
+    return the least length, infinity where none ends within the rounding of the goal.
+
+    A word of three segments has an empty one there. Its length may come out a little below 0, which
+    forwards is a full circle. So each word here is found from the heading, and its end compared.
+    """
+    best, sine, cosine = np.inf, sin(phi), cos(phi)
+    near = _ROUNDING + _RELATIVE * (abs(x) + abs(y))
+    for s in (1, -1):
+        turn = _wrapped(s * phi) if reverses else _forward(s * phi)
+        # What an arc to the heading of the goal leaves, seen from the start, and from the goal.
+        a, b = x - s * sine, y - s * (1 - cosine)
+        ahead, aside = a * cosine + b * sine, b * cosine - a * sine
+        if abs(b) <= near and (reverses or a >= -near):
+            a = a if reverses else max(a, 0.0)
+            best = _take(kinds, lengths, best, 1, 1, False, (0, s), (a, turn))
+        if abs(aside) <= near and (reverses or ahead >= -near):
+            ahead = ahead if reverses else max(ahead, 0.0)
+            best = _take(kinds, lengths, best, 1, 1, False, (s, 0), (turn, ahead))
+        # From the centre of the first circle to that of the last, which touches it.
+        a, b = x + s * sine, s * y - cosine - 1
+        if abs(math.sqrt(a * a + b * b) - 2) <= near:
+            t = atan2(a, -b)
+            q = t - s * phi
+            t, q = (_wrapped(t), _wrapped(q)) if reverses else (_forward(t), _forward(q))
+            best = _take(kinds, lengths, best, 1, 1, False, (s, -s), (t, q))
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _dubins(x, y, phi, kinds, lengths, best):
     """Find the shortest word forwards from the origin to a pose (L. E. Dubins, 1957); return its
     length.
 
     An arc, then the tangent of two circles or a long arc between them, then an arc.
     """
-    best = np.inf
     for s in (1, -1):
         for e in (1, -1):
             # From the centre of the first circle to that of the last.
             d_x, d_y = x - e * sin(phi), y + e * cos(phi) - s
-            distance, angle = math.hypot(d_x, d_y), atan2(d_y, d_x)
+            distance, angle = math.sqrt(d_x * d_x + d_y * d_y), atan2(d_y, d_x)
             if s == e:
                 t, p, q = _forward(s * angle), distance, _forward(s * (phi - angle))
                 best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
-                if distance <= 4 + _ROUNDING:
-                    p = _FULL - 2 * asin(min(distance / 4, 1.0))
+                if distance <= 4:
+                    p = _FULL - 2 * asin(distance / 4)
                     t = _forward(s * angle + p / 2)
                     q = _forward(s * phi - t + p)
                     best = _take(kinds, lengths, best, 1, 1, False, (s, -s, s), (t, p, q))
-            elif distance >= 2 - _ROUNDING:
-                angle += s * asin(min(2 / distance, 1.0))
+            elif distance >= 2:
+                angle += s * asin(2 / distance)
                 t, q = _forward(s * angle), _forward(e * (phi - angle))
-                p = math.sqrt(max(distance * distance - 4, 0.0))
+                p = math.sqrt(distance * distance - 4)
                 best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
     return best
 
@@ -123,16 +152,14 @@ def _three_segments(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip)
     xi, eta = x - sine, y - 1 + cosine
     u, t = math.sqrt(xi * xi + eta * eta), atan2(eta, xi)
     v = _wrapped(phi - t)
-    if t >= -_ROUNDING and v >= -_ROUNDING:
-        best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, 1), (t, u, v))
+    best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, 1), (t, u, v))
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
     if squared >= 4:
         u = math.sqrt(squared - 4)
         t = _wrapped(atan2(eta, xi) + atan2(2.0, u))
         v = _wrapped(t - phi)
-        if t >= -_ROUNDING and v >= -_ROUNDING:
-            best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, -1), (t, u, v))
+        best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, -1), (t, u, v))
     return best
 
 
@@ -151,16 +178,12 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     if rho <= 1:
         u = acos(rho)
         t, v = _tau_omega(u, -u, xi, eta, phi)
-        if t >= -_ROUNDING and v <= _ROUNDING:
-            word = (1, -1, 1, -1)
-            best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, -u, v))
+        best = _take(kinds, lengths, best, mirror, flip, False, (1, -1, 1, -1), (t, u, -u, v))
     rho = (20 - squared) / 16
     if 0 <= rho <= 1:
         u = -acos(rho)
         t, v = _tau_omega(u, u, xi, eta, phi)
-        if t >= -_ROUNDING and v >= -_ROUNDING:
-            word = (1, -1, 1, -1)
-            best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, u, v))
+        best = _take(kinds, lengths, best, mirror, flip, False, (1, -1, 1, -1), (t, u, u, v))
     return best
 
 
@@ -178,12 +201,10 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     squared = xi * xi + eta * eta
     if squared >= 4:
         u = 4 - math.sqrt(squared - 4)
-        if u <= 0:
-            t = _wrapped(atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
-            v = _wrapped(t - phi)
-            if t >= -_ROUNDING and v >= -_ROUNDING:
-                word, segments = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
-                best = _take(kinds, lengths, best, mirror, flip, False, word, segments)
+        t = _wrapped(atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
+        v = _wrapped(t - phi)
+        word, segments = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
+        best = _take(kinds, lengths, best, mirror, flip, False, word, segments)
     return best
 
 
@@ -207,35 +228,32 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
         u = -2 * asin(distance / 4)
         t = _wrapped(angle + u / 2 + math.pi)
         v = _wrapped(phi - t + u)
-        if t >= -_ROUNDING:
-            best = _take(kinds, lengths, best, mirror, flip, back, (1, -1, 1), (t, u, v))
+        best = _take(kinds, lengths, best, mirror, flip, back, (1, -1, 1), (t, u, v))
     if distance >= 2:
         r = math.sqrt(distance * distance - 4)
         u = 2 - r
         t = _wrapped(angle + atan2(r, -2.0))
         v = _wrapped(phi - quarter - t)
-        if t >= -_ROUNDING and u <= _ROUNDING and v <= _ROUNDING:
-            word, segments = (1, -1, 0, 1), (t, -quarter, u, v)
-            best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
+        word, segments = (1, -1, 0, 1), (t, -quarter, u, v)
+        best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
     xi, eta = x + sine, y - 1 - cosine
     distance = math.sqrt(xi * xi + eta * eta)
     if distance >= 2:
         u, t = 2 - distance, atan2(xi, -eta)
         v = _wrapped(t + quarter - phi)
-        if t >= -_ROUNDING and v <= _ROUNDING:
-            word, segments = (1, -1, 0, -1), (t, -quarter, u, v)
-            best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
+        word, segments = (1, -1, 0, -1), (t, -quarter, u, v)
+        best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
     return best
 
 
 @njit(cache=True, nogil=True)
-def _reeds_shepp(x, y, phi, kinds, lengths):
+def _reeds_shepp(x, y, phi, kinds, lengths, best):
     """Find the shortest word forwards and backwards from the origin to a pose; return its length.
 
     J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards, 1990:
-    the words of section 8, each also mirrored, flipped in direction, and driven from its end.
+    the words of section 8, each also mirrored, flipped in direction, and driven from its end. They
+    are taken with all signs: each ends at the goal, and rounding cannot hide one.
     """
-    best = np.inf
     sine, cosine = sin(phi), cos(phi)
     for flip in (1, -1):
         for mirror in (1, -1):
@@ -279,10 +297,11 @@ def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
         return 0
     cosine, sine = cos(yaw0), sin(yaw0)
     x, y, phi = cosine * x + sine * y, cosine * y - sine * x, _wrapped(yaw1 - yaw0)
+    best = _two_segments(x, y, phi, reverses, kinds, lengths)
     if reverses:
-        best = _reeds_shepp(x, y, phi, kinds, lengths)
+        best = _reeds_shepp(x, y, phi, kinds, lengths, best)
     else:
-        best = _dubins(x, y, phi, kinds, lengths)
+        best = _dubins(x, y, phi, kinds, lengths, best)
     if best == np.inf:
         return 0
     n = 5

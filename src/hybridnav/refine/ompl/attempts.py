@@ -112,8 +112,6 @@ class Attempts:
             outcome,
             points,
             self._cost,
-            length_m=self._whole.length(points),
-            bound_m=self.bound_m,
             steps=tuple(self._steps),
             trace=tuple(self._trace),
             iterations=self.budget.iterations,

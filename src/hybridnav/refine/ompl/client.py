@@ -89,10 +89,6 @@ class Reply:
     Shape (0, 3) if there is no path."""
     cost: float
     """Length of the path in metres."""
-    length_m: float = 0.0
-    """Length of the path of the robot's base."""
-    bound_m: float = 0.0
-    """No path is shorter: the length without obstacles."""
     steps: tuple[str, ...] = ()
     """Attempts and their outcomes, in order."""
     trace: tuple[tuple[float, float], ...] = ()

@@ -14,7 +14,7 @@ import numpy as np
 from ompl import base, geometric
 
 from hybridnav.errors import OmplError
-from hybridnav.refine.curves import driven
+from hybridnav.refine.curves import driven, shortest_curve
 from hybridnav.refine.ompl.settings import PARAMETERS, REAL, ROADMAPS
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class StateSpace:
             bounds.setLow(axis, float(low[axis]))
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
-        self.is_straight = settings.space in {"r2", "se2", "differential"}
+        self._radius_m, self._is_dubins = settings.turning_radius_m, settings.space == "dubins"
         self.spins = settings.space in {"se2", "differential"}
         self.is_roadmap = settings.planner in ROADMAPS
         self._spells = settings.space == "differential"
@@ -122,10 +122,13 @@ class StateSpace:
         return all(map(valid, states)) and all(runs(*pair) for pair in itertools.pairwise(states))
 
     def length(self, points: FloatArray) -> float:
-        """Return the metres that the robot's base moves along a path of states."""
-        if not self.is_straight:
-            states = [self.state(point) for point in points]
-            return math.fsum(self.space.distance(*pair) for pair in itertools.pairwise(states))
+        """Return the metres that the robot's base moves along a path of states.
+
+        Not by OMPL: its Reeds-Shepp distance is up to 2.4 times that of some straight drives.
+        """
+        if self._radius_m is not None:
+            curve = partial(shortest_curve, radius_m=self._radius_m, reverses=not self._is_dubins)
+            return math.fsum(curve(*pair).length_m for pair in itertools.pairwise(points.tolist()))
         steps = np.diff(points[:, :2], axis=0)
         return math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
 
