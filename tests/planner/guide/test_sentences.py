@@ -192,7 +192,7 @@ CASES = {
     "along a wall": (
         instruction("cross", 9.0, KITCHEN, doorway=Doorway(LAB, 7, 0.9, wall=Wall("left", None))),
         "keep to the wall on the left for about 1 m and go through door 7 into l3_404",
-        "an der linken Wand entlang, etwa 0 m weit, und durch Tür 7 in „l3_404“ gehen",
+        "an der linken Wand entlang, etwa 1 m weit, und durch Tür 7 in „l3_404“ gehen",
     ),
     "past openings to a door, and across": (
         instruction(
