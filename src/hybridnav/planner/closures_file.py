@@ -80,7 +80,7 @@ def load_blocked(
     MapNotFoundError
         When the file does not exist.
     MapError
-        When the file cannot be read, closes nothing, an area does not meet the map, or an image is
+        When the file cannot be read, an area does not meet the map, or an image is
         not of the map's size.
     InvalidValueError
         When the pose is out of range, or given for a file that is no mask of map_server.
@@ -119,12 +119,7 @@ def _mask(
     path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float], *, keepout: bool
 ) -> Blocked:
     closed = load_keepout_mask(path, grid, pose=pose).keepout
-    if closed is None:
-        raise MapError(
-            f"blocked {printable(path)}: the mask closes no cell of the map, expected occupied "
-            "cells on it: check its origin"
-        )
-    return _closing(closed, grid, keepout=keepout)
+    return Blocked() if closed is None else _closing(closed, grid, keepout=keepout)
 
 
 def _image(path: PathLike, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
@@ -141,11 +136,6 @@ def _image(path: PathLike, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
     closed = (occupancy_of_greys() >= np.float32(grid.occupied_threshold))[raster.grey[::-1]]
     if raster.opaque is not None:
         closed &= raster.opaque[::-1]
-    if not closed.any():
-        raise MapError(
-            f"{where}: the mask closes nothing, expected pixels with a darkness of at least "
-            f"{grid.occupied_threshold:g} where it is closed"
-        )
     return _closing(closed, grid, keepout=keepout)
 
 

@@ -78,7 +78,8 @@ def test_mode_scale_spreads_over_0_to_100_and_rounds_half_away(tmp_path: Path) -
 def test_masks_become_layers_of_the_map(tmp_path: Path) -> None:
     grid = grid_of(np.zeros((2, 24)), hn.Frame(0.5, (0.0, 0.0)), robot_radius_m=0)
     path = mask_file(tmp_path, "raw")
-    slow = hn.load_speed_mask(path, grid)
+    with pytest.warns(hn.errors.MapWarning, match="value 100 limits nothing"):
+        slow = hn.load_speed_mask(path, grid)
     # Values 0, 50, 89, 90 and 100: limits of none, 50, 11, 10 and 0 %, the last one none.
     expected = np.repeat([1, 2, 100 / 11, 10, 1, 1, 1, 1, 1, 1, 1, 1], 2)
     assert np.abs(slow.factors - expected).max() < 2**-14
@@ -202,6 +203,7 @@ def frames(draw: st.DrawFn) -> hn.Frame:
     return hn.Frame(draw(sides), (draw(lengths), draw(lengths)), draw(angles))
 
 
+@pytest.mark.filterwarnings("ignore:.*no cell of the mask:hybridnav.errors.MapWarning")
 @given(st.data())
 @settings(max_examples=examples(100), deadline=None)
 def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(
@@ -386,10 +388,30 @@ def test_presets_on_lengths_name_the_way_that_they_have(floor: Any) -> None:
         hn.HybridPlanner(topology, preset="shortest", costs=layer)
 
 
-def test_a_mask_that_closes_nothing_here_is_refused(floor: Any) -> None:
+def test_a_mask_off_the_map_is_a_warning(floor: Any) -> None:
     grid, _, path = floor
-    with pytest.raises(hn.errors.MapError, match="closes no cell of the map"):
-        hn.load_blocked(path, grid)  # without the pose it lies elsewhere
+    # Without the pose it lies elsewhere.
+    with pytest.warns(hn.errors.MapWarning, match=r"no cell of the mask lies on the map: its"):
+        assert hn.load_blocked(path, grid) is not None
+    with pytest.warns(hn.errors.MapWarning, match=r"no cell of the mask lies on the map: its"):
+        assert hn.load_keepout_mask(path, grid).keepout is None
+    with pytest.warns(hn.errors.MapWarning, match=r"no cell of the mask lies on the map: its"):
+        assert (hn.load_speed_mask(path, grid).factors == 1).all()
+
+
+def test_a_mask_of_another_resolution_that_covers_little_says_how_much(tmp_path: Path) -> None:
+    grid = grid_of(np.zeros((20, 20)), hn.Frame(1.0, (0.0, 0.0)), robot_radius_m=0)
+    path = mask_file(tmp_path, "trinary", resolution=0.7)
+    with pytest.warns(hn.errors.MapWarning, match="covers 8 of 400 cells of the map: its cells"):
+        hn.load_keepout_mask(path, grid)
+
+
+def test_value_100_of_a_speed_mask_limits_nothing(tmp_path: Path) -> None:
+    # nav2_costmap_2d/plugins/costmap_filters/speed_filter.cpp: a limit of 0 is NO_SPEED_LIMIT.
+    grid = grid_of(np.zeros((1, 12)), hn.Frame(1.0, (0.0, 0.0)), robot_radius_m=0)
+    with pytest.warns(hn.errors.MapWarning, match="value 100 limits nothing, as in Nav2"):
+        layer = hn.load_speed_mask(mask_file(tmp_path, "trinary"), grid)
+    assert (layer.factors == 1).all()
 
 
 def test_a_pose_goes_with_masks_alone(floor: Any, tmp_path: Path) -> None:
@@ -416,8 +438,10 @@ def test_the_command_takes_masks_in_other_frames(floor: Any, cli: Any, tmp_path:
         assert max(y for _, y in done["points"]) > 2.2
         assert done["length_m"] > straight + 1.9
     assert cli(*query, "--blocked", placed).answer["blocked"] == [placed]
-    refused = cli(*query, "--blocked", f"keepout:{path}")
-    refused.refuses(3, "closes no cell of the map")
+    for option in ("--blocked", "--costs"):
+        done = cli(*query, option, f"keepout:{path}")
+        assert "no cell of the mask lies on the map: its origin is" in done.stderr
+        assert done.answer["length_m"] == straight
 
 
 MASKS = {

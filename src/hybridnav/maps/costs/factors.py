@@ -228,17 +228,28 @@ class SpeedLimits:
             "full_speed_mps": self.full_speed_mps,
         }
 
-    def factors(self, most: float) -> FloatArray:
-        """Return the factor for each value, float64 (102,), the last one for unknown."""
-        limits = self.base + self.multiplier * np.arange(_VALUES + 1)
-        full = _FULL_PERCENT if self.full_speed_mps is None else self.full_speed_mps
+    @property
+    def _of_values(self) -> FloatArray:
+        """The limit for each value, float64 (102,), the last one for unknown."""
+        return self.base + self.multiplier * np.arange(_VALUES + 1, dtype=np.float64)
+
+    @property
+    def limiting(self) -> LongArray:
+        """int64 (n,), the values that limit the speed."""
+        limits = self._of_values
         is_limit = limits > 0
         if self.unit == "percent":
             is_limit &= limits <= _FULL_PERCENT
         is_limit[[0, _UNKNOWN]] = False  # no limit by the definition of the mask
-        factors = np.ones(len(limits))
+        return np.flatnonzero(is_limit)
+
+    def factors(self, most: float) -> FloatArray:
+        """Return the factor for each value, float64 (102,), the last one for unknown."""
+        full = _FULL_PERCENT if self.full_speed_mps is None else self.full_speed_mps
+        own = self.limiting
+        factors = np.ones(_VALUES + 1)
         with np.errstate(over="ignore"):  # infinite beside the least limits, then `most`
-            np.divide(full, limits, out=factors, where=is_limit)
+            factors[own] = full / self._of_values[own]
         return np.clip(factors, 1.0, most)
 
 

@@ -5,23 +5,31 @@ and a filter mask.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from hybridnav._base.files import printable
 from hybridnav._base.messages import number_of
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.costs.factors import checked_speeds, mask_on_map
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.maps.messages import read_cells
+from hybridnav.maps.occupancy import extent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from hybridnav._base.typing import PathLike
-    from hybridnav.maps import OccupancyGrid
+    from hybridnav.maps import Frame, OccupancyGrid
 
 _KEYS = {
     "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
@@ -162,6 +170,12 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     InvalidValueError
         When a setting or the pose is out of range.
 
+    Warns
+    -----
+    MapWarning
+        When no cell of the mask lies on the map; when a mask of another resolution covers less than
+        a tenth of it; when a value limits nothing, such as 100.
+
     Examples
     --------
     >>> from pathlib import Path
@@ -174,11 +188,21 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     >>> hn.load_speed_mask("slow.yaml", grid).factors
     array([[1., 2., 4.]], dtype=float32)
     """
-    values, frame = read_mask(path, max_cells=max_cells)
+    values, frame = _read_mask(path, grid, pose, max_cells)
+    limits = checked_speeds(base, multiplier, unit, full_speed_mps)
+    idle = sorted(set(np.unique(values[values > 0])) - set(limits.limiting))
+    if idle:
+        warnings.warn(
+            f"mask {printable(path)}: value {idle[-1]} limits nothing, as in Nav2, for which a "
+            "limit of 0 or out of range is none: state a slower value that is one, or close the "
+            "zone by a keepout mask",
+            MapWarning,
+            stacklevel=2,
+        )
     return CostLayer.speed_mask(
         grid,
         values,
-        frame.moved(pose),
+        frame,
         base=base,
         multiplier=multiplier,
         unit=unit,
@@ -217,6 +241,11 @@ def load_keepout_mask(
     InvalidValueError
         When the multiplier or the pose is out of range.
 
+    Warns
+    -----
+    MapWarning
+        When the mask covers too little of the map, as in `load_speed_mask`.
+
     Examples
     --------
     >>> from pathlib import Path
@@ -229,8 +258,39 @@ def load_keepout_mask(
     >>> hn.load_keepout_mask("zones.yaml", grid).keepout
     array([[False,  True, False]])
     """
-    values, frame = read_mask(path, max_cells=max_cells)
-    return CostLayer.keepout_mask(grid, values, frame.moved(pose), multiplier=multiplier)
+    values, frame = _read_mask(path, grid, pose, max_cells)
+    return CostLayer.keepout_mask(grid, values, frame, multiplier=multiplier)
+
+
+_FEW = 0.1
+"""Part of a map below which a mask of another resolution is said to cover few cells."""
+
+
+def _read_mask(
+    path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float], max_cells: int
+) -> tuple[NDArray[np.int8], Frame]:
+    """Return the values of a mask and its place on a map; warn where it covers few cells of it."""
+    values, own = read_mask(path, max_cells=max_cells)
+    frame = own.moved(pose)
+    if frame == grid.frame and values.shape == grid.shape:
+        return values, frame
+    covered = np.count_nonzero(mask_on_map(grid, np.zeros_like(values), frame) == 0)
+    doubt = ""
+    if not covered:
+        x, y = frame.origin_m
+        doubt = (
+            f"no cell of the mask lies on the map: its origin is ({x:g}, {y:g}), the map spans "
+            f"{extent(grid)}"
+        )
+    elif frame.resolution_m != grid.resolution_m and covered < _FEW * grid.classes.size:
+        doubt = (
+            f"the mask covers {covered} of {grid.classes.size} cells of the map: its cells have "
+            f"{frame.resolution_m:g} m, those of the map {grid.resolution_m:g} m"
+        )
+    if doubt:
+        text = f"mask {printable(path)}: {doubt}: set its origin and resolution if that is wrong"
+        warnings.warn(text, MapWarning, stacklevel=3)
+    return values, frame
 
 
 _KEEPOUT, _PERCENT, _ABSOLUTE = 0, 1, 2
