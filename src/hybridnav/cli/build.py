@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import hybridnav as hn
+from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, answer, progress_bar, stage, timings
@@ -67,13 +67,13 @@ def build(
     topology = grow_topology(
         model, settings[0], seconds, rooms_file=rooms_file, find_rooms=find_rooms
     )
-    began = time.perf_counter()
+    began = clock()
     planners = [model.planner(each, topology=topology) for each in settings]
     for each, planner in zip(settings, planners, strict=True):
         with progress_bar(f"preparing {each.name}") as advance:
             planner.prepare(progress=advance)
         planner.close()
-    seconds["prepare"] = round(time.perf_counter() - began, 6)
+    seconds["prepare"] = round(clock() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         hn.save(planners, out, compress=compress)
     answer(_summary(out, topology, settings, seconds))

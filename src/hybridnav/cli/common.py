@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 import os
 import sys
-import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
+from hybridnav._base.clock import clock
 from hybridnav._base.files import check_replaceable, printable, without_controls
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import HybridNavError, MapError, PresetError
@@ -66,10 +66,10 @@ def answer(text: str) -> None:
 @contextmanager
 def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
     """Time a stage, with a spinner on stderr if that is a terminal."""
-    began = time.perf_counter()
+    began = clock()
     with _spinner(text) if sys.stderr.isatty() else nullcontext():
         yield
-    seconds[key] = round(time.perf_counter() - began, 6)
+    seconds[key] = round(clock() - began, 6)
 
 
 @contextmanager

@@ -6,11 +6,11 @@ import hashlib
 import inspect
 import json
 import os
-import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
+from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid, close_method
@@ -261,13 +261,13 @@ class Prepared:
 
 def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = None) -> Prepared:
     """Build a method for a map, with the costs of its cells if it can plan by them."""
-    began = time.perf_counter()
+    began = clock()
     topology = None
     if spec.grid:
         grid = replace(grid, **spec.grid)
     if spec.pyramid:
         topology = TopologicalMap(DualGraphPyramid.build(grid, **spec.pyramid))
-    built = time.perf_counter()
+    built = clock()
     method: Solver
     if spec.preset is not None and topology is not None:
         preset = Preset.model_validate(spec.preset)
@@ -284,7 +284,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     by_costs = costs is not None
     if spec.grid:
         method, topology = OnOwnGrid(method, grid), None
-    seconds = built - began, time.perf_counter() - built
+    seconds = built - began, clock() - built
     is_named = spec.is_named or not spec.source
     return Prepared(method, topology, *seconds, by_costs, is_named)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 import traceback
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hybridnav._base.clock import clock
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.harness.adapters import checked
 from hybridnav.harness.judging import Judge
@@ -272,10 +272,10 @@ def _of_pair(name: str, pair: Pair, common: Record) -> Record:
 
 
 def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
-    began = time.perf_counter()
+    began = clock()
     try:
         tell = prepared.ask(pair.start, pair.goal)
-        seconds = time.perf_counter() - began
+        seconds = clock() - began
         answer = tell()
     except Exception as error:  # noqa: BLE001 - a failing method is a result
         return {

@@ -54,7 +54,7 @@ class PlanRequest(NamedTuple):
     kept: KeptLine | None
     """The line to stay on; None for none."""
     began: float
-    """The time at which reading began, of `time.perf_counter`."""
+    """The time at which reading began, of `clock`."""
 
 
 def no_places() -> NoReturn:

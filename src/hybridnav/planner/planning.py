@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
@@ -95,7 +95,7 @@ class Planning:
         keep: PlanResult | None = None,
     ) -> PlanRequest:
         """Read a query; see `HybridPlanner.plan`."""
-        began, waypoint = time.perf_counter(), goal
+        began, waypoint = clock(), goal
         if at != "anywhere":
             check_at(at)
         if isinstance(start, str) or isinstance(goal, str):
@@ -259,12 +259,12 @@ class Planning:
 
     def _in_sight(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
         """Return the result of a path of cells that is shortened by line of sight."""
-        began, sight, closed = time.perf_counter(), self._sight, request.closed
+        began, sight, closed = clock(), self._sight, request.closed
         if closed is not None:  # one for this query
             allowed = self.preset.planner.allow_unexplored
             sight = LineOfSight(self.grid, allow_unexplored=allowed, closed=closed.flat)
         points = sight.shorten(found.cells, *query.points)
-        found.stats.seconds["smooth"] = time.perf_counter() - began
+        found.stats.seconds["smooth"] = clock() - began
         length_m = polyline_length(points)
         path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
         return self._solved(request, found, path, query.straight_m, metric="any-angle")
@@ -289,10 +289,10 @@ class Planning:
             length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
             path, cost_m = Path(found.cells, points, length_m), found.cost_m
             return solved(path, found.lower_bound_m, metric="weighted", weighted_cost=cost_m)
-        began = time.perf_counter()
+        began = clock()
         finish = costs.arcs if request.smooth == "arcs" else costs.line
         path, cost_m = finish(found.cells, request.poses, request.closed)
-        found.stats.seconds["smooth"] = time.perf_counter() - began
+        found.stats.seconds["smooth"] = clock() - began
         bound, of_cells = self._cost_bound(query, cost_m), found.lower_bound_m
         metric: Any = "any-angle-weighted"
         return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
@@ -304,9 +304,9 @@ class Planning:
         points = found.points
         assert points is not None  # noqa: S101 - any-angle methods state them
         if request.smooth == "arcs":
-            began = time.perf_counter()
+            began = clock()
             path, cost_m = costs.arcs_along(found.cells, points, request.closed)
-            found.stats.seconds["arcs"] = time.perf_counter() - began
+            found.stats.seconds["arcs"] = clock() - began
         else:
             length_m, cost_m = polyline_length(points), found.cost_m
             path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
@@ -332,7 +332,7 @@ class Planning:
         self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
     ) -> PlanResult:
         """Return the result of a path refined by OMPL, with the bound of the method too."""
-        now = time.perf_counter()
+        now = clock()
         first, last = (
             pose if len(pose) > 2 else np.append(pose, 0.0)  # noqa: PLR2004
             for pose in request.poses
@@ -346,7 +346,7 @@ class Planning:
             least_m=found.lower_bound_m if is_any_angle else query.straight_m,
             along=found,
         )
-        found.stats.seconds["ompl"] = time.perf_counter() - now
+        found.stats.seconds["ompl"] = clock() - now
         bound, path = refined.lower_bound, refined.path
         if path is not None and refined.status is PlanStatus.SOLVED:
             path = path if path.headings_rad is not None else path.turned_at_ends(*request.poses)

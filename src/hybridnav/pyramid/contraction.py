@@ -4,12 +4,12 @@ share.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.kernels import base as _base_kernels
@@ -111,7 +111,7 @@ class Decimation:
         self, start: Start, seed: int, linkage: int = _kernels.SURVIVOR, limit: int = NO_LIMIT
     ) -> None:
         self.stats = BuildStats()
-        self._began = time.perf_counter()
+        self._began = clock()
         self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
@@ -346,7 +346,7 @@ class Decimation:
         self._lap("sizes")
 
     def _lap(self, stage: str) -> None:
-        now = time.perf_counter()
+        now = clock()
         self.stats.seconds[stage] = self.stats.seconds.get(stage, 0.0) + now - self._began
         self._began = now
 

@@ -13,11 +13,11 @@ one field. So the record stays valid outside a set of fields that are dissolved.
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav.pyramid.contraction import NO_LIMIT, Decimation
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
@@ -78,18 +78,18 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     places: from the record they take longer than a build.
     """
     labels = rooms if resistance is None else resistance.kept_apart
-    began = time.perf_counter()
+    began = clock()
     parts = None
     if linkage == "throats" and rooms is None and resistance is None:
         parts = parts_of(classes, limit)
-    parted = time.perf_counter()
+    parted = clock()
     if parts is not None:
         kinds = parts.kinds
     else:
         kinds = classes if labels is None else kinds_of(classes, labels)
     start = start_at_base(kinds, limit)
     run = Decimation(start, seed, _LINKAGES[linkage], limit)
-    run.stats.seconds |= {"parts": parted - began, "base": time.perf_counter() - parted}
+    run.stats.seconds |= {"parts": parted - began, "base": clock() - parted}
     if parts is not None:
         run.contract_all()
         run.rename_rooms(parts.part_of)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
@@ -56,17 +56,17 @@ class RegionPlanner:
         """
         first = region_at(self._region_of, start)
         last = region_at(self._region_of, goal)
-        began = time.perf_counter()
+        began = clock()
         plan = self._graph.search(first, last)
-        seconds = {"coarse": time.perf_counter() - began}
+        seconds = {"coarse": clock() - began}
         if plan.vertices is None:
             return MethodResult(None, expanded_nodes=plan.expanded, seconds=seconds)
-        began = time.perf_counter()
+        began = clock()
         in_corridor = along(self._joined, plan.vertices, self._beside, self._graph.allowed)
         found = self._grid_search.search(
             start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
-        seconds["refine"] = time.perf_counter() - began
+        seconds["refine"] = clock() - began
         return MethodResult(
             found.cells,
             nodes=tuple(plan.vertices.tolist()),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-import time
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import no_progress
@@ -108,12 +108,12 @@ class OverLattice(Method):
         """Find a cheapest path between two points; see `Method`. Its cells are found when somebody
         reads them. The bound is the distance of the two: see `PlanResult.lower_bound` for a better
         one."""
-        began = time.perf_counter()
+        began = clock()
         seconds = {}
         if self._search is None:
             self.prepare()
-            seconds["lattice"] = time.perf_counter() - began
-        now = time.perf_counter()
+            seconds["lattice"] = clock() - began
+        now = clock()
         search, line = self.prepare(), self._line
         if query.closed is not None:
             search, line = self._round(query.closed)
@@ -122,13 +122,13 @@ class OverLattice(Method):
             for cell, point in zip(query.cells, query.points, strict=True)
         )
         found = search.line(first, last, query.cells)
-        seconds["search"] = time.perf_counter() - now
+        seconds["search"] = clock() - now
         stats = PlanStats(expanded=found.expanded, seconds=seconds)
         if found.positions is None:
             return Found(None, stats=stats)
-        now = time.perf_counter()
+        now = clock()
         positions = line.settle(found.positions)
-        seconds["settle"] = time.perf_counter() - now
+        seconds["settle"] = clock() - now
         points = line.in_metres(positions, *query.points)
         points = points if query.straight_m > 0 else points[:1]
         if query.kept is not None and len(points) > 1:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from hybridnav._base.clock import clock
 from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import no_progress
 from hybridnav.maps import CellClass
@@ -70,9 +70,9 @@ def round_closed(found: Found, query: Query, refiner: GridRefiner) -> Found:
     closed = query.closed
     if closed is None or not found.has_path or not closed.meets(found.cells, refiner.grid):
         return found
-    began = time.perf_counter()
+    began = clock()
     path = refiner.search.search(*query.cells, blocked=closed.flat)
-    seconds = {**found.stats.seconds, "around": time.perf_counter() - began}
+    seconds = {**found.stats.seconds, "around": clock() - began}
     expanded = found.stats.expanded + path.expanded
     if path.cells is None:
         return Found(None, stats=PlanStats(expanded=expanded, seconds=seconds))
@@ -122,12 +122,12 @@ class WholeMap(Method):
 
     def find(self, query: Query) -> Found:
         """Find a shortest path; see `Method`."""
-        began = time.perf_counter()
+        began = clock()
         refiner, own = self.refiners
         cells, expanded = (own or refiner).refine(*query.cells, None)
         # A refiner of the user's own proves nothing.
         bound = octile_distance_in_cells(*query.cells) if own is not None else None
-        seconds = {"refine": time.perf_counter() - began}
+        seconds = {"refine": clock() - began}
         stats = PlanStats(expanded=expanded, seconds=seconds)
         found = on_cells(refiner, cells, bound_cells=bound, stats=stats)
         return round_closed(found, query, refiner)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import behind
@@ -98,17 +98,17 @@ class OverJumps(Method):
         """Find a shortest path between two cells; see `Method`."""
         if self._grid.corner_cutting:
             return self._whole_map.find(query)
-        began = time.perf_counter()
+        began = clock()
         seconds = {}
         if self._search is None:
             if self._grid.classes.size >= MANY_CELLS:
                 behind(self._begun, self.prepare)
                 return self._whole_map.find(query)
             self.prepare()
-            seconds["graph"] = time.perf_counter() - began
-        now = time.perf_counter()
+            seconds["graph"] = clock() - began
+        now = clock()
         path = (self._search or self.prepare()).path(*query.cells)
-        seconds["jumps"] = time.perf_counter() - now
+        seconds["jumps"] = clock() - now
         stats = filled(PlanStats, expanded=path.expanded, seconds=seconds)
         if path.cells is None:
             return Found(None, stats=stats)

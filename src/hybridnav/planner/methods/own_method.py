@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import threading
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.progress import no_progress
 from hybridnav.errors import PresetError, brief
@@ -81,12 +81,12 @@ class OwnMethod(Method):
         """
         if not self._is_prepared:
             self.prepare()
-        began = time.perf_counter()
+        began = clock()
         found = self._own.find(query)
         if not isinstance(found, Found):
             raise self._wrong(f"a {type(found).__name__}")
         if not found.stats.seconds:
-            found.stats.seconds["find"] = time.perf_counter() - began
+            found.stats.seconds["find"] = clock() - began
         if not found.has_path:
             return found
         ends = [tuple(cell) for cell in np.asarray(found.cells)[[0, -1]].tolist()]

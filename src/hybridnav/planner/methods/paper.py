@@ -8,11 +8,11 @@ grid A* finds the path inside them.
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridnav import route as routes
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import no_progress
@@ -62,19 +62,19 @@ class MaxDistance(Method):
 
     def find(self, query: Query) -> Found:
         """Find the shortest path in the corridor; see `Method`."""
-        began = time.perf_counter()
+        began = clock()
         topology, search = self._topology, self.prepare()
         route = search.search(*map(topology.place_at, query.cells))
-        seconds = {"coarse": time.perf_counter() - began}
+        seconds = {"coarse": clock() - began}
         if route is None and topology.grid.corner_cutting:
             return self._over_whole_map(query, seconds)
         if route is None:
             return Found(None, stats=PlanStats(seconds=seconds))
         beside, enterable = self._settings.corridor, search.enterable
         corridor = routes.corridor_of(topology, route.places, beside=beside, enterable=enterable)
-        seconds["coarse"] = time.perf_counter() - began
+        seconds["coarse"] = clock() - began
         cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
-        seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
+        seconds["refine"] = clock() - began - seconds["coarse"]
         if cells is None and self._refiner.costs is not None:  # cells that the layer closes
             return self._over_whole_map(query, seconds)
         places, arcs = topology.place_ids[route.places], topology.arc_ids[route.arcs]

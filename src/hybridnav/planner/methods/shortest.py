@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.progress import no_progress
 from hybridnav._base.threads import Pool
@@ -149,22 +149,22 @@ class OverMesh(Method):
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
         answer is a cell path shortened by line of sight, with the proved bound.
         """
-        began = time.perf_counter()
+        began = clock()
         seconds = {}
         if self._search is None and self._budget_s is None:
             self._on_mesh()
-            seconds["mesh"] = time.perf_counter() - began
+            seconds["mesh"] = clock() - began
         start, goal = query.points
         ends = (*start.tolist(), *goal.tolist())
-        now = time.perf_counter()
+        now = clock()
         path, expanded = self._on_graph(query, query.positions or self._positions(query))
         if path.positions is not None:
             points, length_m = line_between(path.positions, ends, self._placing)
-            seconds["shortest"] = time.perf_counter() - now
+            seconds["shortest"] = clock() - now
             cells = partial(self._passed, query, path, seconds)
             stats = filled(PlanStats, expanded_intervals=expanded, seconds=seconds)
             return _along((points, length_m), path, cells, stats)
-        seconds["shortest"] = time.perf_counter() - now
+        seconds["shortest"] = clock() - now
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
         if math.isinf(path.lower_bound_cells):
             return Found(None, stats=stats)
@@ -191,7 +191,7 @@ class OverMesh(Method):
         if search is None:
             bound = math.dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
-        began, closed = time.perf_counter(), query.closed
+        began, closed = clock(), query.closed
         detours = None if closed is None else self._round(search, closed)
         effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
         if detours is not None and detours.is_ready:
@@ -206,7 +206,7 @@ class OverMesh(Method):
             bound = found.lower_bound_cells
             left_s = self._budget_s
             if left_s is not None:
-                left_s = max(left_s - (time.perf_counter() - began), 0.0)
+                left_s = max(left_s - (clock() - began), 0.0)
             found = detours.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
             expanded += found.expanded
             # Closed cells make no path shorter.
@@ -216,14 +216,14 @@ class OverMesh(Method):
 
     def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
         """Return the shortest path of cells, shortened by line of sight, with a proved bound."""
-        began = time.perf_counter()
+        began = clock()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
         points = None
         if found.cells is not None:
             sight = self._open_sight if flat is None else self._sight(flat)
             points = sight.shorten(found.cells, *query.points)
-        seconds = {**spent.seconds, "line-of-sight": time.perf_counter() - began}
+        seconds = {**spent.seconds, "line-of-sight": clock() - began}
         expanded = spent.expanded_intervals + found.expanded
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
         if points is None or found.cells is None:
@@ -296,9 +296,9 @@ class OverMesh(Method):
     def _passed(self, query: Query, path: MeshPath, seconds: dict[str, float]) -> LongArray:
         """Return the cells that a path passes, from start to goal, and add the time to its
         stage."""
-        now = time.perf_counter()
+        now = clock()
         passed = self._cells_along(query, path)
-        seconds["shortest"] += time.perf_counter() - now
+        seconds["shortest"] += clock() - now
         return passed
 
     def _cells_along(self, query: Query, path: MeshPath) -> LongArray:
