@@ -125,3 +125,19 @@ def test_there_are_notebooks() -> None:
 def test_notebook_is_kept_without_outputs(path: Path) -> None:
     cells = nbformat.read(path, as_version=4).cells
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_has_no_empty_cell_and_installs_nothing(path: Path) -> None:
+    cells = [cell.source for cell in nbformat.read(path, as_version=4).cells]
+    assert all(cell.strip() for cell in cells)
+    assert not any("pip install --quiet" in cell for cell in cells)
+    assert "docs/howto/install.md" in cells[0]
+
+
+def test_every_page_that_names_an_extra_points_to_the_one_on_installing() -> None:
+    for page in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]:
+        text = page.read_text(encoding="utf-8")
+        if page.name != "install.md":
+            assert "pip install hybridnav" not in text
+            assert "'hybridnav[" not in text or "install.md)" in text, page

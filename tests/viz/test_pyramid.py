@@ -86,6 +86,31 @@ def test_thin_lines_are_the_arcs_of_the_next_level_and_dashed_ones_are_gone(figu
         assert "removal kernel" not in labels(without)
 
 
+def test_arcs_of_a_small_step_have_numbers_and_axes_are_in_metres():
+    small = DualGraphPyramid.build(
+        hn.example_map("figure1", robot_radius_m=0.0), merge_distance_m=10.0, linkage="radius"
+    )
+    ax = plot_kernels(small, 6)
+    numbers = {text.get_text(): text for text in ax.texts if text.get_gid() == "arc-number"}
+    assert sorted(map(int, numbers)) == list(range(small[6].n_arcs))
+    assert ax.get_xlabel() == "x in metres"
+    assert len(ax.get_xticks()) > 2
+    assert not any(text.get_gid() == "arc-number" for text in plot_kernels(small, 4).texts)
+    # What the page on teaching says of the exercise.
+    kinds = small[6].classes[small[6].arcs[[2, 17]]]
+    assert (kinds[:, 0] != kinds[:, 1]).all()
+    gone = set(small.removal_kernel(6).tolist()) | set(small.contraction_kernel(6).tolist())
+    assert not gone & {2, 17}
+    island = int(small[6].field_of[small.grid.frame.cell_of(1.0, 1.4)])
+    of_island = np.flatnonzero((small[6].arcs == island).any(axis=1)).tolist()
+    assert len(of_island) == 4
+    assert gone & set(of_island) == {7, 13}
+    y = [small.grid.frame.points_of(small[6].boundary(arc).reshape(-1, 2))[:, 1] for arc in (2, 17)]
+    obstacle = np.argwhere(small[6].field_of[8:22, 16:30] < 0)[:, 0] + 8
+    assert y[0].max() < obstacle.min() * 0.1 + 0.1
+    assert y[1].min() > obstacle.max() * 0.1 - 0.1
+
+
 def test_nothing_becomes_of_the_apex(figure1):
     with pytest.raises(IndexError):
         plot_kernels(figure1, -1)

@@ -16,12 +16,12 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
-from hybridnav.viz.layout import add_title, finish, frame_axes, wrapped
+from hybridnav.viz.layout import add_title, finish_with_axes, frame_axes, wrapped
 from hybridnav.viz.places import Places
 from hybridnav.viz.topology import Graph, draw_graph, draw_ground, drawable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
 
@@ -133,6 +133,7 @@ def _panels(levels: Sequence[Level], columns: int, width_in: float) -> list[Axes
 # One step of a pyramid: contracted and removed arcs.
 
 
+_NUMBERED_UP_TO = 40
 _CLEARANCE = 2.4  # points on a picture of full width
 _CONTRACTED, _REMOVED, _KEPT = "contraction kernel", "removal kernel", "arc of the next level"
 _STROKES = {
@@ -156,7 +157,8 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
 
     Thick lines are contracted arcs: each is a spoke of a star, whose centre, a black dot, survives.
     Dashed arcs are redundant after that, and removed; thin ones are the arcs of the next level.
-    Each colour is the field of one vertex of the next level, a reduction window.
+    Each colour is the field of one vertex of the next level, a reduction window. Where there are at
+    most 40 arcs, each has its number in `pyramid[level].arcs`. Axes are in metres.
 
     Parameters
     ----------
@@ -211,6 +213,8 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
             zorder=3,
             gid=label.replace(" ", "-"),
         )
+        if lower.n_arcs <= _NUMBERED_UP_TO:
+            _number(canvas, {arc: curves[arc] for arc in arcs if arc in curves}, colour)
     cols = lower.grid.shape[1]
     survives = np.isin(lower.cells @ [cols, 1], upper.cells @ [cols, 1])
     _draw_dots(canvas, graph.positions, survives, lower.classes == CellClass.FREE)
@@ -221,7 +225,26 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
         *([f"{n_removed} removed"] if removed else []),
     ]
     entries = _entries(canvas, kinds, survives)
-    return finish(canvas, entries, words if title is None else [title], framed=True)
+    finish_with_axes(canvas, entries, words if title is None else [title])
+    return canvas.ax
+
+
+def _number(canvas: Canvas, curves: Mapping[int, FloatArray], colour: str) -> None:
+    """Write the number of each arc on the middle of its curve."""
+    for arc, curve in curves.items():
+        x, y = (curve[(len(curve) - 1) // 2] + curve[len(curve) // 2]) / 2
+        canvas.ax.text(
+            x,
+            y,
+            str(arc),
+            fontsize=0.9 * canvas.sizes.font,
+            color=colour,
+            ha="center",
+            va="center",
+            bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none"},
+            zorder=5,
+            gid="arc-number",
+        )
 
 
 def _kinds(pyramid: DualGraphPyramid, level: int, n_arcs: int) -> dict[str, BoolArray]:
