@@ -105,23 +105,32 @@ MAP = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("plan", MAP, "--start", "0.5,0.5", "--goal", "2.0,2.5", "--robot-radius", "0")
 
 
-def test_a_plan_by_clearance_prints_length_cost_and_bound(cli: Any) -> None:
-    answer = json.loads(cli(*QUERY, "--costs", "clearance:multiplier=4", "--json").out)
+def test_a_plan_by_clearance_is_one_of_robot_and_says_so(cli: Any) -> None:
+    costs = ("--costs", "clearance:multiplier=4")
+    answer = json.loads(cli(*QUERY, *costs, "--json").out)
     grid = hn.load_map(MAP, robot_radius_m=0)
-    layer = hn.CostLayer.clearance(grid, multiplier=4.0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
-    result = planner.plan((0.5, 0.5), (2.0, 2.5))
+    preset = hn.load_preset("robot", overrides=["planner.costs.clearance.multiplier=4"])
+    result = hn.HybridPlanner(topology, preset=preset).plan((0.5, 0.5), (2.0, 2.5))
     assert result.path is not None
-    assert answer["settings"]["costs"] == layer.source
-    assert answer["cost"] == answer["lower_bound"] == result.cost > answer["length_m"]
-    told = cli(*QUERY, "--costs", "clearance:multiplier=4").out.splitlines()
+    assert answer["settings"]["preset"] == "robot"
+    assert answer["settings"]["costs"] == hn.CostLayer.clearance(grid, multiplier=4.0).source
+    assert (answer["cost"], answer["lower_bound"]) == (result.cost, result.lower_bound)
+    told = cli(*QUERY, *costs).out.splitlines()
+    assert "preset     robot, which plans by costs" in told
     assert f"length     {result.path.length_m:.2f} m" in told
-    assert f"cost       {result.cost:.2f} m (weighted)" in told
-    assert f"bound      {result.cost:.2f} m, the path is optimal" in told
-    taut = cli(*QUERY, "--costs", "clearance", "--smooth", "line-of-sight").out
-    assert "(any-angle-weighted)" in taut
-    assert "% too dear" in taut
+    assert f"cost       {result.cost:.2f} m (any-angle-weighted)" in told
+    # The cheapest path of cells, which is optimal among these alone.
+    cells = json.loads(cli(*QUERY, *costs, "--preset", "grid-astar", "--json").out)
+    assert cells["metric"] == "weighted"
+    assert answer["cost"] <= cells["cost"] == cells["lower_bound"]
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile", "paper"])
+def test_every_answer_names_its_preset(cli: Any, preset: str) -> None:
+    for query in (QUERY, (*QUERY[:2], "--start", "0.5,0.5", "--goal", "9,9")):
+        assert f"\npreset     {preset}\n" in cli(*query, "--preset", preset).out
+    assert "\npreset     shortest\n" in cli(*QUERY).out
 
 
 def test_the_corridor_is_compared_with_the_cheapest_path(cli: Any) -> None:
@@ -143,12 +152,13 @@ def test_masks_are_read_and_joined(cli: Any, tmp_path: Path) -> None:
             f"{{image: {name}.pgm, resolution: {max(rows, cols) * 0.1}, origin: [0, 0, 0], "
             "negate: 0, mode: raw, free_thresh: 0.196, occupied_thresh: 0.65}"
         )
-    slow = json.loads(cli(*QUERY, "--costs", f"speed:{tmp_path / 'slow.yaml'}", "--json").out)
+    query = (*QUERY, "--preset", "grid-astar")
+    slow = json.loads(cli(*query, "--costs", f"speed:{tmp_path / 'slow.yaml'}", "--json").out)
     assert slow["cost"] == pytest.approx(2 * slow["length_m"])
     base = f"speed:{tmp_path / 'slow.yaml'},base=90,multiplier=-1.3"
-    slower = json.loads(cli(*QUERY, "--costs", base, "--costs", "clearance", "--json").out)
+    slower = json.loads(cli(*query, "--costs", base, "--costs", "clearance", "--json").out)
     assert slower["cost"] == pytest.approx(4 * slower["length_m"], rel=1e-3)
-    shut = cli(*QUERY, "--costs", f"keepout:{tmp_path / 'shut.yaml'}", "--json")
+    shut = cli(*query, "--costs", f"keepout:{tmp_path / 'shut.yaml'}", "--json")
     assert shut.code == 1
     assert json.loads(shut.out)["status"] == "start blocked"
 

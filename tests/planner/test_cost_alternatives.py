@@ -144,7 +144,7 @@ def test_the_command_prints_alternatives_by_costs(cli: Any, tmp_path: Any) -> No
         "8.5,4.5",
     )
     options = (*query, "--to", "22.5,4.5", "--costs", "clearance:inflation_radius_m=2,multiplier=5")
-    options = (*options, "--alternatives", "3")
+    options = (*options, "--alternatives", "3", "--preset", "grid-astar")
     options = (*options, "--max-stretch", "4")
     found = json.loads(cli(*options, "--json").out)["alternatives"]
     costs = [other["cost"] for other in found]

@@ -178,7 +178,7 @@ CostsOption = Annotated[
     ),
 ]
 
-PRESET = "grid-astar"
+PRESET = "robot"
 """The preset that plans by costs unless another is named."""
 
 

@@ -129,6 +129,16 @@ WhyOption = Annotated[
     ),
 ]
 
+WithinOption = Annotated[
+    float | None,
+    typer.Option(
+        "--within",
+        metavar="M",
+        help="If the goal cannot be reached, plan to the nearest point that can, at most so many "
+        "metres from it.",
+    ),
+]
+
 
 @with_map(
     before="compare",
@@ -143,6 +153,7 @@ def plan(
     to: ToOption = None,
     via: ViaOption = None,
     at: AtOption = "anywhere",
+    within: WithinOption = None,
     rooms_file: options.RoomsOption = None,
     alternatives: AlternativesOption = 1,
     max_overlap: OverlapOption = None,
@@ -168,7 +179,8 @@ def plan(
     Without --rooms, rooms are those of rooms.yaml beside the map, if there. Things that `hybridnav
     closed` has closed stay closed.
 
-    Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
+    Exits with 0 when it is solved, or ends within --within of the goal, 1 when it is not, 2 on
+    wrong usage, 3 on unreadable input.
     """
     del no_stairs  # of a building
     _check_files(plot, poses, bag)
@@ -194,6 +206,7 @@ def plan(
         costs=given,
         rooms_file=rooms_file,
         at=where,
+        within_m=within,
         wanted=wanted,
         compare=compare,
         why=why,
@@ -229,6 +242,10 @@ def _check_fits(request: Request) -> None:
             )
     if request.proof is not None and len(request.waypoints) > 2:  # noqa: PLR2004 - start and goal
         raise UsageError("--proof is of a path without --via: leave one out")
+    if request.within_m is not None and not request.within_m >= 0:
+        raise UsageError(f"--within must be metres, 0 or more, got {request.within_m:g}")
+    if request.is_tour and request.within_m is not None:
+        raise UsageError("--within goes with --start and --goal alone, and files as --blocked")
     if request.is_tour and request.compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
 

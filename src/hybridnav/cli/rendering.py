@@ -75,6 +75,7 @@ def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict
         f"query      {printable(grid.name)}, {query_of(waypoints)}, {radius}",
         *closing_lines(figures),
         *profile_lines(figures["settings"].get("profile")),
+        preset_line(figures["settings"]["preset"], chosen=figures.get("by_costs", False)),
         f"status     {figures['status']}",
         *islands_line(grid),
     ]
@@ -85,6 +86,11 @@ def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict
     lines += _tour_lines(figures) if "words" in figures else _plan_lines(figures)
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
+
+
+def preset_line(name: str, *, chosen: bool = False) -> str:
+    """Return the line of a summary about the preset; `chosen`: whether costs have chosen it."""
+    return f"preset     {printable(name)}{', which plans by costs' if chosen else ''}"
 
 
 def _plan_lines(figures: dict[str, Any]) -> list[str]:
@@ -105,6 +111,9 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
         stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
+        if figures["short_m"]:
+            far = f"{figures['short_m']:.2f} m"
+            lines.append(f"short      {far} of the goal, at the nearest point that can be reached")
         if figures["grid_bound"] is not None:
             lines.append(_beside_cells(figures["grid_bound"], figures["grid_gap"]))
     if figures["steps"] is not None:

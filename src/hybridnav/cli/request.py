@@ -53,6 +53,7 @@ class Request:
     costs: Costs
     rooms_file: Path | None
     at: At
+    within_m: float | None
     wanted: Wanted
     compare: bool
     why: bool
@@ -85,7 +86,7 @@ class Request:
         check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
         closed, costs = self.closing.read(grid), self.costs.read(grid)
         status = outside(grid, self.waypoints) if self.plot is None else None
-        if status is not None:
+        if status is not None and (self.within_m is None or "goal" not in status):
             refused = refused_result(status, settings, self.waypoints)
             outcome = hn.Tour((refused,), ()) if self.is_tour else refused
             self._respond(grid, outcome, self._beside_refusal(refused), seconds)
@@ -124,7 +125,7 @@ class Request:
                 costs=planner.costs,
                 blocked=closed,
             )
-        return outcome.solved
+        return outcome.solved or (isinstance(outcome, hn.PlanResult) and outcome.ends_well)
 
     def _grown(self, model: hn.Model, seconds: dict[str, float]) -> hn.TopologicalMap:
         """Build the pyramid, with rooms for a tour, while the search is compiled.
@@ -159,7 +160,7 @@ class Request:
         spent: dict[str, float] = {}
         with stage("planning", spent, "plan"):
             if not self.is_tour:  # the result has the seconds of its stages
-                return planner.plan(*self.waypoints, blocked=closed)
+                return planner.plan(*self.waypoints, blocked=closed, within_m=self.within_m)
             tour = hn.plan_tour(planner, self.waypoints, at=self.at, blocked=closed)
         counted = sum(sum(result.stats.seconds.values()) for result in tour.results)
         seconds["plan"] = round(max(spent["plan"] - counted, 0.0), 6)  # what no stage counts
@@ -236,7 +237,8 @@ class Request:
         beside: dict[str, Any],
         seconds: dict[str, float],
     ) -> None:
-        figures = outcome.to_dict() | {"map": str(self.map_file)}
+        by_costs = bool(self.costs) and self.reading.preset is None
+        figures = outcome.to_dict() | {"map": str(self.map_file), "by_costs": by_costs}
         if not isinstance(outcome, hn.PlanResult):  # `hn.Tour` would load the words
             figures["words"] = outcome.words(self.language)
         islands, closed = islands_figures(grid), self.closing.to_dict()

@@ -220,6 +220,7 @@ class HybridPlanner(Questions):
         blocked: Closable | ClosedCells | None = None,
         at: At = "anywhere",
         keep: PlanResult | None = None,
+        within_m: float | None = None,
     ) -> PlanResult:
         """Plan a path between two points, or rooms.
 
@@ -248,6 +249,10 @@ class HybridPlanner(Questions):
             With method `cheapest`: an earlier result, on whose path the robot stays. From `start`
             beside it, its rest is returned, while no cell of it is closed and it costs little more
             than a new path: 2 %, or `keep_within` of the preset. For another goal nothing is kept.
+        within_m
+            Where the goal cannot be reached, plan to the nearest point that can be, if it lies at
+            most so many metres from the goal, by the crow. The status is then `near the goal`,
+            `short_m` is the distance, and cost and bound are those of that point. Not with OMPL.
 
         Returns
         -------
@@ -263,8 +268,11 @@ class HybridPlanner(Questions):
         """
         with self._query():
             now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
-            result = now.plan(now.read(start, goal, smooth, closed, at, keep))
-        if result.path is None:
+            request = now.read(start, goal, smooth, closed, at, keep)
+            result = now.plan(request)
+            if within_m is not None:
+                result = now.near(request, result, within_m)
+        if not result.solved and (result.path is None or result.ends_well):
             ends = result.start, result.goal
             result = replace(result, why_source=partial(explained, now, ends, closed))
         return result if own is None else own.stated(result, (start, goal), blocked)

@@ -27,6 +27,7 @@ from hybridnav.planner.endpoints import (
     read_end,
     refusal,
 )
+from hybridnav.planner.nearest import check_within, nearest_reachable
 from hybridnav.planner.path import path_of
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
@@ -218,6 +219,31 @@ class Planning:
         if isinstance(query, PlanStatus):
             return self._answer(query, request)
         return self.result(request, query, self.method.find(query))
+
+    def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
+        """Return a result, or where its goal cannot be reached one to the nearest point that can
+        be; see `HybridPlanner.plan`."""
+        check_within(within_m)
+        if self.ompl is not None:
+            raise InvalidValueError(
+                f"within_m goes with presets without OMPL, and {self.preset.name} has it: take "
+                "another preset, or leave it out"
+            )
+        if result.path is not None or result.status.value.startswith("start"):
+            return result
+        shut = self.closed_for_all(request.closed)
+        is_open = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
+        if shut is not None:
+            is_open.ravel()[shut.flat] = False
+        first, last = request.poses
+        point = nearest_reachable(
+            self.grid, is_open, first[:2].tolist(), last[:2].tolist(), within_m
+        )
+        if point is None:
+            return result
+        poses = first, np.array([*point, *last[2:]])
+        found = self.plan(request._replace(poses=poses, goal=point, kept=None))
+        return replace(found, status=PlanStatus.NEAR_GOAL, goal=tuple(last.tolist()))
 
     def draft(self, request: PlanRequest) -> PlanDraft:
         """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""

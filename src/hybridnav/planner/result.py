@@ -56,6 +56,9 @@ class PlanStatus(str, Enum):
     NO_PATH = "no path"
     APPROXIMATE = "approximate"
     """A sampling-based planner came near the goal but did not reach it."""
+    NEAR_GOAL = "near the goal"
+    """The goal cannot be reached, and the path ends at the nearest point that can be, as asked for
+    by `within_m`."""
     TIMEOUT = "timeout"
     """A sampling-based planner found nothing in its time."""
 
@@ -225,7 +228,7 @@ class PlanResult:
 
     @property
     def reason(self) -> str:
-        """Why there is no path, in one line: see `HybridPlanner.explain`; empty with a path."""
+        """Why the goal is not reached, in one line: see `HybridPlanner.explain`; empty if it is."""
         return "" if self.explanation is None else self.explanation.reason
 
     def words(self, language: str = "en") -> list[str]:
@@ -252,16 +255,22 @@ class PlanResult:
         return self.status is PlanStatus.SOLVED
 
     @property
+    def ends_well(self) -> bool:
+        """Whether there is a path to the goal or, by `within_m`, to the point nearest to it."""
+        return self.status in {PlanStatus.SOLVED, PlanStatus.NEAR_GOAL}
+
+    @property
     def cost(self) -> float:
-        """Cost in the metric, metres; infinite where there is no path to the goal."""
-        if self.path is None or not self.solved:
+        """Cost in the metric, metres; infinite where there is no path to the goal. Near the goal,
+        this and the bound are those of the point at which the path ends."""
+        if self.path is None or not self.ends_well:
             return math.inf
         return self.path.length_m if self.weighted_cost is None else self.weighted_cost
 
     @property
     def gap(self) -> float:
         """Proved distance from the optimum, cost / lower bound - 1; NaN where there is no path."""
-        if self.path is None or not self.solved:
+        if self.path is None or not self.ends_well:
             return math.nan
         return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
 
@@ -273,16 +282,26 @@ class PlanResult:
             return math.nan
         return self.cost / self.grid_bound - 1 if self.grid_bound > 0 else 0.0
 
+    @property
+    def short_m(self) -> float:
+        """Metres from the end of the path to the goal, for `near the goal`; 0 if it is solved,
+        infinite without a path."""
+        if self.solved:
+            return 0.0
+        if self.path is None or self.goal is None:
+            return math.inf
+        return math.dist(self.path.points[-1], self.goal[:2])
+
     def raise_for_status(self) -> Self:
-        """Return the result itself if it is solved.
+        """Return the result itself if it is solved, or near the goal as asked for.
 
         Raises
         ------
         PlanError
-            When the result is not solved; the text names the status.
+            When the result is not solved; the text has the status and the reason.
         """
-        if not self.solved:
-            raise PlanError(f"no path was planned: {self.status}")
+        if not self.ends_well:
+            raise PlanError(f"no path was planned: {self.status}. {self.reason}".rstrip(". "))
         return self
 
     def proof(self) -> dict[str, Any]:
@@ -328,9 +347,10 @@ class PlanResult:
             "goal": None if self.goal is None else list(self.goal),
             "length_m": self.path.length_m if self.path else None,
             "duration_s": self.duration_s,
-            "cost": self.cost if self.solved else None,
-            "lower_bound": self.lower_bound if self.solved else None,
-            "gap": self.gap if self.solved else None,
+            "short_m": self.short_m if self.ends_well else None,
+            "cost": self.cost if self.ends_well else None,
+            "lower_bound": self.lower_bound if self.ends_well else None,
+            "gap": self.gap if self.ends_well else None,
             "grid_bound": self.grid_bound,
             "grid_gap": self.grid_gap if self.grid_bound is not None else None,
             "places": list(self.route.places) if self.route else None,

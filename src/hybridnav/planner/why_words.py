@@ -76,7 +76,7 @@ _TABLES = {
         "goal": "the goal",
         "outside": "{End} lies outside the map.",
         "occupied": "{End} lies in an obstacle.",
-        "near": "{End} lies {clear} m from an obstacle: a radius of {radius} m does not fit there.",
+        "near": "{End} lies {clear} m from an obstacle: a radius of {radius} m needs more.",
         "island": "{End} lies in an island of the map that is left out.",
         "unexplored": "{End} lies in unexplored cells.",
         "blocked": "{End} is closed by {closures}.",
@@ -115,8 +115,7 @@ _TABLES = {
         "goal": "das Ziel",
         "outside": "{End} liegt außerhalb der Karte.",
         "occupied": "{End} liegt in einem Hindernis.",
-        "near": "{End} liegt {clear} m von einem Hindernis: Ein Radius von {radius} m passt dort "
-        "nicht hin.",
+        "near": "{End} liegt {clear} m von einem Hindernis: Radius {radius} m braucht mehr.",
         "island": "{End} liegt in einer Insel der Karte, die ausgelassen ist.",
         "unexplored": "{End} liegt in unerforschten Zellen.",
         "blocked": "{End} ist gesperrt durch {closures}.",

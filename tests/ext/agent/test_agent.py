@@ -225,6 +225,24 @@ def test_lists_come_as_text_and_one_thing_without_a_list(tmp_path):
     assert both == {"doors": [door], "rooms": [goal]}
 
 
+def test_a_route_ends_near_a_goal_that_cannot_be_reached(tmp_path):
+    floor = PaintedFloor(2)
+    answers = MapAnswers(session_of(floor, tmp_path))
+    ask = asker(answers)
+    start = floor.inner_point()[0]
+    goal = [-0.5, 1.5]  # beside the map, whose wall is a cell thick; the robot keeps 0.2 m off it
+    assert "short_m" not in ask("route", start=start, goal=goal)
+    assert "short_m" not in ask("route", start=start, goal=goal, within=0.6)
+    found = ask("route", start=start, goal=goal, within=1.5, points=True)
+    assert found["status"] == "near the goal"
+    assert found["short_m"] == pytest.approx(np.hypot(*np.subtract(found["goal"], goal)), abs=2e-3)
+    assert 0.6 < found["short_m"] <= 1.5
+    assert found["lower_bound_m"] <= found["length_m"] + 1e-3
+    assert found["points"][-1] == found["goal"]
+    assert "outside the map" in found["text"]
+    assert ask("route", start=start, goal=start, within=1)["status"] == "solved"
+
+
 def test_a_mistake_is_answered_in_words(tmp_path):
     floor = PaintedFloor(2)
     answers = MapAnswers(session_of(floor, tmp_path))

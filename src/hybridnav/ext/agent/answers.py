@@ -220,7 +220,8 @@ class MapAnswers:
     def _route(self, asked: ask.RouteBetween) -> dict[str, Any]:
         planner, tour = self._tour(asked)
         if not tour.solved:
-            return self._no_path(planner, tour, asked, asked.language)
+            refused = self._no_path(planner, tour, asked, asked.language)
+            return refused | self._near(planner, tour, asked)
         length, bound = round(tour.length_m, 3), math.floor(tour.lower_bound * 1000) / 1000
         doors = [leg.door.number for leg in tour.legs if leg.door is not None]
         answer: dict[str, Any] = {
@@ -242,6 +243,30 @@ class MapAnswers:
         if asked.points and path is not None:
             answer["points"] = path.points[:_MOST_POINTS].round(3).tolist()
         return answer
+
+    def _near(self, planner: HybridPlanner, tour: Tour, asked: ask.RouteBetween) -> dict[str, Any]:
+        """Return a route to the nearest point that can be reached, if it is wanted and near."""
+        if asked.within is None or tour.start is None or tour.goal is None:
+            return {}
+        shut = self._shut(asked.avoiding)
+        found = planner.plan(tour.start, tour.goal, blocked=shut, within_m=asked.within)
+        if found.path is None:
+            return {}
+        bound = math.floor(found.lower_bound * 1000) / 1000
+        points = found.path.points
+        answer = {
+            "text": f"{found.reason} The nearest point that can be reached lies "
+            f"{found.short_m:.2f} m from the goal; {found.cost:.2f} m to it.",
+            "status": str(found.status),
+            "length_m": round(found.cost, 3),
+            "lower_bound_m": bound,
+            "short_m": round(found.short_m, 3),
+            "start": places.rounded(found.start),
+            "goal": places.rounded(tuple(points[-1].tolist())),
+        }
+        return answer | (
+            {"points": points[:_MOST_POINTS].round(3).tolist()} if asked.points else {}
+        )
 
     def _no_path(
         self, planner: HybridPlanner, tour: Tour, asked: ask.Journey, language: str

@@ -129,6 +129,8 @@ class RouteBetween(Journey):
     """Lines to leave out, for the rest of a long description."""
     points: bool = False
     """Whether the points of the path are wanted too, at most 200."""
+    within: Annotated[float, _NUMBER, Field(ge=0, le=_FAR_M)] | None = None
+    """Metres from the goal at which a path may end, if the goal cannot be reached."""
     language: Language = "en"
 
 
@@ -300,6 +302,8 @@ class RouteAnswer(WhyAnswer):
     lower_bound_m: float | None = None
     """No path is shorter."""
     gap: float | None = None
+    short_m: float | None = None
+    """Metres from the end of the path to the goal, if it cannot be reached."""
     start: list[float] | None = None
     goal: list[float] | None = None
     rooms: list[str] | None = None

@@ -16,7 +16,7 @@ from hybridnav.cli.closed import change_closed, list_closed
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import MapOptions, check_model, read_settings
-from hybridnav.cli.rendering import in_metric, rounded_bound
+from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
@@ -93,6 +93,7 @@ def plan_over_floors(
             plans = others = building.alternatives(first, last, alternatives, **how)
     figures = plans[0].to_dict() | {
         "building": str(map_file),
+        "preset": _preset_of(building, plans[0]),
         "words": plans[0].words(language),
         "query": f"{typed[0]} to {typed[1]}",
         "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
@@ -118,6 +119,13 @@ def plan_over_floors(
         save_figure(plot_building(building, plans)[0], plot)
     if not plans[0].solved:
         raise typer.Exit(common.EXIT_NOT_SOLVED)
+
+
+def _preset_of(building: hn.ext.fleet.Building, plan: hn.ext.fleet.BuildingPlan) -> str:
+    """Return the name of the preset that a plan is by, which a profile may have chosen."""
+    for result in plan.results:
+        return str(result.settings["preset"])
+    return building.floors[0].planner.preset.name
 
 
 def _typed(option: str, point: Any, other: str, text: str | None) -> str:
@@ -161,7 +169,7 @@ def _summary(file: Path, building: hn.ext.fleet.Building, figures: dict[str, Any
     if "profile" in figures:
         stated = {"name": figures["profile"], "asks": figures["asks"], "forbids": figures["note"]}
         lines += profile_lines(stated)
-    lines.append(f"status     {figures['status']}")
+    lines += [preset_line(figures["preset"]), f"status     {figures['status']}"]
     if figures["cost"] is not None:
         lines += _route_lines(figures)
     for number, line in enumerate(figures["words"]):

@@ -1,0 +1,61 @@
+"""The nearest point to a goal that a robot can reach."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError, brief
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._base.typing import BoolArray
+    from hybridnav.maps import OccupancyGrid
+
+_INSIDE = 1e-6
+"""Cells that the point lies inside its cell, so that rounding takes it into no other."""
+
+
+def check_within(within_m: float) -> None:
+    """Refuse a distance that is no number of metres."""
+    is_number = isinstance(within_m, int | float | np.number) and not isinstance(within_m, bool)
+    if not is_number or not within_m >= 0:
+        raise InvalidValueError(f"within_m must be metres, 0 or more, got {brief(within_m)}")
+
+
+def nearest_reachable(
+    grid: OccupancyGrid,
+    is_open: BoolArray,
+    start: Sequence[float],
+    goal: Sequence[float],
+    within_m: float,
+) -> tuple[float, float] | None:
+    """Find the point nearest to a goal, by the crow, in the free space that a start can reach.
+
+    `grid`: the map; `is_open`: bool (rows, cols), the cells that may be entered, that of the start
+    among them; `start`, `goal`: `(x, y)` in metres, map frame, the goal maybe off the map;
+    `within_m`: the farthest it may lie from the goal. Returns `(x, y)` in metres, or None.
+    """
+    from scipy import ndimage  # noqa: PLC0415 - plans to reachable goals need none of it
+
+    at = np.array(grid.frame.position_of(goal[0], goal[1]))
+    reach = min(within_m / grid.resolution_m, math.hypot(*grid.shape) + float(np.abs(at).max()))
+    low = np.clip(np.floor(at - reach) - 1, 0, grid.shape).astype(np.int64)
+    high = np.clip(np.ceil(at + reach) + 1, 0, grid.shape).astype(np.int64)
+    if not (low < high).all():
+        return None
+    # The moves of planners: a diagonal needs both its side cells, unless corners may be cut.
+    labels, _ = ndimage.label(is_open, np.ones((3, 3)) if grid.corner_cutting else None)
+    here = labels[grid.frame.cell_of(start[0], start[1])]
+    cells = low + np.argwhere(labels[low[0] : high[0], low[1] : high[1]] == here)
+    nearest = np.clip(at, cells + _INSIDE, cells + 1 - _INSIDE)
+    apart = nearest - at
+    squared = (apart * apart).sum(axis=1)
+    # Of equal distances the first in the order of rows.
+    if not len(cells) or squared.min() > (reach + _INSIDE) ** 2:
+        return None
+    x, y = grid.frame.points_of_grid(nearest[squared.argmin()]).tolist()
+    return x, y
