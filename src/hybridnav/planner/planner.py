@@ -246,9 +246,10 @@ class HybridPlanner(Questions):
             Position in a named room: `"anywhere"`, at the cells that make the cell path shortest,
             or at its `"point"`.
         keep
-            With method `cheapest`: an earlier result, on whose path the robot stays. From `start`
-            beside it, its rest is returned, while no cell of it is closed and it costs little more
-            than a new path: 2 %, or `keep_within` of the preset. For another goal nothing is kept.
+            With methods `cheapest`, `shortest` and `octile`: an earlier result, on whose path the
+            robot stays. From `start` beside it, its rest is returned, while no cell of it is closed
+            and it costs little more than a new path: 2 %, or `keep_within` of `cheapest`. For
+            another goal nothing is kept.
         within_m
             Where the goal cannot be reached, plan to the nearest point that can be, if it lies at
             most so many metres from the goal, by the crow. The status is then `near the goal`,
@@ -263,8 +264,8 @@ class HybridPlanner(Questions):
         ------
         InvalidValueError
             When a point is not two or three finite numbers, a name is not known, or a closed item
-            is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or `keep`
-            is given to another method than `cheapest`.
+            is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or
+            another method is given `keep`.
         """
         with self._query():
             now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy

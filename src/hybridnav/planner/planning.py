@@ -47,12 +47,17 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.methods.ompl import OmplPlanner
     from hybridnav.planner.named import At
+    from hybridnav.refine import CostLine
     from hybridnav.search.found import Found, Method
     from hybridnav.topology import TopologicalMap
 
 Smooth = Literal["none", "line-of-sight", "arcs"]
 _SMOOTH = get_args(Smooth)
 
+_KEEPING = ("cheapest", "shortest", "octile")
+"""Methods whose paths may stay on earlier ones."""
+_KEEP_WITHIN = 0.02
+"""Share by which a kept path may be longer than a shortest one; `keep_within` of `cheapest`."""
 _KEPT = 16
 """Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
 
@@ -111,14 +116,24 @@ class Planning:
     def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
         """Return the line of a result, None if it ends elsewhere or there is none."""
         planner, name = self.preset.planner, self.preset.name
-        if planner.method != "cheapest":
-            raise InvalidValueError(f"keep goes with presets of method cheapest, and {name} is not")
+        if self.ompl is not None or planner.method not in _KEEPING:
+            known = ", ".join(_KEEPING)
+            raise InvalidValueError(
+                f"keep goes with presets of methods {known} without OMPL, and {name} is none: "
+                "take one of these, or leave it out"
+            )
         points, path = checked_type("keep", keep, PlanResult).line, keep.path
+        within = getattr(planner, "keep_within", _KEEP_WITHIN)
+        if planner.method == "octile":
+            cells = None if path is None else path.cells
+            if cells is None or tuple(cells[-1].tolist()) != self.grid.frame.cell_of(*goal[:2]):
+                return None
+            return KeptLine(self.grid.frame.points_of(cells), within, cells)
         if points is None and path is not None and not path.is_curved:
             points = path.points
         if points is None or len(points) == 1 or not np.array_equal(points[-1], goal[:2]):
             return None
-        return KeptLine(points, planner.keep_within)
+        return KeptLine(points, within)
 
     @property
     def needs_headings(self) -> bool:
@@ -218,7 +233,23 @@ class Planning:
         query = self.query(request)
         if isinstance(query, PlanStatus):
             return self._answer(query, request)
-        return self.result(request, query, self.method.find(query))
+        found = self.method.find(query)
+        if query.kept is not None and found.has_path and self.preset.planner.method != "cheapest":
+            from hybridnav.planner.keeping import staying  # noqa: PLC0415 - loads the lattice
+
+            line = self._open if query.closed is None else self._open.closing(query.closed.flat)
+            found = staying(self.grid, line, query, found)
+        return self.result(request, query, found)
+
+    @cached_property
+    def _open(self) -> CostLine:
+        """The cells that may be entered, for paths by lengths that stay on earlier ones."""
+        from hybridnav.maps.costs import CostLayer  # noqa: PLC0415 - most queries keep nothing
+        from hybridnav.refine import CostLine  # noqa: PLC0415
+
+        layer = CostLayer(np.ones(self.grid.shape, np.float32))
+        allowed = self.preset.planner.allow_unexplored
+        return CostLine(self.grid, layer, allow_unexplored=allowed)
 
     def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
         """Return a result, or where its goal cannot be reached one to the nearest point that can

@@ -96,6 +96,8 @@ class KeptLine(NamedTuple):
     """float64 (n, 2), n >= 2, `(x, y)` in metres, map frame, to the goal."""
     within: float
     """Most that it may cost more, as a part of the cost of the other."""
+    cells: LongArray | None = None
+    """int64 (n, 2), the cells of a path of cells, (row, col); None of others."""
 
 
 class Query(NamedTuple):
@@ -108,7 +110,7 @@ class Query(NamedTuple):
     closed: ClosedCells | None = None
     """Closed cells, not including start and goal; None for none."""
     kept: KeptLine | None = None
-    """The line to stay on, for method `cheapest`; None for none."""
+    """The line to stay on; None for none."""
     positions: tuple[Position, Position] | None = None
     """The points as (row, col) in grid units; None where nobody has found them yet."""
 

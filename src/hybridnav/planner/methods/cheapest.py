@@ -135,7 +135,7 @@ class OverLattice(Method):
             most_m = (1 + query.kept.within) * self._cost_m(query, points)
             rest = line.rest_of(query.kept.points, query.points[0], most_m)
             points = points if rest is None else rest
-        passed = partial(self._passed, query, line, points)
+        passed = partial(cells_passed, query, line, points)
         cost = partial(self._cost_m, query, points)
         return Found(passed, cost, query.straight_m, points, stats=stats)
 
@@ -152,17 +152,6 @@ class OverLattice(Method):
         )
         return row, col
 
-    def _passed(self, query: Query, line: CostLine, points: FloatArray) -> LongArray:
-        """Return the cells that a path passes, from start to goal."""
-        passed = cells_of_line(line.free.view(np.bool_), line.on_grain(points))
-        # For an end on a side, the cell behind the side may be listed.
-        parts = [passed]
-        if tuple(passed[0].tolist()) != query.cells[0]:
-            parts.insert(0, np.array([query.cells[0]]))
-        if tuple(passed[-1].tolist()) != query.cells[1]:
-            parts.append(np.array([query.cells[1]]))
-        return passed if len(parts) == 1 else np.concatenate(parts)
-
     def _round(self, closed: ClosedCells) -> tuple[LatticeSearch, CostLine]:
         """Return the search and the finisher round closed cells, which are cached."""
         # By identity: `Planning.closed` returns the same object for equal closures.
@@ -175,3 +164,15 @@ class OverLattice(Method):
             for old in list(self._around)[:-_KEPT]:
                 self._around.pop(old, None)
         return found
+
+
+def cells_passed(query: Query, line: CostLine, points: FloatArray) -> LongArray:
+    """Return the cells that a line passes, from start to goal."""
+    passed = cells_of_line(line.free.view(np.bool_), line.on_grain(points))
+    # For an end on a side, the cell behind the side may be listed.
+    parts = [passed]
+    if tuple(passed[0].tolist()) != query.cells[0]:
+        parts.insert(0, np.array([query.cells[0]]))
+    if tuple(passed[-1].tolist()) != query.cells[1]:
+        parts.append(np.array([query.cells[1]]))
+    return passed if len(parts) == 1 else np.concatenate(parts)
