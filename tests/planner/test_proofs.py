@@ -67,6 +67,41 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
     assert planted | ({"forged bound"} if preset != "robot" else set()) <= kinds.keys()
 
 
+@pytest.mark.parametrize("preset", PRESETS)
+def test_ends_on_the_corners_of_cells_beside_walls_are_proved(preset):
+    """Round numbers of metres are a rounding error off the sides of cells, on either side."""
+    rng = np.random.default_rng(7)
+    below = 0
+    for _ in range(examples(6)):
+        turned = random_grid(rng)
+        grid = hn.OccupancyGrid(turned.probability, hn.Frame(0.05), robot_radius_m=0)
+        free = grid.enterable()
+        # Not between two blocked cells that meet there, with free ones on both sides.
+        walled = ~(np.roll(free, 1, 0) | np.roll(free, 1, 1) | np.roll(free, (1, 1), (0, 1)))
+        cells = np.argwhere(free & walled)
+        planner = planner_of(grid, preset)
+        for pair in rng.choice(len(cells), (8, 2)):
+            ends = np.round(cells[pair][:, ::-1] * 0.05, 2)
+            below += int((grid.frame.positions_of(ends) < cells[pair]).any())
+            proof = planner.plan(*ends).proof()
+            assert check_proof.check(grid.measured, frame_of(grid), proof)
+            assert proof.get("bound", 0) <= proof.get("cost", 0)
+    assert below
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_bound_above_the_cost_is_no_proof(preset):
+    grid = hn.OccupancyGrid(np.zeros((9, 9), np.float32), hn.Frame(0.5), robot_radius_m=0)
+    result = planner_of(grid, preset).plan((0.75, 0.75), (3.25, 2.25))
+    assert result.proof()["bound"] <= result.cost
+    vars(result)["lower_bound"] = 2 * result.cost
+    if preset == "robot":  # its proof finds a bound of its own
+        assert result.proof()["bound"] <= result.cost
+    else:
+        with pytest.raises(PlanError, match="a proof has the bound"):
+            result.proof()
+
+
 def forged(proof, grid, rng):
     """Return a proof of a bound that is too high, with a longer path and other heights."""
     more = float(rng.choice([1e-6, 1e-3, 0.1, 1.0]))

@@ -60,7 +60,13 @@ def proof_of(
             "weighted, any-angle or any-angle-weighted that OMPL did not change"
         )
     problem = _Problem(result, grid, costs, closed)
-    return problem.stated | make(problem)
+    proof = problem.stated | make(problem)
+    if proof.get("bound", 0.0) > proof.get("cost", 0.0) * (1 + 1e-9):
+        raise PlanError(
+            f"a proof has the bound {proof['bound']:.6f} m, expected at most the cost of the path, "
+            f"{proof['cost']:.6f} m: no path is cheaper than the cheapest, so please report this"
+        )
+    return proof
 
 
 @dataclass(frozen=True)
@@ -159,7 +165,10 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     points = result.path.points if result.line is None else result.line
     if result.line is None and result.path.is_curved:
         raise PlanError("no proof is known of arcs along cells: take smooth='line-of-sight'")
-    line = _distinct(problem.grid.frame.positions_of(points))
+    line, cells = problem.grid.frame.positions_of(points), result.path.cells[[0, -1]]
+    # An end on a side may lie a rounding error beyond it, where another cell is blocked.
+    line[[0, -1]] = np.clip(line[[0, -1]], cells, cells + 1)
+    line = _distinct(line)
     walls = np.pad(~problem.free, 1, constant_values=True)
     units = np.pad(layer.units, 1, constant_values=ONE)
     cost = cost_of(walls, units, line + 1, False) * per_cell
@@ -169,8 +178,8 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     joins = joins_of(units, line[[0, -1]] + 1, corners + 1)
     known = cost / per_cell + joins
     grid = grid_near(problem.free, problem.units, corners, known * _RATIO)
-    ends, cells = line[[0, -1]].tolist(), result.path.cells[[0, -1]].tolist()
-    given = problem.free, layer.factors, ends, cells, cost / per_cell
+    ends = line[[0, -1]].tolist()
+    given = problem.free, layer.factors, ends, cells.tolist(), cost / per_cell
     proof, least = moves_of_king(grid, math.floor(known * UNIT), given)
     bound = max(least / UNIT - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
     return {
