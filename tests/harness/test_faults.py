@@ -231,8 +231,9 @@ def test_counter_examples_are_in_all_that_is_written(folder, study):
     report = (folder / "report.html").read_text()
     assert report.count("data:image/png") > 3
     assert "is not free" in report
+    assert "when the last run began" in report  # without --repeat there is a load, too
     assert f"{len(study.faults)} counter-examples" in (folder / "summary.md").read_text()
-    assert load_study(folder).labels == study.labels
+    assert load_study(str(folder)).labels == study.labels
 
 
 def test_a_data_frame_holds_what_the_tables_say(study):

@@ -13,7 +13,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome
-from hybridnav.harness.records import commands_of, latest_sources, query_key, read_records
+from hybridnav.harness.records import commands_of, latest_sources, loads_of, query_key, read_records
 from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from hybridnav._base.typing import PathLike
     from hybridnav.harness.outcome import MapQuery
     from hybridnav.harness.records import Record
     from hybridnav.harness.yardstick import Yardstick
@@ -121,7 +122,9 @@ class Study:
         return [(outcome, *fault) for outcome in self.outcomes for fault in outcome.faults]
 
 
-def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "both") -> Study:
+def load_study(
+    folder: PathLike, *, root: PathLike | None = None, metric: Yardstick = "both"
+) -> Study:
     """Read the records of a run.
 
     Parameters
@@ -148,12 +151,12 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from hybridnav.harness import load_study
-    >>> load_study(Path("run")).labels  # of the example of `evaluate`
+    >>> load_study("run").labels  # of the example of `evaluate`
     ['grid-astar', 'octile']
     """
     check_yardstick(metric)
+    folder, root = Path(folder), None if root is None else Path(root)
     preparations: dict[tuple[str, str], Record] = {}
     pairs: dict[tuple[str, str], list[Record]] = {}
     timed: list[Record] = []
@@ -197,7 +200,7 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             outcome.label,
         )
     )
-    about = circumstances_of(timed, outcomes, together, commands_of(folder))
+    about = circumstances_of(timed, outcomes, together, commands_of(folder), loads_of(folder))
     return Study(outcomes, metric, about, _left_out(every, preparations, pairs, names))
 
 
@@ -229,9 +232,8 @@ def to_frame(study: Study) -> pd.DataFrame:
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from hybridnav.harness import load_study, to_frame
-    >>> frame = to_frame(load_study(Path("run")))  # of the example of `evaluate`
+    >>> frame = to_frame(load_study("run"))  # of the example of `evaluate`
     >>> frame.groupby("method")["octile_loss"].max().to_dict()
     {'grid-astar': 0.0, 'octile': 0.0}
     """

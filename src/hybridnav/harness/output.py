@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,9 +25,8 @@ from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
-    from hybridnav._base.typing import FloatArray
+    from hybridnav._base.typing import FloatArray, PathLike
     from hybridnav.harness.report import CaseKey
     from hybridnav.harness.yardstick import Optimum, Yardstick
 
@@ -35,10 +35,10 @@ _BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (
 
 
 def write_outputs(
-    folder: Path,
+    folder: PathLike,
     *,
     title: str = "hybridnav evaluation",
-    root: Path | None = None,
+    root: PathLike | None = None,
     metric: Yardstick = "both",
 ) -> Study:
     """Write `summary.csv`, `maps.csv`, `summary.md` and `report.html` into the folder of a run.
@@ -61,11 +61,11 @@ def write_outputs(
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from hybridnav.harness import write_outputs
-    >>> write_outputs(Path("run")).faults  # of the example of `evaluate`
+    >>> write_outputs("run").faults  # of the example of `evaluate`
     []
     """
+    folder = Path(folder)
     study = load_study(folder, root=root, metric=metric)
     overall = columns.rows_of_study(study)
     by_map = {name: columns.rows_of_map(study, name) for name in study.maps}

@@ -190,6 +190,11 @@ def commands_of(folder: Path) -> list[str]:
     return list(dict.fromkeys(run["command"] for run in _runs(folder) if "command" in run))
 
 
+def loads_of(folder: Path) -> list[float]:
+    """Return the loads of the machine when the runs into a folder began, as far as known."""
+    return [run["load"] for run in _runs(folder) if run.get("load") is not None]
+
+
 def read_records(folder: Path) -> list[Record]:
     """Return all whole records of a run in the order written; none without a file.
 

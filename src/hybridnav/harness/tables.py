@@ -23,9 +23,8 @@ from hybridnav.refine.ompl import OmplSettings
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
-    from pathlib import Path
 
-    from hybridnav._base.typing import FloatArray
+    from hybridnav._base.typing import FloatArray, PathLike
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.records import Record
@@ -296,7 +295,7 @@ def _not_asked(outcomes: Sequence[Outcome], n_maps: int) -> str:
 _Sample = tuple["FloatArray", "FloatArray", "FloatArray", "FloatArray"]
 
 
-def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> list[Row]:
+def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both") -> list[Row]:
     """Compare the methods that two runs have in common, on the maps and pairs that they share.
 
     Parameters
@@ -324,9 +323,8 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from hybridnav.harness import compare_runs
-    >>> rows = compare_runs(Path("run"), Path("run"))  # of the example of `evaluate`
+    >>> rows = compare_runs("run", "run")  # of the example of `evaluate`
     >>> rows[0]["pairs"], rows[0]["difference, points"]
     (5, 0.0)
     """
@@ -355,7 +353,7 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     return rows
 
 
-def _loaded(folder: Path, metric: Yardstick) -> Study:
+def _loaded(folder: PathLike, metric: Yardstick) -> Study:
     study = load_study(folder, metric=metric)
     if not study.outcomes:
         raise InvalidValueError(f"run {folder}: no records there")

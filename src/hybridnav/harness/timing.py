@@ -177,6 +177,8 @@ class Circumstances:
     own_loads: tuple[float, ...] = ()
     """The same without what was before the pass, from its second minute on; of a shorter pass all
     loads, as they are."""
+    began: tuple[float, ...] = ()
+    """Loads when the runs began."""
     apart: tuple[str, ...] = ()
     """Methods whose times are not of the timing pass of the others."""
     commands: tuple[str, ...] = field(default=())
@@ -204,6 +206,8 @@ class Circumstances:
             if self.own_loads != self.loads:
                 text += " in the pass, without earlier load"
             facts.append(("load of the machine", text))
+        elif self.began:
+            facts.append(("load of the machine", f"{self.began[-1]:.2f} when the last run began"))
         facts += [("command", command) for command in self.commands]
         return facts
 
@@ -272,11 +276,12 @@ def circumstances_of(
     outcomes: Sequence[Outcome],
     together: Mapping[str, set[str]],
     commands: Sequence[str],
+    began: Sequence[float] = (),
 ) -> Circumstances:
     """Return the circumstances of the times of a study.
 
     `timed`: records of timing passes; `together`: what `lay_times` returned; `commands`: command
-    lines of the runs.
+    lines of the runs; `began`: loads when they began.
     """
     used = [record for record in timed if record["status"] in {"ready", "timed"}]
     dates = [record["date"] for record in used if "date" in record]
@@ -294,6 +299,7 @@ def circumstances_of(
         dates=(min(dates), max(dates)) if dates else ("", ""),
         loads=tuple(record["load"] for record in loaded),
         own_loads=_own_loads(loaded),
+        began=tuple(began),
         apart=tuple(dict.fromkeys(apart)),
         commands=tuple(dict.fromkeys(commands)),
     )
