@@ -151,8 +151,9 @@ def load_study(
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from hybridnav.harness import load_study
-    >>> load_study("run").labels  # of the example of `evaluate`
+    >>> load_study(Path("run")).labels  # of the example of `evaluate`
     ['grid-astar', 'octile']
     """
     check_yardstick(metric)
@@ -232,8 +233,9 @@ def to_frame(study: Study) -> pd.DataFrame:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from hybridnav.harness import load_study, to_frame
-    >>> frame = to_frame(load_study("run"))  # of the example of `evaluate`
+    >>> frame = to_frame(load_study(Path("run")))  # of the example of `evaluate`
     >>> frame.groupby("method")["octile_loss"].max().to_dict()
     {'grid-astar': 0.0, 'octile': 0.0}
     """

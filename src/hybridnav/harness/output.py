@@ -61,8 +61,9 @@ def write_outputs(
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from hybridnav.harness import write_outputs
-    >>> write_outputs("run").faults  # of the example of `evaluate`
+    >>> write_outputs(Path("run")).faults  # of the example of `evaluate`
     []
     """
     folder = Path(folder)

@@ -323,8 +323,9 @@ def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from hybridnav.harness import compare_runs
-    >>> rows = compare_runs("run", "run")  # of the example of `evaluate`
+    >>> rows = compare_runs(Path("run"), Path("run"))  # of the example of `evaluate`
     >>> rows[0]["pairs"], rows[0]["difference, points"]
     (5, 0.0)
     """
