@@ -226,21 +226,23 @@ def shrink(file: Path) -> None:
         image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
+PICTURES = {
+    "office-route.png": draw_route,
+    "office-levels.png": draw_levels,
+    "office-regions.png": draw_regions,
+    "office-rooms.png": draw_rooms,
+    "mesh-office.png": draw_mesh,
+    "mesh-search.png": draw_search,
+    "office-robot.png": draw_robot,
+    "building.png": draw_building,
+    "office-lanes.png": draw_lanes,
+    "view.png": draw_page,
+    "proof-potential.png": draw_potential,
+    "proof-cut.png": draw_cut,
+}
+
 if __name__ == "__main__":
-    for draw, name in (
-        (draw_route, "office-route.png"),
-        (draw_levels, "office-levels.png"),
-        (draw_regions, "office-regions.png"),
-        (draw_rooms, "office-rooms.png"),
-        (draw_mesh, "mesh-office.png"),
-        (draw_search, "mesh-search.png"),
-        (draw_robot, "office-robot.png"),
-        (draw_building, "building.png"),
-        (draw_lanes, "office-lanes.png"),
-        (draw_page, "view.png"),
-        (draw_potential, "proof-potential.png"),
-        (draw_cut, "proof-cut.png"),
-    ):
+    for name, draw in PICTURES.items():
         draw(IMAGES / name)
         shrink(IMAGES / name)
     draw_gallery()
