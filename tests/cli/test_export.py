@@ -373,3 +373,18 @@ def test_one_floor_of_several_is_judged(cli, tmp_path):
     assert "two L1" in done.out
     refused = cli("evaluate", FIGURE, "--floor", "L1", "-o", tmp_path / "r")
     assert refused.refuses(2, "--floor goes with --graph")
+
+
+@pytest.mark.parametrize("name", ["office/office.yaml", "building/building.yaml"])
+def test_a_map_and_a_building_become_indoorgml(cli, tmp_path, name):
+    out = tmp_path / "a.json"
+    done = cli("export", FIGURE.parents[1] / name, "-o", out, "--format", "indoorgml", "--json")
+    assert (done.code, done.err) == (0, "")
+    layers = hn.ext.graphs.load_indoorgml(out).layers
+    assert done.answer["layers"] == {
+        each: {"cells": len(layer), "edges": layer.number_of_edges()}
+        for each, layer in layers.items()
+    }
+    assert list(layers) == ["places", "rooms"]
+    refused = cli("export", FIGURE, "-o", tmp_path / "a.gml", "--format", "indoorgml")
+    assert refused.refuses(2, "must end in .json")

@@ -24,11 +24,14 @@ from .route_messages import (
 from .waypoint_graph import RouteGraph as RouteGraph, WaypointGraph as WaypointGraph
 from .files import (
     Anchor as Anchor,
+    IndoorModel as IndoorModel,
+    export_indoorgml as export_indoorgml,
     export_lif as export_lif,
     export_nav2 as export_nav2,
     export_osm as export_osm,
     export_rmf as export_rmf,
     load_graph as load_graph,
+    load_indoorgml as load_indoorgml,
 )
 
 __all__: list[str]

@@ -20,6 +20,7 @@ from hybridnav.ext.graphs import fleet_options as given
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from hybridnav.ext.fleet import Building
     from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph
 
 _ENDINGS = {
@@ -27,9 +28,10 @@ _ENDINGS = {
     **given.ENDINGS,
     "rooms": (".csv", ".geojson"),
     "places": (".csv", ".geojson"),
+    "indoorgml": (".json",),
 }
 """Endings of the file of each format."""
-_PARTS = ("rooms", "places")
+_PARTS = ("rooms", "places", "indoorgml")
 """Formats without a graph."""
 _SHOWN = 8
 """Ids in a line about changes."""
@@ -80,12 +82,13 @@ def export(
     reading: MapOptions,
 ) -> None:
     """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
-    5050, or its rooms or places.
+    5050, its rooms or places, or both as IndoorGML.
 
-    The file ends in .geojson; for rmf in .yaml, for osm in .osm, for lif in .json; that of rooms
-    and places in .geojson or .csv. In rmf, osm and lif the floor is called 0 without --floor.
+    The file ends in .geojson; for rmf in .yaml, for osm in .osm, for lif and indoorgml in .json;
+    that of rooms and places in .geojson or .csv. In rmf, osm and lif the floor is called 0 without
+    --floor.
 
-    MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
+    MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050, or as IndoorGML.
     """
     others = {"--out": out, f"--format {kind}": kind != "nav2"}
     robot = given.Bundle.checked(bundle, given.Bundle(tuple(costs or ()), operations), others)
@@ -183,14 +186,20 @@ def _export_over_floors(
     out = _checked_out(kind, out, force=force)
     given.check_style(style, {"--nodes": nodes}, {})
     fleet = given.Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
-    if fleet is None:
+    if fleet is None and kind != "indoorgml":
         raise common.UsageError(
-            f"--format {kind} is for one map, and this is a building: take rmf, osm or lif"
+            f"--format {kind} is for one map, and this is a building: take rmf, osm, lif or "
+            "indoorgml"
         )
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
 
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
+    if fleet is None:
+        with common.stage(f"writing {out}", seconds, "write"):
+            parts = _write_indoorgml(building, out, map_file)
+        given.respond(*parts, seconds, as_json=as_json)
+        return
     build = _builder(style, nodes, spacing_m, reading.seed or 0)
     reports: list[GraphReport] = []
 
@@ -282,6 +291,8 @@ def _write_parts(
         rooms = topology.rooms
         hn.export_rooms(rooms, out, frame=frame)
         counts = {"rooms": int(rooms.is_listed.sum()), "doors": len(rooms.listed_doors)}
+    elif kind == "indoorgml":
+        return _write_indoorgml(topology, *files)
     else:
         hn.export_places(topology, out, frame=frame)
         counts = {"places": topology.n_places, "arcs": topology.n_arcs}
@@ -292,6 +303,20 @@ def _write_parts(
         f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
     ]
     return counts | {"file": str(out), "map": str(map_file)}, lines
+
+
+def _write_indoorgml(
+    source: hn.TopologicalMap | Building, out: Path, map_file: Path
+) -> tuple[dict[str, Any], list[str]]:
+    """Write IndoorGML, and return the figures and lines that are printed of it."""
+    left_out = hn.ext.graphs.export_indoorgml(source, out)
+    layers = hn.ext.graphs.load_indoorgml(out).layers
+    counts = {name: (len(each), each.number_of_edges()) for name, each in layers.items()}
+    lines = [f"file       {printable(out)}"]
+    lines += [f"{name:<10} {n:,} cells, {m:,} edges" for name, (n, m) in counts.items()]
+    layers_of = {name: {"cells": n, "edges": m} for name, (n, m) in counts.items()}
+    figures = {"file": str(out), "map": str(map_file), "layers": layers_of}
+    return figures | {"left_out": list(left_out)}, [*lines, *_left_out_lines(left_out)]
 
 
 def _summary(out: Path, graph: RouteGraph, judged: GraphReport | None) -> list[str]:

@@ -51,7 +51,7 @@ class WaypointGraph:
     """Name of the graph."""
     format: str
     """Where it is from: nav2, strands, strands-text, tmap2, graphml, gml, node-link, networkx, rmf,
-    osm, lif, or hybridnav for the graph of a map."""
+    osm, lif, indoorgml, or hybridnav for the graph of a map."""
     frame: str
     """Name of the frame of the points; empty if the file has none."""
     names: tuple[Name, ...]

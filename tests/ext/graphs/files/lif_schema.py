@@ -7,11 +7,9 @@ and LIF.md of Intralogistics-2X-LIF/Layout-Interchange-Format.
 import json
 import re
 
-import pytest
+import jsonschema
 
 TEXT, NUMBER = {"type": "string"}, {"type": "number"}
-
-jsonschema = pytest.importorskip("jsonschema")
 
 
 def _object(required, **properties):

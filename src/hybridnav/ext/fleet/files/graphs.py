@@ -19,6 +19,7 @@ from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_lane_graph
 from hybridnav.ext.graphs.attach import Network, placed_points
 from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
 from hybridnav.ext.graphs.files import json_graphs as graph_json
+from hybridnav.ext.graphs.files.indoorgml import is_indoorgml, read_indoor_floors
 from hybridnav.ext.graphs.files.lif import is_lif, read_lif
 from hybridnav.ext.graphs.files.osm_read import read_osm
 from hybridnav.ext.graphs.files.osm_xml import Anchor, is_osm
@@ -54,7 +55,7 @@ def load_building_graph(
 
         * `.yaml`, `.yml`: a navigation graph of Open-RMF, or a building map of its traffic editor;
         * `.osm`, `.xml`: OpenStreetMap's XML with indoor tags, or an area graph (osmAG);
-        * `.json`, `.lif`: a layout in VDMA's Layout Interchange Format.
+        * `.json`, `.lif`: a layout in VDMA's Layout Interchange Format, or IndoorGML 2.0.
     anchor
         Place of the frame of a file of OpenStreetMap on the Earth. None for the node that is named
         root, or else the least latitude and longitude of the file.
@@ -92,7 +93,8 @@ def load_building_graph(
         if suffix in XML:
             return read_osm(text, where, name, anchor=anchor)
         if suffix in JSON:
-            return read_lif(text, where, name)
+            read = read_indoor_floors if is_indoorgml(text) else read_lif
+            return read(text, where, name)
         data = parse_document(text, where, MapError, graph_yaml.LIMITS)
         if not is_rmf(data):
             raise MapError(f"{where}: expected a file of Open-RMF, a mapping with 'levels'")
@@ -142,6 +144,8 @@ def floors_of_text(text: str, suffix: str, where: str, name: str) -> BuildingGra
         return read_osm(text, where, name)
     if suffix in JSON and is_lif(text):
         return read_lif(text, where, name)
+    if suffix in JSON and is_indoorgml(text):
+        return read_indoor_floors(text, where, name)
     return None
 
 

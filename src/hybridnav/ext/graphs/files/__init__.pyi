@@ -1,4 +1,9 @@
 from .osm_xml import Anchor as Anchor
+from .indoorgml import (
+    IndoorModel as IndoorModel,
+    export_indoorgml as export_indoorgml,
+    load_indoorgml as load_indoorgml,
+)
 from .lif import export_lif as export_lif
 from .load import load_graph as load_graph
 from .nav2 import export_nav2 as export_nav2

@@ -76,7 +76,7 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     ]
     meta = rmf.mapping_of(data.get("metaInformation"), where, "metaInformation")
     title = str(meta.get("projectIdentification") or name)
-    links = _links(crossing, floor_of, point_of, list(kept))
+    links = links_between(crossing, floor_of, point_of, list(kept))
     rmf.check_link_count(len(links), where)
     return BuildingGraph(name=title, floors=tuple(graphs), links=tuple(links))
 
@@ -154,7 +154,7 @@ def _speed(edge: dict[str, Any]) -> dict[str, Any]:
     return {"speed_limit": min(limits)} if limits else {}
 
 
-def _links(
+def links_between(
     crossing: list[tuple[str, str, str]],
     floor_of: dict[str, str],
     point_of: dict[str, Point],

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _TEXTS = (".yaml", ".yml", ".tmap", ".tmap2", ".tplg", ".tpl")
 _KNOWN = (
     "GeoJSON of Nav2, node-link JSON, GraphML, GML, topological maps of STRANDS and LCAS, "
-    "Open-RMF, OpenStreetMap, LIF"
+    "Open-RMF, OpenStreetMap, LIF, IndoorGML"
 )
 
 
