@@ -360,6 +360,18 @@ def test_errors_come_first():
     assert [found.severity for found in findings.collected()] == list(SEVERITIES)
 
 
+def test_a_lift_that_cannot_be_placed_is_a_warning(tmp_path):
+    path = tmp_path / "a.building.yaml"
+    path.write_text(
+        "{coordinate_system: cartesian_meters, levels: {a: {vertices: [[1, 1, 0, a], [2, 1, 0, b]],"
+        " lanes: [[0, 1, {}]]}}, lifts: {L: {x: 9, y: 9, yaw: 0, width: 1, depth: 1,"
+        " level_doors: {a: []}}}}"
+    )
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    found = hn.ext.graphs.check_graph(topology, hn.ext.graphs.load_graph(path)).findings
+    assert ("link-unread", "warning") in [(each.kind, each.severity) for each in found]
+
+
 def test_every_kind_of_finding_is_planted_here():
     text = Path(__file__).read_text(encoding="utf-8")
     assert [kind for kind in KINDS if f'"{kind}"' not in text] == []

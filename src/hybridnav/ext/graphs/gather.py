@@ -34,6 +34,7 @@ KINDS = {
     "repeated-id": "ids that occur more than once",
     "bad-id": "ids that Nav2 cannot hold",
     "unknown-node": "edges to nodes that are not there",
+    "link-unread": "lifts, stairs and ramps of the file that cannot be placed, and are left out",
     "bad-cost": "costs that are negative or no number",
     "stops-loader": "values at which Nav2's loader stops: it takes nothing of the file",
     "fails-later": "values that Nav2 loads, and fails at later or takes for others",
@@ -74,7 +75,7 @@ _WARNINGS = frozenset(
     {
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
         *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
-        *("link-missing", "link-kind", "stop-missing", "fails-later"),
+        *("link-missing", "link-kind", "link-unread", "stop-missing", "fails-later"),
     }
 )
 _NOTES = frozenset({"missing-door", "missing-room", "missing-part"})

@@ -173,8 +173,8 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     Warns
     -----
     MapWarning
-        When no cell of the mask lies on the map; when a mask of another resolution covers less than
-        a tenth of it; when a value limits nothing, such as 100.
+        When no cell of the mask lies on the map, or a mask of another resolution covers less than a
+        tenth of it. When a value limits nothing, such as 100.
 
     Examples
     --------

@@ -134,3 +134,25 @@ def test_graphs_of_one_floor_are_graphs(small, tmp_path):
     hn.ext.graphs.export_lif(small, tmp_path / "a.json", vehicle_types=["A.B"])
     graph = hn.ext.graphs.load_graph(tmp_path / "a.json")
     assert (graph.format, graph.n_nodes, graph.n_edges) == ("lif", 2, 1)
+
+
+def test_a_layout_of_version_2_is_named(tmp_path):
+    # VDMA's LIF 2.0.0 has its layouts under `origins`.
+    data = {"metaInformation": {"lifVersion": "2.0.0"}, "origins": [{"layouts": []}]}
+    (tmp_path / "a.lif.json").write_text(json.dumps(data))
+    with pytest.raises(hn.errors.MapError, match=r"LIF 2\.0\.0 is not read, 1\.0\.0 is: export"):
+        hn.ext.graphs.load_graph(tmp_path / "a.lif.json")
+
+
+def test_stations_are_facts_of_their_nodes(tmp_path):
+    node = {"nodePosition": {"x": 1, "y": 2}}
+    stations = [
+        {"stationId": "s1", "stationName": "dock", "interactionNodeIds": ["a"]},
+        {"stationId": "s2", "interactionNodeIds": ["a", "gone"]},
+    ]
+    nodes = [node | {"nodeId": "a"}, {"nodeId": "b", "nodePosition": {"x": 3, "y": 2}}]
+    layouts = [{"layoutId": "1", "nodes": nodes, "edges": [], "stations": stations}]
+    (tmp_path / "a.json").write_text(json.dumps({"metaInformation": {}, "layouts": layouts}))
+    graph = hn.ext.graphs.load_graph(tmp_path / "a.json")
+    assert graph.node_facts[0]["stations"] == ["dock", "s2"]
+    assert "stations" not in graph.node_facts[1]

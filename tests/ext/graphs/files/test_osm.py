@@ -21,6 +21,7 @@ from hybridnav.ext.fleet import (
     Link,
     LinkEnd,
     join_links,
+    load_building_graph,
     to_networkx,
 )
 from tests.drawn_rooms import HOUSE, topology_of
@@ -257,3 +258,89 @@ def _pair():
     plain.add_node(1, x=1, y=0)
     plain.add_edge(0, 1)
     return plain
+
+
+HALL = [(1, 0.0, 0.0), (2, 0.0, 9.0), (3, 9.0, 9.0), (4, 9.0, 0.0)]
+
+
+def drawn(tmp_path, ways, nodes=None, tags=None):
+    """Load a file of nodes, about as many metres apart, and ways of their numbers with tags."""
+    lines = ['<osm version="0.6">']
+    for number, north, east in [*HALL, *(nodes or [])]:
+        own = "".join(f'<tag k="{k}" v="{v}"/>' for k, v in (tags or {}).get(number, {}).items())
+        place = f'lat="{48 + north * 9e-6}" lon="{11 + east * 1.34e-5}"'
+        lines.append(f'<node id="{number}" {place}>{own}</node>')
+    for number, (refs, facts) in enumerate(ways):
+        body = "".join(f'<nd ref="{ref}"/>' for ref in refs)
+        body += "".join(f'<tag k="{key}" v="{value}"/>' for key, value in facts.items())
+        lines.append(f'<way id="{100 + number}">{body}</way>')
+    path = tmp_path / "drawn.osm"
+    path.write_text("\n".join([*lines, "</osm>"]))
+    return load_building_graph(path)
+
+
+def left_out(building):
+    found = building.floors[0].graph.findings
+    return [each.where for one in found if one.kind == "link-unread" for each in one.examples]
+
+
+ROOMS = [([1, 2, 3, 4, 1], {"indoor": "room", "level": "0", "repeat_on": "1-2"})]
+WALKS = [
+    ([1, 2], {"highway": "footway", "level": "0"}),
+    ([3, 4], {"highway": "footway", "level": "1"}),
+]
+
+
+@pytest.mark.parametrize(
+    ("tags", "kind"),
+    [
+        # OpenStreetMap's wiki, Simple Indoor Tagging, Key:level and Key:repeat_on, of 2026.
+        ({"highway": "steps", "level": "0;1"}, "stairs"),
+        ({"highway": "steps", "level": "0-1"}, "stairs"),
+        ({"highway": "footway", "level": "0;1", "incline": "up"}, "ramp"),
+        ({"highway": "elevator", "level": "0", "repeat_on": "1"}, "lift"),
+    ],
+)
+def test_links_between_foot_ways_have_their_levels_on_the_way(tmp_path, tags, kind):
+    building = drawn(tmp_path, [*WALKS, ([2, 3], tags)])
+    (link,) = building.links
+    assert (link.kind, [end.floor for end in link.ends]) == (kind, ["0", "1"])
+    at = dict(zip((1, 2, 3, 4), building.floors[0].graph.points.tolist(), strict=False))
+    assert link.ends[0].position_m == pytest.approx(tuple(at[2]))
+    assert left_out(building) == []
+
+
+@pytest.mark.parametrize(
+    "tags", [{"highway": "elevator"}, {"room": "elevator"}, {"room": "stairs"}, {"stairs": "yes"}]
+)
+def test_links_that_are_areas_stop_in_their_middle_on_every_level(tmp_path, tags):
+    nodes = [(5, 0.0, 11.0), (6, 2.0, 11.0), (7, 2.0, 9.0)]
+    area = [2, 5, 6, 7, 2], {"indoor": "room", "level": "0-2"} | tags
+    building = drawn(tmp_path, [*ROOMS, area], nodes)
+    (link,) = building.links
+    assert [end.floor for end in link.ends] == ["0", "1", "2"]
+    assert len({end.position_m for end in link.ends}) == 1
+    assert link.ends[0].position_m == pytest.approx((10.0, 1.0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "stated", [{"door": "yes"}, {"indoor": "door"}, {"entrance": "main"}, {"door": "hinged"}]
+)
+def test_doors_are_tagged_in_three_ways(tmp_path, stated):
+    tags = {2: stated | {"level": "0"}, 3: {"door": "no"}}
+    building = drawn(tmp_path, ROOMS, tags=tags)
+    assert [(floor.graph.n_nodes, floor.graph.n_edges) for floor in building.floors] == [(2, 2)] * 3
+
+
+@pytest.mark.parametrize(
+    ("way", "where"),
+    [
+        (([8, 9], {"highway": "steps", "level": "0;1"}), "stairs, way 102"),
+        (([8, 9], {"highway": "steps", "level": "5;6"}), "stairs, way 102"),
+        (([2, 3, 9, 2], {"indoor": "room", "highway": "elevator", "level": "0"}), "lift, way 102"),
+    ],
+)
+def test_a_link_that_cannot_be_placed_is_a_finding(tmp_path, way, where):
+    building = drawn(tmp_path, [*WALKS, way], [(8, 4.0, 4.0), (9, 4.0, 8.0)])
+    assert building.links == ()
+    assert left_out(building) == [where]

@@ -409,3 +409,20 @@ def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
     path = write(tmp_path / "a.yaml")
     with pytest.raises(hn.errors.MapError, match="no lane of graph 2; graphs with lanes: 0"):
         hn.ext.fleet.load_building_graph(path, graph_index=2)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"x": 900}, {"level_doors": {"up": ["d"], "attic": ["d"]}}],
+    ids=["beside its vertices", "a level that is not there"],
+)
+def test_a_lift_that_is_lost_is_a_finding(tmp_path, change):
+    path = write(tmp_path / "a.yaml")
+    data = yaml.safe_load(path.read_text())
+    data["lifts"]["hoist"] |= change
+    path.write_text(yaml.safe_dump(data))
+    building = hn.ext.fleet.load_building_graph(path)
+    assert building.links == ()
+    (found,) = building.floors[0].graph.findings
+    assert found.kind == "link-unread"
+    assert found.examples[0].where.startswith("lift hoist, vertices in its cabin on ")

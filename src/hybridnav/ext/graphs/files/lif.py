@@ -55,11 +55,14 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
         gathered = floors.setdefault(floor, Gathered(f"{where}, level {shown(floor)}"))
         if len(floors) > rmf.MOST_FLOORS:
             raise MapError(f"{where}: more than {rmf.MOST_FLOORS} levels are not read")
+        stations = _stations(layout, at)
         for node in _entries(layout, "nodes", at):
             known = _text(node, "nodeId", at)
             point = pair_of(node.get("nodePosition"))
             facts = {key: value for key, value in node.items() if key != "nodePosition"}
             facts |= _id_in(known, f"{floor}/")
+            if known in stations:
+                facts["stations"] = stations[known]
             if isinstance(node.get("nodeName"), str):
                 facts["name"] = node["nodeName"]
             gathered.add_node(known, point, facts)
@@ -86,6 +89,13 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
         raise MapError(f"{where}: a layout of more than {_MOST_BYTES} bytes is not read")
     with json_errors(text, where, _MOST_VALUES):
         data = json.loads(text)
+    if isinstance(data, dict) and "origins" in data:
+        meta = data.get("metaInformation")
+        version = meta.get("lifVersion") if isinstance(meta, dict) else None
+        raise MapError(
+            f"{where}: LIF {shown(str(version or '2.0.0'))} is not read, 1.0.0 is: export the "
+            "layout in that version"
+        )
     if not isinstance(data, dict) or "layouts" not in data:
         raise MapError(f"{where}: expected a layout in the Layout Interchange Format, 'layouts'")
     return data
@@ -105,6 +115,16 @@ def _layouts(data: dict[str, Any], where: str) -> list[tuple[str, str, dict[str,
 def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str, Any]]:
     for number, entry in enumerate(rmf.list_of(layout.get(key), where, key)):
         yield rmf.mapping_of(entry, f"{where}, {key} {number}", f"an entry of {key}")
+
+
+def _stations(layout: dict[str, Any], where: str) -> dict[str, list[str]]:
+    """Return the names of the stations at each node, their ids where they have none."""
+    found: dict[str, list[str]] = {}
+    for station in _entries(layout, "stations", where):
+        name = str(station.get("stationName") or _text(station, "stationId", where))
+        for node in rmf.list_of(station.get("interactionNodeIds"), where, "interactionNodeIds"):
+            found.setdefault(str(node), []).append(name)
+    return found
 
 
 def _text(entry: dict[str, Any], key: str, where: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from hybridnav.ext.graphs import WaypointGraph
 from hybridnav.ext.graphs.files import osm_xml as osm
 from hybridnav.ext.graphs.files.osm_write import ALONE, ID, ID_BACK
 from hybridnav.ext.graphs.files.rmf_read import MOST_FLOORS, check_link_count, id_fact
-from hybridnav.ext.graphs.gather import Gathered, free_name, number_of, shown
+from hybridnav.ext.graphs.gather import Findings, Gathered, free_name, number_of, shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 
-_HERE: dict[str, LinkKind] = {"elevator": "lift", "steps": "stairs"}
-"""Values of `highway` that join levels."""
 _VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
 """Values of `osmAG:areaType` that join levels."""
 _FACTS = ("wait_s", "ride_s", "cost_m", "max_radius_m")
@@ -88,11 +86,12 @@ def read_osm(
         )
     found = {floor.level: floor.name for floor, _ in kept}
     links = _Links(data, points, found, where)
-    return BuildingGraph(
-        name=osm.title_of(data, name),
-        floors=tuple(graph for _, graph in kept if graph is not None),
-        links=tuple(links.found(floors)),
-    )
+    joined = tuple(links.found(floors))
+    first, *others = (graph for _, graph in kept if graph is not None)
+    links.findings.add_all(first.graph.findings)
+    first = replace(first, graph=replace(first.graph, findings=links.findings.collected()))
+    title = osm.title_of(data, name)
+    return BuildingGraph(name=title, floors=(first, *others), links=joined)
 
 
 def _sorted_floors(data: osm.OsmData, where: str) -> list[OsmFloor]:
@@ -100,7 +99,8 @@ def _sorted_floors(data: osm.OsmData, where: str) -> list[OsmFloor]:
     floors: dict[float, OsmFloor] = {}
     for way in data.ways:
         part, levels = osm.part_of(way), osm.levels_of(way.tags) or [0.0]
-        if part == "" or (part == "routes" and len(levels) > 1):
+        is_link = len(levels) > 1 and osm.link_kind(way.tags, is_line=True) is not None
+        if part == "" or (part == "routes" and is_link):
             continue
         for level in levels:
             floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
@@ -225,9 +225,16 @@ class _Links:
     ) -> None:
         self._data, self._points, self._names, self._where = data, points, names, where
         self._taken: set[str] = set()
+        self.findings = Findings()
+        """Links that cannot be placed."""
+        self._levels_at: dict[int, set[float]] = {}
+        """Levels of the foot ways that pass a node."""
 
     def found(self, floors: list[OsmFloor]) -> list[Link]:
         """Return all links."""
+        for floor in floors:
+            for node in itertools.chain.from_iterable(way.refs for way in floor.routes):
+                self._levels_at.setdefault(node, set()).add(floor.level)
         links = [*self._from_ways(), *self._from_nodes()]
         grouped: dict[tuple[str, LinkKind], list[tuple[float, Point]]] = {}
         for floor in floors:
@@ -245,30 +252,56 @@ class _Links:
     def _from_ways(self) -> list[Link | None]:
         links = []
         for way in self._data.ways:
-            kind = self._kind(way.tags)
-            stops = []
-            for node in way.refs:
-                levels, point = osm.levels_of(self._data.tags.get(node, {})), self._points.get(node)
-                if len(levels) == 1 and point is not None:
-                    stops.append((levels[0], point))
+            kind = osm.link_kind(way.tags, is_line=not way.is_closed)
             if kind is not None and len(osm.levels_of(way.tags)) > 1:
-                links.append(self._link(way.tags.get("name", ""), kind, stops, way.tags))
+                links.append(self._link(way.tags.get("name", ""), kind, self._stops(way), way.tags))
+                self._note(links[-1], kind, f"way {way.id}")
+            elif kind == "lift":
+                self._note(None, kind, f"way {way.id}")
         return links
+
+    def _stops(self, way: osm.OsmWay) -> list[tuple[float, Point]]:
+        """Return where a link stops: at nodes that state one level, or that a foot way of the level
+        passes; else an area in its middle, and a line of two levels at its other end, or by its
+        incline."""
+        levels = osm.levels_of(way.tags)
+        known = [(node, at) for node in way.refs if (at := self._points.get(node)) is not None]
+        stops: dict[float, Point] = {}
+        for node, at in known:
+            own = osm.levels_of(self._data.tags.get(node, {}))
+            passed = self._levels_at.get(node, set()).intersection(levels)
+            for level in own if len(own) == 1 else passed:
+                stops.setdefault(level, at)
+        lost = [level for level in levels if level not in stops]
+        if way.is_closed:
+            shape = _shape(way, self._points) if lost else None
+            middle = None if shape is None else shape.representative_point()
+            stops |= {} if middle is None else dict.fromkeys(lost, (middle.x, middle.y))
+        elif lost and len(levels) == 2 and len(known) > 1:  # noqa: PLR2004
+            ends = [at for _, at in (known[0], known[-1])]
+            incline = way.tags.get("incline", "")
+            if len(lost) == 1:
+                stops[lost[0]] = max(ends, key=lambda at: math.dist(at, *stops.values()))
+            elif incline:
+                is_down = incline == "down" or incline.startswith("-")
+                stops = dict(zip(levels, ends[:: -1 if is_down else 1], strict=True))
+        return list(stops.items())
 
     def _from_nodes(self) -> list[Link | None]:
         links = []
         for node, tags in self._data.tags.items():
-            kind, levels, point = self._kind(tags), osm.levels_of(tags), self._points.get(node)
-            if kind is not None and len(levels) > 1 and point is not None:
-                stops = [(level, point) for level in levels]
+            kind, levels = osm.link_kind(tags, is_line=False), osm.levels_of(tags)
+            point = self._points.get(node)
+            if kind is not None and (kind == "lift" or len(levels) > 1):
+                stops = [(level, point) for level in levels if point is not None]
                 links.append(self._link(tags.get("name", ""), kind, stops, tags))
+                self._note(links[-1], kind, f"node {node}")
         return links
 
-    def _kind(self, tags: dict[str, str]) -> LinkKind | None:
-        stated = tags.get("hybridnav:link")
-        if stated == "ramp":
-            return "ramp"
-        return _HERE.get(tags.get("highway", ""))
+    def _note(self, link: Link | None, kind: LinkKind, where: str) -> None:
+        """Note a link that stops at fewer than two levels."""
+        if link is None:
+            self.findings.add("link-unread", f"{kind}, {where}")
 
     def _link(
         self, name: str, kind: LinkKind, points: list[tuple[float, Point]], tags: dict[str, str]
@@ -307,7 +340,7 @@ def add_area_graph(
 
     An area is joined with its passages, in both directions, and two of its passages with each other
     where the segment between them stays inside it. A passage (osmAG) belongs to the two areas that
-    it names, by their ids or names; a door, a node with `door`, to those whose outline it is part
+    it names, by their ids or names; a door, a node, to those whose outline it is part
     of.
 
     `gathered`: what they are added to; ids are `way ID` and `node ID`; `areas`: closed ways;
@@ -377,12 +410,12 @@ def _add_doors(
     tags: Mapping[int, osm.Tags],
     points: Mapping[int, Point | None],
 ) -> None:
-    """Add the nodes with `door` on outlines of areas."""
+    """Add the doors on outlines of areas."""
     added: set[int] = set()
     for way in areas:
         for node in dict.fromkeys(way.refs) if way.id in inside else ():
             point = points.get(node)
-            if "door" not in tags.get(node, {}) or point is None:
+            if point is None or not osm.is_door(tags.get(node, {})):
                 continue
             if node not in added:
                 gathered.add_node(f"node {node}", point, tags[node])

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
 import numpy as np
@@ -14,6 +14,9 @@ import numpy as np
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.graphs.gather import number_of, pair_of, shown
+
+if TYPE_CHECKING:
+    from hybridnav.ext.fleet import LinkKind
 
 # From metres to latitude and longitude, and back.
 
@@ -153,8 +156,8 @@ class OsmData:
 
     @cached_property
     def door_names(self) -> frozenset[str]:
-        """Names of the nodes with `door`."""
-        return frozenset(tags.get("name", "") for tags in self.tags.values() if "door" in tags)
+        """Names of the doors that are nodes."""
+        return frozenset(tags.get("name", "") for tags in self.tags.values() if is_door(tags))
 
 
 def is_osm(text: str) -> bool:
@@ -283,10 +286,11 @@ class _Reader(XmlReader):
 def levels_of(tags: Tags) -> list[float]:
     """Return the levels that an element states, ascending: `1`, `0;1`, `0-3`; none for none.
 
-    As on the pages of the keys `level` and `repeat_on` in OpenStreetMap's wiki.
+    As on the pages of the keys `level` and `repeat_on` in OpenStreetMap's wiki: what repeats lies
+    at the same point of each.
     """
     found: set[float] = set()
-    for part in tags.get("level", "").split(";"):
+    for part in f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";"):
         ends = _RANGE.fullmatch(part.strip())
         if ends:
             low, high = int(ends[1]), int(ends[2])
@@ -296,6 +300,30 @@ def levels_of(tags: Tags) -> list[float]:
         if len(found) > _MOST_LEVELS:
             break
     return sorted(level for level in found if not math.isnan(level))
+
+
+def is_door(tags: Tags) -> bool:
+    """Return whether a node is a door: `door`, `indoor=door` or `entrance`, unless it says no."""
+    stated = {tags.get("door", "no"), tags.get("entrance", "no")} - {"no"}
+    return bool(stated) or tags.get("indoor") == "door"
+
+
+def link_kind(tags: Tags, *, is_line: bool) -> LinkKind | None:
+    """Return what joins levels, None for what does not.
+
+    Stairs and lifts are ways, areas or nodes (`highway`, `room`, `stairs`); any other line with
+    `highway` on several levels is a ramp.
+    """
+    if tags.get("hybridnav:link") == "ramp":
+        return "ramp"
+    kind = _LINKS.get(tags.get("highway", "")) or _LINKS.get(tags.get("room", ""))
+    if kind is None and tags.get("stairs", "no") != "no":
+        kind = "stairs"
+    is_ramp = is_line and "highway" in tags and "repeat_on" not in tags
+    return kind or ("ramp" if is_ramp and len(levels_of(tags)) > 1 else None)
+
+
+_LINKS: dict[str, LinkKind] = {"elevator": "lift", "steps": "stairs", "stairs": "stairs"}
 
 
 def part_of(element: OsmWay) -> str:

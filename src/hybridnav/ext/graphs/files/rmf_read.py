@@ -86,7 +86,7 @@ def building_of(
     floors: Iterable[RmfFloor], lifts: Mapping[str, RmfLift], name: str, where: str
 ) -> BuildingGraph:
     """Return what was read, without floors that have no vertices, and without lifts that stop at
-    fewer than two of the rest.
+    fewer than two of the rest, which are findings of the first floor.
 
     `floors`: floors, from the lowest to the highest where that is known; `lifts`: lifts by name;
     `name`: name of the building; `where`: what messages begin with. Raises `MapError` when no floor
@@ -103,6 +103,9 @@ def building_of(
             ends = tuple(LinkEnd(floor, known.ends[floor]) for _, floor in stops)
             fits = {} if known.dims_m is None else {"max_radius_m": min(known.dims_m) / 2}
             links.append(Link(name=lift, kind="lift", ends=ends, **fits))
+        else:
+            at = f"lift {shown(lift)}, vertices in its cabin on {len(stops)} levels"
+            kept[0].gathered.findings.add("link-unread", at, *known.ends.values())
     check_link_count(len(links), where)
     graphs = tuple(floor.graph(f"{name} {floor.name}") for floor in kept)
     return BuildingGraph(name=name, floors=graphs, links=tuple(links))
