@@ -190,7 +190,7 @@ class Case:
         """What each closure closes: flat cells, or moves between two where it is a boundary."""
         found = {} if self.costs is None else {Closure("costs", None): self.costs.flat}
         if isinstance(self.blocked, Blocked):
-            found |= {closure: self._closed_by(one) for closure, one in _each(self.blocked)}
+            found |= {closure: self._closed_by(one) for closure, one in each_closure(self.blocked)}
         elif self.blocked is not None:
             found[Closure("cells", None)] = self.blocked.flat
         return found
@@ -316,7 +316,7 @@ class Case:
         return one, other
 
 
-def _each(blocked: Blocked) -> Iterator[tuple[Closure, Blocked]]:
+def each_closure(blocked: Blocked) -> Iterator[tuple[Closure, Blocked]]:
     """Yield each closure with a `Blocked` of it alone."""
     for one in fields(blocked):
         items = getattr(blocked, one.name)

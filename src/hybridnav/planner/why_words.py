@@ -155,6 +155,16 @@ _TABLES = {
 }
 
 
+def closure_words(closure: Closure, language: str) -> str:
+    """Return what sentences call a closure, as "door 4"; `language`: `en` or `de`."""
+    return _named(closure, _TABLES[language])
+
+
+def _named(closure: Closure, table: dict[str, str]) -> str:
+    order = closure.which + 1 if isinstance(closure.which, int) else ""
+    return table[closure.kind].format(which=closure.which, order=order)
+
+
 def sentences(why: Any, language: str) -> list[str]:
     """Write an explanation, one sentence or two a line; see `Explanation.words`."""
     mark = check_language(language).decimal
@@ -238,12 +248,7 @@ class _Writer:
 
     def listed(self, closures: Sequence[Closure]) -> str:
         """List closures: "door 3, door 5 and room kitchen"."""
-        names = [
-            self.table[one.kind].format(
-                which=one.which, order=one.which + 1 if isinstance(one.which, int) else ""
-            )
-            for one in closures
-        ]
+        names = [_named(one, self.table) for one in closures]
         if len(names) < 2:  # noqa: PLR2004
             return "".join(names)
         return f"{', '.join(names[:-1])} {self.table['and']} {names[-1]}"

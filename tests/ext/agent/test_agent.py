@@ -290,6 +290,22 @@ def test_kinds_are_taken_in_the_plural_and_choices_hold_what_was_meant(tmp_path)
             assert choice["name"] in found["text"]
 
 
+def test_no_other_room_is_nearer_than_the_bound(tmp_path):
+    """A bound that is rounded to the nearest millimetre is above half of the lengths."""
+    floor = PaintedFloor(2)
+    session = session_of(floor, tmp_path)
+    answers, (start, *_) = MapAnswers(session, allow_edits=False), floor.inner_point()
+    topology = session.planning.topology
+    planner, rooms = hn.HybridPlanner(topology), topology.rooms
+    for away_m in np.arange(40) * 0.00117:
+        begin = (start[0] + away_m, start[1])
+        found = answers.call("nearest", {"of": "rooms", "start": list(begin)})
+        (nearest,) = found["nearest"]
+        others = [name for name in rooms.names if name not in (nearest["name"], rooms.at(begin))]
+        costs = [planner.plan(begin, rooms.point_of(name)).cost for name in others]
+        assert found["others_at_least_m"] <= min(costs)
+
+
 def test_a_page_that_prepares_says_when_to_ask_again(tmp_path):
     session, go_on = session_of(PaintedFloor(1), tmp_path), threading.Event()
 

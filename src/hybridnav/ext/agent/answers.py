@@ -222,10 +222,11 @@ class MapAnswers:
         if not tour.solved:
             refused = self._no_path(planner, tour, asked, asked.language)
             return refused | self._near(planner, tour, asked)
-        length, bound = round(tour.length_m, 3), math.floor(tour.lower_bound * 1000) / 1000
+        length, bound = round(tour.length_m, 3), places.rounded_down(tour.lower_bound)
         doors = [leg.door.number for leg in tour.legs if leg.door is not None]
+        least = places.rounded_down(bound, 2)
         answer: dict[str, Any] = {
-            "text": f"{length:.2f} m, and no path is shorter than {bound:.2f} m.",
+            "text": f"{length:.2f} m, and no path is shorter than {least:.2f} m.",
             "status": "solved",
             "length_m": length,
             "lower_bound_m": bound,
@@ -334,7 +335,7 @@ class MapAnswers:
                 break
             found = planner.draft(here, point, blocked=self._closed)
             if math.isfinite(found.cost):
-                bound_m = math.floor(found.lower_bound * 1000) / 1000
+                bound_m = places.rounded_down(found.lower_bound)
                 lengths = {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
                 best.append((found.cost, facts | lengths))
                 best.sort(key=lambda one: one[0])
@@ -351,7 +352,7 @@ class MapAnswers:
         return {
             "text": f"Nearest: {names}.",
             "nearest": [facts for _, facts in best],
-            "others_at_least_m": round(others_m, 3) if math.isfinite(others_m) else None,
+            "others_at_least_m": places.rounded_down(others_m) if math.isfinite(others_m) else None,
         }
 
     def _picture(self, asked: ask.Picture) -> dict[str, Any]:

@@ -169,6 +169,11 @@ def rounded(point: tuple[float, ...] | None) -> list[float] | None:
     return None if point is None else [round(number, 3) for number in point]
 
 
+def rounded_down(bound: float, digits: int = 3) -> float:
+    """Return a bound with so many digits, none of which is above it."""
+    return math.floor(bound * 10**digits) / 10**digits
+
+
 def fitting(lines: list[str]) -> list[str]:
     """Return the first lines, as many as an answer holds, one at least."""
     ends = itertools.accumulate(len(line) for line in lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.fleet import checks
+from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
 from hybridnav.ext.fleet.links import Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
@@ -22,7 +23,7 @@ from hybridnav.planner.profile import PROFILES, profile_of
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -323,7 +324,7 @@ class Building:
         """Plan as many routes as are wanted, under a profile, without what is out of order."""
         asked = self._in_order(asked)
         if profile is None:
-            return self._plans(start, goal, asked, limits)
+            return self._with_reasons(self._plans(start, goal, asked, limits), start, goal, asked)
         chosen = profile_of(profile, self.profiles)
 
         def plans(one: Profile, most: tuple[int, float]) -> BuildingAlternatives:
@@ -340,6 +341,31 @@ class Building:
         note = "" if found[0].solved else checks.reason_under(chosen, wider)
         of: dict[str, Any] = {"profile": chosen.name, "note": note}
         return replace(found, found=tuple(replace(plan, **of) for plan in found))
+
+    def _with_reasons(
+        self,
+        found: BuildingAlternatives,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
+        asked: _Asked,
+    ) -> BuildingAlternatives:
+        """Return plans with the reasons why there is no route."""
+        if found[0].solved:
+            return found
+        shut = why.shut_of(asked.blocked, asked.closed_links, stairs=asked.stairs)
+
+        def is_solved(still: list[why.Shut]) -> bool:
+            given = asked._replace(**why.conditions(still))
+            return self._plans(start, goal, given, (1, 1.0))[0].solved
+
+        endpoints = (
+            checks.endpoint_of("start", start, self.floors),
+            checks.endpoint_of("goal", goal, self.floors),
+        )
+        opening = why.to_open(shut, is_solved), asked.blocked
+        network = self._network((), stairs=True)
+        given = why.reasons(found[0], endpoints, self.floors, network, opening)
+        return replace(found, found=tuple(replace(plan, reasons=given) for plan in found))
 
     def _under(self, profile: Profile) -> Building:
         """Return the building under a profile, made anew where a map or costs have changed."""
@@ -362,6 +388,12 @@ class Building:
 
     def _in_order(self, asked: _Asked) -> _Asked:
         """Return the conditions of a query with what the journal closes."""
+        if not isinstance(asked.blocked, Mapping):
+            raise InvalidValueError(
+                "blocked of a building must be a mapping from names of floors to what is closed "
+                f"there, as {{{self.floors[0].name!r}: {{'doors': [4]}}}}, "
+                f"got {asked.blocked!r:.80}"
+            )
         if isinstance(asked.closed_links, str):
             raise InvalidValueError(
                 f"closed_links must be names of links, got the text {asked.closed_links!r:.80}: "

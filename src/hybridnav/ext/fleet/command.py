@@ -98,6 +98,8 @@ def plan_over_floors(
         "query": f"{typed[0]} to {typed[1]}",
         "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
     }
+    if not plans[0].solved:
+        figures["why"] = {"words": list(plans[0].reasons.get(language, ()))}
     if profile is not None:
         asks = next(one.described for one in building.profiles if one.name == profile)
         figures["asks"] = asks
@@ -170,6 +172,8 @@ def _summary(file: Path, building: hn.ext.fleet.Building, figures: dict[str, Any
         stated = {"name": figures["profile"], "asks": figures["asks"], "forbids": figures["note"]}
         lines += profile_lines(stated)
     lines += [preset_line(figures["preset"]), f"status     {figures['status']}"]
+    for number, line in enumerate((figures["why"] or {"words": ()})["words"]):
+        lines.append(f"{'' if number else 'why':<10} {line}")
     if figures["cost"] is not None:
         lines += _route_lines(figures)
     for number, line in enumerate(figures["words"]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -67,6 +67,8 @@ class BuildingPlan:
     """Name of the profile that it was planned under; None for none."""
     note: str = ""
     """The reason, one line, where the profile leaves no route."""
+    reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict, repr=False)
+    """Why there is no route, in sentences, by the code of the language; none with a route."""
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
@@ -144,7 +146,8 @@ class BuildingPlan:
             When it is not; the text names the status.
         """
         if not self.solved:
-            raise PlanError(f"no route over floors was planned: {self.status}")
+            why = " ".join(self.reasons.get("en", ()))
+            raise PlanError(f"no route over floors was planned: {self.status}. {why}".strip(". "))
         return self
 
     def to_dict(self) -> dict[str, Any]:
@@ -175,6 +178,7 @@ class BuildingPlan:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "instructions": [instruction.to_dict() for instruction in self.instructions],
             "words": self.words(),
+            "why": None if known else {"words": list(self.reasons.get("en", ()))},
             **({} if self.profile is None else {"profile": self.profile, "note": self.note}),
         }
 

@@ -394,7 +394,9 @@ def lines_of(
 def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the figures of a plan, and its lines floor by floor; None stands for what is not
     finite."""
-    why = plan.note if not isinstance(plan, PlanResult) else ""
+    why = ""
+    if not isinstance(plan, PlanResult):
+        why = plan.note or " ".join(plan.reasons.get("en", ()))
     if isinstance(plan, PlanResult):
         why = plan.settings.get("profile", {}).get("forbids", "")
     return {

@@ -1,0 +1,198 @@
+"""Why there is no route over floors: what is closed, where an end lies, or what walls enclose."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.planner import PlanStatus
+from hybridnav.planner.blocked import as_blocked
+from hybridnav.planner.why import each_closure
+from hybridnav.planner.why_words import closure_words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from hybridnav.ext.fleet.floors import Floor
+    from hybridnav.ext.fleet.links import LinkNetwork
+    from hybridnav.ext.fleet.plan import BuildingPlan
+    from hybridnav.ext.fleet.search import Endpoint
+    from hybridnav.planner import Blocked
+    from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.why import Explanation
+    from hybridnav.planner.why_words import Closure
+
+_WORDS = {
+    "en": {
+        "link": "link {0}",
+        "stairs": "the way by stairs",
+        "on": "floor {0}, {1}",
+        "open": "{0} is closed, and there is no other way.",
+        "more": "If {0} open, there is a route; if one of them stays closed, none.",
+        "and": "and",
+        "apart": "No lift, stairs or ramp that this robot can take joins floors {0} and {1}.",
+        "end": "Floor {0}: {1}",
+        "between": "On a floor between, no way joins the ends of the links.",
+    },
+    "de": {
+        "link": "Verbindung {0}",
+        "stairs": "der Weg über Treppen",
+        "on": "Etage {0}, {1}",
+        "open": "Gesperrt ist {0}, und einen anderen Weg gibt es nicht.",
+        "more": "Mit {0} offen gibt es einen Weg; bleibt eines davon gesperrt, keinen.",
+        "and": "und",
+        "apart": "Kein Aufzug, keine Treppe und keine Rampe, die dieser Roboter nehmen kann, "
+        "verbindet die Etagen {0} und {1}.",
+        "end": "Etage {0}: {1}",
+        "between": "Auf einer Etage dazwischen verbindet kein Weg die Enden der Verbindungen.",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Shut:
+    """One thing that is closed in a building: a link, all stairs, or a thing on a floor."""
+
+    link: str | None = None
+    floor: str | None = None
+    closure: Closure | None = None
+    blocked: Blocked | None = None
+
+    def named(self, language: str) -> str:
+        """Return its name in a sentence."""
+        words = _WORDS[language]
+        if self.floor is None or self.closure is None:
+            return words["stairs"] if self.link is None else words["link"].format(self.link)
+        return words["on"].format(self.floor, closure_words(self.closure, language))
+
+
+def shut_of(blocked: Mapping[str, Closable], links: Collection[str], *, stairs: bool) -> list[Shut]:
+    """Return what is closed in a query, each thing once."""
+    found = [Shut(link=name) for name in dict.fromkeys(links)]
+    found += [] if stairs else [Shut()]
+    for floor, given in blocked.items():
+        for closure, one in each_closure(as_blocked(given)):
+            found.append(Shut(floor=floor, closure=closure, blocked=one))
+    return found
+
+
+def conditions(shut: Sequence[Shut]) -> dict[str, Any]:
+    """Return the conditions of a query with these things closed."""
+    blocked: dict[str, list[Blocked]] = {}
+    for one in shut:
+        if one.floor is not None and one.blocked is not None:
+            blocked.setdefault(one.floor, []).append(one.blocked)
+    merged = {floor: reduce(operator.or_, each) for floor, each in blocked.items()}
+    links = [one.link for one in shut if one.link is not None]
+    return {"blocked": merged, "closed_links": links, "stairs": Shut() not in shut}
+
+
+def to_open(shut: Sequence[Shut], is_solved: Callable[[list[Shut]], bool]) -> list[Shut]:
+    """Return things that open a route, none of which can stay closed; empty where none does.
+
+    `is_solved`: whether there is a route with these closed alone.
+
+    Notes
+    -----
+    U. Junker: QuickXplain, AAAI 2004: few queries where few of many things matter.
+    """
+    if not shut or not is_solved([]):
+        return []
+
+    def search(opened: list[Shut], rest: list[Shut], *, is_new: bool) -> list[Shut]:
+        if is_new and is_solved([one for one in shut if one not in opened]):
+            return []
+        if len(rest) == 1:
+            return rest
+        one, other = rest[: len(rest) // 2], rest[len(rest) // 2 :]
+        second = search(opened + one, other, is_new=True)
+        return search(opened + second, one, is_new=bool(second)) + second
+
+    return search([], list(shut), is_new=False)
+
+
+def reasons(
+    plan: BuildingPlan,
+    endpoints: tuple[Endpoint, Endpoint],
+    floors: Sequence[Floor],
+    network: LinkNetwork,
+    opening: tuple[list[Shut], Mapping[str, Closable]],
+) -> dict[str, tuple[str, ...]]:
+    """Return why a plan has no route, in each language.
+
+    `network`: the links that may be used with nothing closed; `opening`: what would have to open,
+    and what is closed on each floor.
+    """
+    found, blocked = opening
+    at = [_point_of(end, floors) for end in endpoints]
+    is_end = plan.status.name.startswith(("START_", "GOAL_"))
+    if is_end and not (found and isinstance(endpoints[_is_goal(plan)].waypoint, str)):
+        number = int(_is_goal(plan))
+        floor = floors[endpoints[number].floor]
+        why = floor.planner.explain(at[number], at[number], blocked=blocked.get(floor.name))
+        ends = tuple(one for one in why.blocked_ends if one.is_start == (number == 0))
+        return _each(lambda to: _on(floor, replace(why, blocked_ends=ends).words(to), to))
+    if found:
+        return _each(lambda to: [_opening([one.named(to) for one in found], to)])
+    if plan.status is not PlanStatus.NO_PATH:
+        return _each(lambda _: [])
+    for number, floor in enumerate(floors[end.floor] for end in endpoints):
+        enclosed = _enclosed(number, endpoints, floors, network)
+        if enclosed is not None:
+            return {to: tuple(_on(floor, enclosed.words(to), to)) for to in _WORDS}
+    names = [floors[end.floor].name for end in endpoints]
+    reached = {names[0]}
+    for _ in floors:
+        for link in network.links:
+            stops = {stop.floor for stop in link.ends}
+            reached |= stops if stops & reached else set()
+    if names[1] not in reached:
+        return _each(lambda to: [_WORDS[to]["apart"].format(*names)])
+    return _each(lambda to: [_WORDS[to]["between"]])
+
+
+def _enclosed(
+    number: int, endpoints: tuple[Endpoint, Endpoint], floors: Sequence[Floor], network: LinkNetwork
+) -> Explanation | None:
+    """Return why no end of a link, nor the goal on the same floor, can be reached from the start,
+    number 0, or from the goal; None where one can, or there is none."""
+    floor = floors[endpoints[number].floor]
+    here, other = (_point_of(endpoints[which], floors) for which in (number, 1 - number))
+    ways: list[tuple[float, ...]] = [
+        stop.position_m for link in network.links if (stop := link.end_on(floor.name))
+    ]
+    ways += [other] if endpoints[0].floor == endpoints[1].floor else []
+    found = [floor.planner.explain(here, way) for way in ways]
+    return found[-1] if found and not any(one.has_path for one in found) else None
+
+
+def _each(lines: Callable[[str], list[str]]) -> dict[str, tuple[str, ...]]:
+    return {language: tuple(lines(language)) for language in _WORDS}
+
+
+def _is_goal(plan: BuildingPlan) -> bool:
+    return plan.status.name.startswith("GOAL_")
+
+
+def _point_of(end: Endpoint, floors: Sequence[Floor]) -> tuple[float, ...]:
+    if not isinstance(end.waypoint, str):
+        return tuple(float(number) for number in end.waypoint)  # type: ignore[union-attr, arg-type]
+    floor = floors[end.floor]
+    known = {} if floor.rooms is None else floor.rooms.points
+    return tuple(known.get(end.waypoint) or floor.planner.topology.rooms.point_of(end.waypoint))
+
+
+def _on(floor: Floor, lines: Sequence[str], language: str) -> list[str]:
+    """Return lines about one floor, the first one with its name."""
+    return [_WORDS[language]["end"].format(floor.name, lines[0]), *lines[1:]]
+
+
+def _opening(names: Sequence[str], language: str) -> str:
+    words = _WORDS[language]
+    if len(names) == 1:
+        text = words["open"].format(names[0])
+    else:
+        text = words["more"].format(f"{', '.join(names[:-1])} {words['and']} {names[-1]}")
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,89 @@
+"""Why there is no route over floors: what would have to open, or where an end lies."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import hybridnav as hn
+from hybridnav.errors import InvalidValueError, PlanError
+from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
+from tests.drawn_rooms import HOUSE, house, topology_of
+
+KITCHEN, LAB = (1.25, 5.75), (19.75, 6.25)
+
+
+def building(upper=None, *, links=("lift", "stairs")):
+    """Two floors of the house with a lift and stairs in the corridor."""
+    floors = [Floor("1", house()), Floor("2", upper or house())]
+    at = {"lift": (1.0, 3.0), "stairs": (20.0, 3.0)}
+    ends = {name: tuple(LinkEnd(floor, at[name]) for floor in ("1", "2")) for name in links}
+    return Building(floors, [Link(name=name, kind=name, ends=ends[name]) for name in links])
+
+
+@pytest.mark.parametrize(
+    ("goal", "closed", "reason"),
+    [
+        (
+            ("2", LAB),
+            {"closed_links": ["lift", "stairs"]},
+            r"Link (lift|stairs) is closed, and there is no other way\.",
+        ),
+        (
+            ("2", "lab"),
+            {"closed_links": ["lift"], "stairs": False, "blocked": {"2": {"doors": [6, 3]}}},
+            r"If link lift and floor 2, door 6 open, there is a route; .* one of them .* none\.",
+        ),
+        (
+            ("2", LAB),
+            {"blocked": {"2": {"doors": [6, 3]}}},
+            r"Floor 2, door 6 is closed, and there is no other way\.",
+        ),
+        (
+            ("2", "lab"),
+            {"blocked": {"2": {"rooms": ["lab"]}}},
+            r"Floor 2, room lab is closed, and there is no other way\.",
+        ),
+        (("2", (99.0, 1.0)), {}, r"Floor 2: The goal lies outside the map\. .*"),
+        (("2", (0.1, 0.1)), {}, r"Floor 2: The goal lies in an obstacle\. The nearest point .*"),
+    ],
+)
+def test_a_route_that_is_not_there_has_a_reason(goal, closed, reason):
+    plan = building().plan(("1", KITCHEN), goal, **closed)
+    assert not plan.solved
+    assert re.fullmatch(reason, " ".join(plan.reasons["en"]))
+    assert plan.to_dict()["why"] == {"words": list(plan.reasons["en"])}
+    assert plan.reasons["de"]
+    with pytest.raises(PlanError, match=re.escape(plan.reasons["en"][0][:-1])):
+        plan.raise_for_status()
+    opened = building().plan(("1", KITCHEN), ("2", LAB))
+    assert opened.solved
+    assert (opened.reasons, opened.to_dict()["why"]) == ({}, None)
+
+
+def test_what_opens_a_route_does_and_nothing_of_it_can_stay_closed():
+    shut = {
+        "closed_links": ["lift", "stairs"],
+        "blocked": {"2": {"doors": [6]}, "1": {"doors": [2]}},
+    }
+    (reason,) = building().plan(("1", KITCHEN), ("2", LAB), **shut).reasons["en"]
+    named = re.fullmatch(r"If link (?:lift|stairs), (.*) and (.*) open, there .*", reason)
+    assert named is not None
+    assert sorted(named.groups()) == ["floor 1, door 2", "floor 2, door 6"]
+
+
+def test_walls_and_floors_that_no_link_joins_are_named():
+    alone = building(links=()).plan(("1", KITCHEN), ("2", LAB))
+    assert alone.reasons["en"] == (
+        "No lift, stairs or ramp that this robot can take joins floors 1 and 2.",
+    )
+    lines = [line.replace("######ll", "########") for line in HOUSE]
+    walled = building(hn.HybridPlanner(topology_of(lines))).plan(("1", KITCHEN), ("2", LAB))
+    assert walled.reasons["en"][0].startswith("Floor 2: Obstacles and unexplored cells enclose")
+
+
+@pytest.mark.parametrize("blocked", [["door 4"], 5, "2:door:6", [{"doors": [4]}]])
+def test_closures_without_floors_are_refused(blocked):
+    with pytest.raises(InvalidValueError, match=r"mapping from names of floors .* as \{'1'"):
+        building().plan(("1", KITCHEN), ("2", LAB), blocked=blocked)
