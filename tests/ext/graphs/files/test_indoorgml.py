@@ -175,6 +175,16 @@ def test_rooms_contain_their_places_and_doors_join_them(path):
         assert shapely.Polygon(outer, holes).buffer(1e-5).covers(shapely.Polygon(own))
 
 
+def test_a_room_of_occupied_cells_alone_is_left_out(path):
+    classes = np.full((4, 8), hn.CellClass.FREE)
+    classes[:, 4:] = hn.CellClass.OCCUPIED
+    hn.ext.graphs.export_indoorgml(
+        topology(classes, np.arange(8) // 4 * np.ones((4, 1), int)), path
+    )
+    rooms: Any = hn.ext.graphs.load_indoorgml(path).layers["rooms"]
+    assert [name for _, name in rooms.nodes("name")] == ["west"]
+
+
 def test_floors_are_levels_and_a_lift_is_a_transfer_space_on_each(path):
     building = house()
     left_out = hn.ext.graphs.export_indoorgml(building, path)

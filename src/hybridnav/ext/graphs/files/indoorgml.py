@@ -240,8 +240,10 @@ def _add_rooms(
 
     rooms, number = topology.rooms, floor[0]
     room_of = rooms.labels.label_of[tuple(topology.level.cells.T)]
-    ids = {name: f"R{number}.{label}" for label, name in enumerate(rooms.names)}
-    for label, (name, cell) in enumerate(ids.items()):
+    # A room of occupied cells alone has no place, and is none here.
+    labels = np.unique(room_of[room_of >= 0]).tolist()
+    ids = {rooms.names[label]: f"R{number}.{label}" for label in labels}
+    for label, (name, cell) in zip(labels, ids.items(), strict=True):
         own = [f"P{number}.{place}" for place in topology.place_ids[room_of == label].tolist()]
         rings = [places.nodes[place]["polygon"] for place in own]
         known = [shapely.Polygon(outer, inner) for outer, *inner in rings]
@@ -263,7 +265,7 @@ def _add_door(
     layer: nx.MultiGraph[str], door: Door, ends: Any, known: tuple[dict[str, str], int]
 ) -> None:
     ids, number = known
-    cells = [ids[name] for name in door.rooms if name is not None]
+    cells = [ids[name] for name in door.rooms if name in ids]
     boundary = f"D{number}.{door.number}"
     facts: dict[str, Any] = {
         "kind": "NavigableBoundary" if door.passable else "CellBoundary",
