@@ -32,9 +32,9 @@ _COMMAND = (
 )
 
 
-def started(cache: Path) -> subprocess.Popen[str]:
+def started(cache: Path, words: tuple[str, ...] = PLAN) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", _COMMAND, *PLAN],
+        [sys.executable, "-c", _COMMAND, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         encoding="utf-8",
@@ -71,7 +71,9 @@ def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture
             KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
     told = capsys.readouterr().err
     # Another command may need others: "once" is said of each kernel, not of the installation.
-    assert told.startswith("hybridnav: compiling kernels, each once, when a command first needs it")
+    assert told.startswith(
+        "hybridnav: compiling kernels that this command needs, up to two minutes, once"
+    )
     assert told.count("\n") == 1
     KERNELS.warning("compiled", extra={"seconds": 9.0, "is_kept": True})
     assert capsys.readouterr().err == ""
@@ -132,6 +134,21 @@ def test_a_first_plan_leaves_nothing_to_compile(tmp_path: Path) -> None:
         assert told.count("\n") == is_first
         assert (len(list(tmp_path.rglob("*.nbi"))) > kept) == is_first
     assert not compilers(tmp_path)
+
+
+@pytest.mark.full  # compiles all kernels of a model
+def test_a_model_leaves_nothing_to_compile_for_plans_on_it(tmp_path: Path) -> None:
+    model, cache = str(tmp_path / "office.hnm"), tmp_path / "kernels"
+    built = ("build", PLAN[1], "--preset", "shortest", "--find-rooms", "-o", model)
+    ends = ("--start", "1.0,13.2", "--goal", "40.6,19.4"), ("--from", "room-1", "--to", "room-5")
+    counts = []
+    for words in (built, *(("plan", model, *one) for one in ends)):
+        with started(cache, words) as process:
+            process.communicate()
+        assert process.returncode == 0
+        counts.append(len(list(cache.rglob("*.nbc"))))
+    assert counts[0] > 0
+    assert counts[1:] == counts[:1] * 2
 
 
 def test_set_up_compiles_whole_plans_not_their_searches_alone(

@@ -22,6 +22,7 @@ from hybridnav.cli.reading import (
     overridden,
     with_map,
 )
+from hybridnav.cli.warm import rehearse
 
 FindRoomsOption = Annotated[
     bool, typer.Option("--find-rooms", help="Find rooms, and keep them in the model.")
@@ -76,6 +77,8 @@ def build(
     seconds["prepare"] = round(clock() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         hn.save(planners, out, compress=compress)
+    with stage("planning on the model once", seconds, "rehearse"):
+        rehearse(out, settings)
     answer(_summary(out, topology, settings, seconds))
 
 

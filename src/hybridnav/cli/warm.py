@@ -21,7 +21,8 @@ from hybridnav._base.threads import cores, start_module
 from hybridnav.cli.common import complain, stage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
     from hybridnav.planner import Preset
 
@@ -34,7 +35,10 @@ SEARCHES = ("shortest", "octile", "grid-astar", "paper")
 """Methods whose search can be compiled without a pyramid."""
 SEARCH = "search-"
 """Beginning of the job of a search: a preset of the method's name is a job of its own."""
-_FIRST = "compiling kernels, each once, when a command first needs it; the next start is quick"
+_FIRST = (
+    "compiling kernels that this command needs, up to two minutes, once; others need others "
+    "(all beforehand: python -m hybridnav.cli.warm)"
+)
 _NOT_MINE = " (those of this package are for another version of numba)"
 
 
@@ -123,6 +127,35 @@ def start(*jobs: str) -> subprocess.Popen[bytes] | None:
     with contextlib.suppress(OSError):
         return start_module("hybridnav.cli.warm", *jobs, **pipes)
     return None
+
+
+# What a model is prepared for: the first plan on it compiles nothing.
+
+
+def rehearse(file: Path, presets: Iterable[Preset]) -> None:
+    """Plan on a model that was written as `hybridnav plan` will: by each preset, and in words where
+    it has rooms.
+
+    Arrays of a file are of other types than those that were written, so kernels are compiled anew.
+    """
+    import numpy as np  # noqa: PLC0415 - help does without
+
+    model = hn.load(file)
+    free = np.argwhere(model.grid.enterable())
+    if not len(free):
+        return
+    pairs = model.grid.frame.points_of(free[np.random.default_rng(0).integers(len(free), size=40)])
+    for preset in presets:
+        if preset.planner.method == "ompl":  # its process takes its time at every start
+            continue
+        planner = model.planner(preset, topology=model.grown(preset.pyramid, model.rooms))
+        for start, goal in zip(pairs[::2], pairs[1::2], strict=True):
+            found = planner.plan(start, goal)
+            if found.solved:
+                found.to_dict()
+                if model.rooms is not None and model.rooms.names:
+                    hn.plan_tour(planner, [start, model.rooms.names[0]]).words()
+                break
 
 
 # What is compiled.
