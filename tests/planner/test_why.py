@@ -290,3 +290,12 @@ def test_hostile_questions_end_in_one_line():
             planner.explain((0.1, 0.1), (0.2, 0.1), radius_m=radius)
     with pytest.raises(InvalidValueError, match="language must be one of"):
         planner.explain((0.1, 0.1), (0.2, 0.1)).words("xx")
+
+
+def test_a_found_room_is_not_called_a_room_twice():
+    grid = hn.example_map("figure1")
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
+    why = hn.HybridPlanner(topology).explain(
+        (0.5, 0.5), (2.0, 2.5), blocked={"rooms": [topology.rooms.at((0.5, 0.5))]}
+    )
+    assert why.reason.startswith("The start is closed by room-")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.guide import check_language
+from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -161,6 +162,8 @@ def closure_words(closure: Closure, language: str) -> str:
 
 
 def _named(closure: Closure, table: dict[str, str]) -> str:
+    if closure.kind == "rooms" and FOUND_NAME.fullmatch(str(closure.which)):
+        return str(closure.which)  # "room-1" says what it is
     order = closure.which + 1 if isinstance(closure.which, int) else ""
     return table[closure.kind].format(which=closure.which, order=order)
 
