@@ -121,7 +121,7 @@ def room_log(path: Path, *, extra: str = "") -> Path:
 
 def test_a_log_becomes_a_map_that_other_commands_read(cli: Any, tmp_path: Path) -> None:
     log, out = room_log(tmp_path / "room.log", extra="FLASER 181 1.0 1."), tmp_path / "room.yaml"
-    done = cli("map", log, "-o", out, "--resolution", "0.1")
+    done = cli("map", log, "-o", out, "--force", "--resolution", "0.1")
     assert (done.code, done.err) == (0, "")
     assert "scans      12, recorded in 11 s" in done.out
     assert "log        left out 1 of 13 scans: 1 line cut off" in done.out
@@ -147,7 +147,7 @@ def test_the_log_is_never_replaced(cli: Any, tmp_path: Path, name: str) -> None:
 
 def test_the_figures_are_one_object(cli: Any, tmp_path: Path) -> None:
     log, out = room_log(tmp_path / "room.log"), tmp_path / "room.yaml"
-    answer = cli("map", log, "-o", out, "--resolution", "0.1", "--json").answer
+    answer = cli("map", log, "-o", out, "--force", "--resolution", "0.1", "--json").answer
     grid = hn.load_map(out, robot_radius_m=0)
     assert (answer["rows"], answer["cols"]) == grid.shape
     assert answer["cells"] == grid.class_counts()
@@ -157,7 +157,7 @@ def test_the_figures_are_one_object(cli: Any, tmp_path: Path) -> None:
 def test_settings_of_the_sensor_reach_the_map(cli: Any, tmp_path: Path) -> None:
     log, out = room_log(tmp_path / "room.log"), tmp_path / "room.yaml"
     settings = ("--max-range", "1.9", "--clear-range", "1.0", "--hit", "0.7", "--pass", "0.4")
-    assert cli("map", log, "-o", out, "--resolution", "0.1", *settings).code == 0
+    assert cli("map", log, "-o", out, "--force", "--resolution", "0.1", *settings).code == 0
     grid = hn.load_map(out, robot_radius_m=0)
     far = grid.frame.cells_of([7.05, 5.0])
     assert far[1] >= grid.shape[1]  # the walls at 2 m are beyond
@@ -169,15 +169,19 @@ def test_what_cannot_be_mapped_is_refused(cli: Any, tmp_path: Path) -> None:
     log, out = room_log(tmp_path / "room.log"), tmp_path / "room.yaml"
     empty = tmp_path / "empty.log"
     empty.write_text("ODOM 1 2 3\nFLASER 3 1\n", encoding="utf-8")
-    assert cli("map", empty, "-o", out).refuses(3, "no scan", "FLASER", "1 line cut off")
-    assert cli("map", log, "-o", out, "--max-range", "0.5").refuses(3, "no reading below")
-    assert cli("map", tmp_path / "no.log", "-o", out).refuses(3, "no such file")
+    assert cli("map", empty, "-o", out, "--force").refuses(3, "no scan", "FLASER", "1 line cut off")
+    assert cli("map", log, "-o", out, "--force", "--max-range", "0.5").refuses(
+        3, "no reading below"
+    )
+    assert cli("map", tmp_path / "no.log", "-o", out, "--force").refuses(3, "no such file")
     assert cli("map", log, "-o", tmp_path / "room.png").refuses(2, "must end in .yaml")
     assert cli("map", log, "-o", tmp_path / "no" / "room.yaml").refuses(2, "cannot write")
-    assert cli("map", log, "-o", out, "--resolution", "0").refuses(2, "resolution")
-    assert cli("map", log, "-o", out, "--hit", "0.4").refuses(2, "when_hit")
-    assert cli("map", log, "-o", out, "--least", "0.5").refuses(2, "least_probability")
-    assert cli("map", log, "-o", out, "--max-cells", "9").refuses(3, "12 beyond --max-cells")
+    assert cli("map", log, "-o", out, "--force", "--resolution", "0").refuses(2, "resolution")
+    assert cli("map", log, "-o", out, "--force", "--hit", "0.4").refuses(2, "when_hit")
+    assert cli("map", log, "-o", out, "--force", "--least", "0.5").refuses(2, "least_probability")
+    assert cli("map", log, "-o", out, "--force", "--max-cells", "9").refuses(
+        3, "12 beyond --max-cells"
+    )
     assert not out.exists()
 
 
@@ -185,7 +189,7 @@ def test_what_cannot_be_mapped_is_refused(cli: Any, tmp_path: Path) -> None:
 def test_a_bag_becomes_a_map_of_its_scans(cli, tmp_path, kind):
     out = tmp_path / "room.yaml"
     bag = driven(kind).write(tmp_path)
-    done = cli("map", bag, "-o", out, "--resolution", 0.1, "--json")
+    done = cli("map", bag, "-o", out, "--force", "--resolution", 0.1, "--json")
     assert (done.code, done.err) == (0, "")
     assert (done.answer["scans"], done.answer["left_out"]) == (40, {})
     grid = hn.load_map(out, robot_radius_m=0)
@@ -193,7 +197,7 @@ def test_a_bag_becomes_a_map_of_its_scans(cli, tmp_path, kind):
     away = np.minimum(np.abs(np.abs(walls[:, 0]) - 4), np.abs(np.abs(walls[:, 1]) - 3))
     assert len(walls) > 50
     assert away.max() < 0.11
-    shown = cli("map", bag, "-o", out, "--resolution", 0.1).out
+    shown = cli("map", bag, "-o", out, "--force", "--resolution", 0.1).out
     assert [line.split()[0] for line in shown.splitlines()] == [
         "map", "extent", "cells", "scans", "log", "seconds",
     ]  # fmt: skip
@@ -204,23 +208,36 @@ def test_the_map_of_a_bag_is_written_as_it_is(cli, tmp_path):
     grid = hn.example_map("figure1")
     hn.ext.live.save_bag(tmp_path / "kept.bag", grid=grid)
     out = tmp_path / "kept.yaml"
-    done = cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map", "--json")
+    done = cli("map", tmp_path / "kept.bag", "-o", out, "--force", "--topic", "/map", "--json")
     assert done.answer["cells"]["free"] == (grid.measured == hn.CellClass.FREE).sum()
     again = hn.load_map(out, robot_radius_m=grid.robot_radius_m)
     assert (again.measured == grid.measured).all()
-    shown = cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map").out
+    assert cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map").refuses(
+        2, "kept.yaml exists: add --force to write over it"
+    )
+    out.unlink()
+    assert cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map").refuses(
+        2, "kept.pgm exists: add --force to write over it"
+    )
+    shown = cli("map", tmp_path / "kept.bag", "-o", out, "--force", "--topic", "/map").out
     assert [line.split()[0] for line in shown.splitlines()] == ["map", "extent", "cells"]
 
 
 def test_wrong_topics_and_frames_end_in_one_line(cli, tmp_path):
     bag, out = driven("mcap").write(tmp_path), tmp_path / "m.yaml"
-    assert cli("map", bag, "-o", out, "--topic", "/rear").refuses(3, "'/rear'", "/scan: name one")
-    moon = cli("map", bag, "-o", out, "--frame", "moon")
+    assert cli("map", bag, "-o", out, "--force", "--topic", "/rear").refuses(
+        3, "'/rear'", "/scan: name one"
+    )
+    moon = cli("map", bag, "-o", out, "--force", "--frame", "moon")
     assert moon.refuses(3, "no scan of a laser", "40 no transforms from laser to moon")
     log = tmp_path / "some.log"
     log.write_text("")
-    assert cli("map", log, "-o", out, "--topic", "/scan").refuses(2, "--topic is for bags")
-    assert cli("map", log, "-o", out, "--frame", "odom").refuses(2, "--frame is for bags")
+    assert cli("map", log, "-o", out, "--force", "--topic", "/scan").refuses(
+        2, "--topic is for bags"
+    )
+    assert cli("map", log, "-o", out, "--force", "--frame", "odom").refuses(
+        2, "--frame is for bags"
+    )
     assert not out.exists()
 
 

@@ -117,6 +117,7 @@ def map(  # noqa: A001 - the command's name
     max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     topic: TopicOption = None,
     frame: options.FrameOption[str | None] = None,
+    force: options.ForceOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map.
@@ -132,6 +133,8 @@ def map(  # noqa: A001 - the command's name
             raise UsageError(
                 f"--out {str(out)!r:.80} would replace the log, expected another name: choose one"
             )
+        if file.exists() and not force:
+            raise UsageError(f"{printable(file)} exists: add --force to write over it")
     if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
         return
     from hybridnav.ext.live.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
