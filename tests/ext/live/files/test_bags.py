@@ -197,7 +197,9 @@ def test_the_topic_must_be_one_of_scans(tmp_path: Path) -> None:
     with pytest.raises(hn.errors.MapError, match="expected topic '/tf' of"):
         hn.ext.live.BagLog(path, topic="/tf")
     assert sum(1 for _ in hn.ext.live.BagLog(path, topic="/scan")) == 40
-    with pytest.raises(hn.errors.MapError, match="got no topic of that type"):
+    with pytest.raises(
+        hn.errors.MapError, match=r"got no topic of that type; topics: /odom|topics: .*/rear, /scan"
+    ):
         hn.ext.live.load_bag_map(path)
 
 
@@ -304,6 +306,22 @@ def test_the_last_map_of_a_topic_counts_and_topics_are_named(tmp_path: Path) -> 
         hn.errors.MapError, match="expected topic '/floor' of nav_msgs/OccupancyGrid, got"
     ):
         hn.ext.live.load_bag_map(path, topic="/floor")
+    # A last map of 0 x 0 cells does not make the bag useless.
+    empty = bag.make(
+        "nav_msgs/MapMetaData",
+        map_load_time=header.stamp,
+        resolution=0.5,
+        width=0,
+        height=0,
+        origin=origin,
+    )
+    message = store.types[GRID](header=header, info=empty, data=np.zeros(0, np.int8))
+    bag.add("/map", GRID, 2, message)
+    (tmp_path / "again").mkdir()
+    path = bag.write(tmp_path / "again")
+    with pytest.warns(hn.errors.MapWarning, match=r"the last map is wrong .*, taken is the last"):
+        grid = hn.ext.live.load_bag_map(path, robot_radius_m=0)
+    assert grid.classes.tolist() == [[0]]
 
 
 def test_a_wrong_map_names_bag_and_topic(tmp_path: Path) -> None:

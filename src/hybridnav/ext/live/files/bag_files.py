@@ -91,7 +91,11 @@ class Bag:
             return str(topic)
         named = "a topic" if topic is None else f"topic {brief(topic)}"
         if not found:
-            raise MapError(f"{self.where}: expected {named} of {short}, got no topic of that type")
+            there = ", ".join(sorted(self.topics)) or "none"
+            raise MapError(
+                f"{self.where}: expected {named} of {short}, got no topic of that type; topics: "
+                f"{there:.200}"
+            )
         raise MapError(
             f"{self.where}: expected {named} of {short}, got {', '.join(found):.200}: name one"
         )

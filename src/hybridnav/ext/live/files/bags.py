@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
+from contextlib import suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +15,7 @@ import numpy as np
 from hybridnav._base.files import printable
 from hybridnav._base.messages import number_of, stamp_ns_of, value_of
 from hybridnav._base.trig import atan2, cos
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError, MapError, MapWarning
 from hybridnav.ext.live.files import bag_files
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
@@ -79,17 +82,25 @@ def load_bag_map(
     if topic is None and "/map" in bag.topics_of({bag_files.GRID}):
         topic = "/map"
     topic = bag.topic_of(bag_files.GRID, topic)
-    message = bag.last(topic)
+    read = partial(
+        OccupancyGrid.from_message,
+        robot_radius_m=robot_radius_m,
+        free_threshold=free_threshold,
+        occupied_threshold=occupied_threshold,
+        name=topic.strip("/") or "map",
+    )
     try:
-        return OccupancyGrid.from_message(
-            message,
-            robot_radius_m=robot_radius_m,
-            free_threshold=free_threshold,
-            occupied_threshold=occupied_threshold,
-            name=topic.strip("/") or "map",
-        )
+        return read(bag.last(topic))
     except InvalidValueError as error:
-        raise MapError(f"{bag.where}, {topic}: {error}") from None
+        where, fault, good = f"{bag.where}, {topic}", error, None
+    for _, message in bag.messages([topic]):
+        with suppress(InvalidValueError):
+            good = read(message)
+    if good is None:
+        raise MapError(f"{where}: {fault}")
+    text = f"{where}: the last map is wrong ({fault}), taken is the last good one"
+    warnings.warn(text, MapWarning, stacklevel=2)
+    return good
 
 
 class BagLog(ScanLog):
@@ -125,7 +136,7 @@ class BagLog(ScanLog):
     >>> try:
     ...     BagLog("plans.bag", topic="/scan")
     ... except hn.errors.MapError as error:
-    ...     print(error)
+    ...     print(str(error).partition(";")[0])
     bag plans.bag: expected topic '/scan' of sensor_msgs/LaserScan, got no topic of that type
     """
 
