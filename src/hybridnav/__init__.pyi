@@ -1,4 +1,4 @@
-from . import errors as errors, ext as ext
+from . import errors as errors, ext as ext, harness as harness, viz as viz
 from .maps import (
     CellClass as CellClass,
     DroppedIslands as DroppedIslands,

@@ -192,6 +192,41 @@ class UnknownRegions(SoundPlaces):
         return replace(answer, nodes=(answer.nodes[0], 10**6, answer.nodes[-1]), arcs=None)
 
 
+class PlansAlone(SoundPlaces):
+    """Regions are the whole answer, and nothing is said of a search for them: no fault."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        nodes = self.route(super().solve(start, goal).nodes)
+        return MethodResult(None, nodes=nodes)
+
+    def route(self, nodes: tuple[int, ...] | None) -> tuple[int, ...] | None:
+        """Return the regions of the answer."""
+        return nodes
+
+
+class PlansAcrossWalls(PlansAlone):
+    """Regions alone, of which each third is left out: those beside it do not touch."""
+
+    def route(self, nodes: tuple[int, ...] | None) -> tuple[int, ...] | None:
+        return nodes and tuple(node for at, node in enumerate(nodes) if at % 3 != 1)
+
+
+class PlansForAll(PlansAlone):
+    """Regions of start and goal for each pair, joined or not."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        assert self.region_of is not None
+        ends = int(self.region_of[start]), int(self.region_of[goal])
+        return MethodResult(None, nodes=tuple(dict.fromkeys(ends)))
+
+
+class PlansOfNothing(Sound):
+    """Regions of a method that has none."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:  # noqa: ARG002
+        return MethodResult(None, nodes=(0, 1))
+
+
 class Liar(SoundPlaces):
     """A method that tells the truth or one of ten lies, at random."""
 

@@ -49,6 +49,9 @@ FAULTS = {
     faulty.SkipsRegions: "no metric path inside regions",
     faulty.Backwards: "the plan does not start and end in the regions of start and goal",
     faulty.UnknownRegions: "the plan names region 1000000, which there is not",
+    faulty.PlansAcrossWalls: "no metric path inside regions",
+    faulty.PlansForAll: "solvability: planned, but on the whole grid: no path",
+    faulty.PlansOfNothing: "cannot be judged where region_of is None: state the region",
     faulty.TornRegion: "is not connected",
     faulty.HomelessCells: "free cells are in no region",
 }
@@ -63,6 +66,8 @@ OF_KIND = {
     faulty.SkipsRegions: {"plan to path"},
     faulty.Backwards: {"plan to path"},
     faulty.UnknownRegions: {"plan to path"},
+    faulty.PlansAcrossWalls: {"plan to path"},
+    faulty.PlansForAll: {"plan to path", "no path"},
     faulty.TornRegion: {"regions"},
     faulty.HomelessCells: {"regions", "path to plan"},
 }

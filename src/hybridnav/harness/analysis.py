@@ -220,11 +220,13 @@ def to_frame(study: Study) -> pd.DataFrame:
         `status` of the record, and `faults`, the number of its contradictions. `length_m` is NaN
         where the method found no path without a fault itself; it and what follows is NaN for equal
         cells, and where the reference found no path. `octile_optimum_m` and `any_angle_optimum_m`
-        follow, and as shares `octile_loss` and `any_angle_loss` over them. Then `seconds` of the
-        query and `reference_seconds` of A* on the whole grid, and `expanded` cells, intervals and
-        nodes together. A run with costs also has `costs`, their text, `cost_m`,
-        `weighted_optimum_m` and `cost_lower_bound_m`. Any-angle paths with a bound on paths of
-        cells have `cost_grid_bound_m`. `weighted_loss`, `gap` and `grid_gap` are shares.
+        follow, and as shares `octile_loss` and `any_angle_loss` over them. `plan_loss` and
+        `in_order_loss` are Thrun's losses of the plan, `plan_steps` its steps, and `backups` his
+        count: nodes times steps, of cells for a method without plans. Then `seconds` of the query
+        and `reference_seconds` of A* on the whole grid, and `expanded` cells, intervals and nodes
+        together. A run with costs also has `costs`, their text, `cost_m`, `weighted_optimum_m` and
+        `cost_lower_bound_m`. Any-angle paths with a bound on paths of cells have
+        `cost_grid_bound_m`. `weighted_loss`, `gap` and `grid_gap` are shares.
 
     Raises
     ------
@@ -263,6 +265,10 @@ def _columns(outcome: Outcome) -> dict[str, object]:
         "any_angle_optimum_m": frame["any_angle_optima_m"],
         "octile_loss": frame["octile_losses"],
         "any_angle_loss": frame["any_angle_losses"],
+        "plan_loss": frame["plan_losses"],
+        "in_order_loss": frame["in_order_losses"],
+        "plan_steps": frame["plan_steps"],
+        "backups": frame["backups"],
         "seconds": frame["seconds"],
         "reference_seconds": frame["reference_seconds"],
         "expanded": frame["expansions"],

@@ -83,9 +83,10 @@ _OF_COSTS = {
 }
 _SOLVED = {
     "metric": "metric of its paths: octile, paths of cells; any-angle, paths of points; weighted "
-    "and any-angle-weighted, the same, planned by costs",
+    "and any-angle-weighted, the same, planned by costs; regions, none: it has plans alone",
     "solved %": "share of the pairs of two joined cells for which it found a path of its own "
     "without a fault",
+    "planned %": "share of these pairs for which it answered with regions alone, without a fault",
     "by the grid %": "share of these pairs for which the path of the grid, shortened by line of "
     "sight, replaced one that it did not find; it counts in no other column",
 }
@@ -99,12 +100,16 @@ EFFICIENCY_COLUMNS = {
     "work in cells": "expansions times that price: the mean time of a query in the unit in which "
     "the reference expands one cell. Work of different methods can be compared, their expansions "
     "cannot",
+    "steps": "mean steps of its plans, of a method without a topological layer those of its paths; "
+    "none of plans that are read off paths",
+    "backups": "Thrun's count of value-iteration backups: nodes times steps, mean over the maps",
     "query ms, median": "median wall-clock time of one query over these pairs, from two ends to "
     "the path, kernels warm; with repeats the time of a pair is their median",
     "query ms, p95": "95th percentile of these times",
     "spread %": "longest minus shortest time of the repeats of a pair, over their median: the "
     "median of this over these pairs",
-    "speed-up": "median over these pairs of the ratio of the reference's time to the method's",
+    "speed-up": "median over these pairs of the ratio of the reference's time to the method's; "
+    "below 1 the method is slower",
     "speed-up of means": "ratio of the reference's mean time to the method's, over the same pairs: "
     "what a robot saves that asks them all",
     "preparation s": "mean over the maps of the seconds from the loaded map to the first query",
@@ -231,6 +236,7 @@ def figures(
     fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
     by_grid = int(sum(fallbacks)) if fallbacks else math.nan
     solved, pairs = int(np.isfinite(lengths).sum()), len(lengths)
+    planned = sum(int(outcome.planned.sum()) for outcome in outcomes)
     by_costs = any(outcome.costs for outcome in outcomes)
     # A method that was not asked on a map says nothing of its metric there.
     asked = [outcome for outcome in outcomes if outcome.is_asked] or outcomes
@@ -239,10 +245,11 @@ def figures(
         "pairs": pairs,
         "solved": solved,
         "solved %": 100 * solved / pairs if pairs else math.nan,
+        "planned %": 100 * planned / pairs if planned else math.nan,
         "by the grid": by_grid,
         "by the grid %": 100 * by_grid / pairs if pairs else math.nan,
         "faults": sum(len(outcome.faults) for outcome in outcomes),
-        "pairs in common": int(np.isfinite(pool.shared("lengths_m")).sum()),
+        "pairs in common": int(pool.shared("answered").sum()),
         **consistency_row(outcomes),
     }
     for optimum in OPTIMA:
@@ -305,6 +312,7 @@ def _efficiency(pool: _Pool, outcomes: Sequence[Outcome], references: Sequence[O
     return {
         "nodes": pool.mean_of("n_nodes"),
         "edges": pool.mean_of("n_edges"),
+        "steps": nanmean(pool.of(attrgetter("steps"))),
         "backups": nanmean(counts),
         "backups of the grid / backups": nanquantile(_ratio(grid_counts, counts), 0.5),
         **{

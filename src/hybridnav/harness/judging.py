@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridnav import check_proof
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.judges import (
@@ -22,7 +23,14 @@ from hybridnav.harness.judges import (
     judge_path,
     line_cells,
 )
-from hybridnav.harness.yardstick import ANY_ANGLE_SLACK, ARC_SLACK, SLACK, AnyAngleOptimum, Fault
+from hybridnav.harness.yardstick import (
+    ANY_ANGLE_SLACK,
+    ARC_SLACK,
+    PLANNED,
+    SLACK,
+    AnyAngleOptimum,
+    Fault,
+)
 from hybridnav.maps import CellClass
 from hybridnav.maps.costs import cost_along
 from hybridnav.search.grid_search import GridSearch
@@ -94,17 +102,23 @@ class Judge:
             checked.append("proofs")
             wrong = _false_proof(self._grid, pair, answer, length_m)
             faults += [Fault("proofs", wrong)] if wrong else []
-        checks = self._consistency
+        checks, status = self._consistency, status_of(answer)
         if checks is None:
+            if status == PLANNED:
+                raise InvalidValueError(
+                    "a plan of regions cannot be judged where region_of is None: state the region "
+                    "of each cell, or return a path"
+                )
             return length_m, faults, checked
         if answer.nodes is not None:
             checked.append("plan to path")
             arcs = answer.arcs if self._has_arcs else None  # they may belong to another map
             wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
             faults += [Fault("plan to path", wrong)] if wrong else []
-        if not answer.gave_up and answer.is_path != checks.joined(pair.start, pair.goal):
-            here, there = ("solved", "no path") if answer.is_path else ("no path", "solved")
-            faults.append(Fault("no path", f"solvability: {here}, but on the whole grid: {there}"))
+        there = "solved" if checks.joined(pair.start, pair.goal) else "no path"
+        if not answer.gave_up and (status == "no path") != (there == "no path"):
+            text = f"solvability: {status}, but on the whole grid: {there}"
+            faults.append(Fault("no path", text))
         if answer.is_path and not faults:
             checked.append("path to plan")
             wrong = checks.check_walk(self._cells_of(answer))
@@ -167,9 +181,10 @@ class Judge:
 
     def in_order_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length of the shortest path of cells through the regions of the plan in their
-        order; None without path, by costs, and for a plan that no search made."""
+        order; None by costs, for no plan, and for one that is read off a path."""
         checks = None if self._costs is not None else self._consistency
-        if checks is None or not answer.nodes or not answer.is_path or not answer.expanded_nodes:
+        was_searched = answer.expanded_nodes if answer.is_path else not answer.gave_up
+        if checks is None or not answer.nodes or not was_searched:
             return None
         return (
             checks.shortest_in_order(pair.start, pair.goal, answer.nodes) * self._grid.resolution_m
@@ -177,7 +192,7 @@ class Judge:
 
     def plan_optimum_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length, or the cost, of the best path inside the regions of the plan; None
-        without plan or path."""
+        without a plan, or a path there."""
         if answer.nodes is None or self._search is None:
             return None
         self._regions[list(answer.nodes)] = True
@@ -190,6 +205,13 @@ class Judge:
         if self._layer is not None:
             return self._layer.cost_of_cells(found.cells) * self._grid.resolution_m
         return path_length_in_cells(found.cells) * self._grid.resolution_m
+
+
+def status_of(answer: MethodResult) -> str:
+    """Return the status of the record of an answer."""
+    if answer.is_path:
+        return "solved"
+    return answer.gave_up or ("no path" if answer.nodes is None else PLANNED)
 
 
 def _false_claims(line: AnyAngleResult, length_m: float) -> list[str]:

@@ -15,6 +15,7 @@ from hybridnav.harness.yardstick import (
     ANSWERED,
     ANY_ANGLE_SLACK,
     NOT_ASKED,
+    PLANNED,
     SLACK,
     TOO_SLOW,
     is_any_angle,
@@ -36,6 +37,9 @@ EXPANSIONS = {
 """Fields of records that count things taken from the queue of a search, and their columns."""
 
 _FINE = ("ready", NOT_ASKED, *ANSWERED)
+
+REGIONS = "regions"
+"""Metric of methods that have plans alone."""
 
 MapQuery = tuple[str, QueryKey]
 
@@ -88,7 +92,9 @@ class Outcome:
     @cached_property
     def metric(self) -> str:
         """Metric of the method's paths: "octile" or "any-angle"; "weighted" or "any-angle-weighted"
-        if it planned by costs."""
+        if it planned by costs; "regions" if it has plans alone."""
+        if self.has_plans_alone:
+            return REGIONS
         if self.preparation.get("by_costs"):
             return "any-angle-weighted" if self.is_any_angle else "weighted"
         return "any-angle" if self.is_any_angle else "octile"
@@ -98,6 +104,27 @@ class Outcome:
         """Whether some of the method's paths are any-angle ones."""
         return any(map(is_any_angle, (self.preparation, *self.records)))
 
+    @cached_property
+    def _faulty(self) -> BoolArray:
+        return np.array([bool(r and r.get("faults")) for r in self.matched], dtype=np.bool_)
+
+    @cached_property
+    def planned(self) -> BoolArray:
+        """Whether each pair was answered by regions alone, without a fault."""
+        planned = [bool(record and record["status"] == PLANNED) for record in self.matched]
+        return np.array(planned, dtype=np.bool_) & ~self._faulty
+
+    @cached_property
+    def has_plans_alone(self) -> bool:
+        """Whether the method planned, and found no path."""
+        return bool(self.planned.any() and not np.isfinite(self._lengths["lengths_m"]).any())
+
+    @cached_property
+    def answered(self) -> BoolArray:
+        """Whether the method solved each pair itself without a fault; of one that has plans alone,
+        whether it planned."""
+        return self.planned if self.has_plans_alone else np.isfinite(self._lengths["lengths_m"])
+
     @property
     def costs(self) -> str:
         """Costs of the run, as a text; empty for lengths."""
@@ -106,7 +133,7 @@ class Outcome:
     @cached_property
     def frame(self) -> dict[str, FloatArray]:
         """The arrays by name; each is an attribute, too."""
-        return self._lengths | self._losses | self._efforts
+        return self._lengths | self._losses | self._efforts | self._steps()
 
     @cached_property
     def _lengths(self) -> dict[str, FloatArray]:
@@ -114,7 +141,6 @@ class Outcome:
         paths that stand in for them, and of all."""
         figure, own = self.figure, [record or {} for record in self.matched]
         of_grid = np.nan_to_num(figure("by_grid")) > 0
-        faulty = np.array([bool(record.get("faults")) for record in own], dtype=np.bool_)
         lines = np.array([is_any_angle(record) for record in own], dtype=np.bool_)
         octile = np.array([octile_optimum_m(record) for record in self.references], dtype=float)
         weighted, any_angle = self._known("weighted_m"), self._known("any_angle_m")
@@ -128,11 +154,11 @@ class Outcome:
         }
         found = {"lengths_m": figure("length_m"), "costs_m": figure("cost_m")}
         judged = found["costs_m" if self.yardstick == "weighted" else "lengths_m"]
-        missed = of_grid | faulty
+        missed = of_grid | self._faulty
         return {
             **{name: np.where(missed, math.nan, values) for name, values in found.items()},
             "judged_m": np.where(missed, math.nan, judged),
-            "fallback_m": np.where(of_grid & ~faulty, judged, math.nan),
+            "fallback_m": np.where(of_grid & ~self._faulty, judged, math.nan),
             "best_m": best[self.yardstick],
             "optima_m": octile,
             "octile_optima_m": of_cells,
@@ -165,7 +191,7 @@ class Outcome:
         """Times, and the things taken from the queues of searches: none of a method that counts
         none."""
         figure, own = self.figure, [record or {} for record in self.matched]
-        solved = np.isfinite(self._lengths["lengths_m"])
+        solved = self.answered
         seconds, asked = figure("seconds"), figure("asked_seconds")
         answered = np.where(np.isfinite(asked), asked, seconds)
         refined = np.array([(one.get("stages") or {}).get("refine", math.nan) for one in own])
@@ -193,9 +219,9 @@ class Outcome:
 
     @cached_property
     def solved_keys(self) -> set[MapQuery]:
-        """The pairs that the method solved itself, without a fault."""
-        solved = np.isfinite(self.lengths_m)
-        return {(self.map_name, query_key(self.references[at])) for at in np.flatnonzero(solved)}
+        """The pairs in `answered`."""
+        at = np.flatnonzero(self.answered)
+        return {(self.map_name, query_key(self.references[one])) for one in at}
 
     def losses_over(self, optimum: Optimum) -> FloatArray:
         """Return lengths, or with "weighted" costs, over an optimum, minus one."""
@@ -221,19 +247,25 @@ class Outcome:
             record.get("method_seconds", math.nan)
         )
 
-    @cached_property
+    @property
     def thrun_count(self) -> float:
         """Thrun's count: nodes times mean steps of a plan; for a method without a topological
-        layer, cells times mean steps of a path. NaN for plans that no search in that layer made,
-        which tell nothing of its price."""
-        steps = self.figure("plan_steps")
-        if np.isfinite(steps).any():
-            if not np.nansum(self.figure("expanded_nodes")) > 0:
-                return math.nan
-        else:
+        layer, cells times mean steps of a path. NaN for plans that are read off paths, which tell
+        nothing of its price."""
+        return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(self.steps))
+
+    def _steps(self) -> dict[str, FloatArray]:
+        """Return the steps of the plans without a fault, and the steps that Thrun counts."""
+        plans = counted = np.where(self._faulty, math.nan, self.figure("plan_steps"))
+        if not np.isfinite(plans).any():
             paths = ((record or {}).get("path") for record in self.matched)
-            steps = np.array([math.nan if path is None else path_steps(path) for path in paths])
-        return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(steps))
+            steps = [math.nan if path is None else path_steps(path) for path in paths]
+            counted = np.array(steps, dtype=float)
+            counted[self._faulty] = math.nan
+        elif not (self.has_plans_alone or np.nansum(self.figure("expanded_nodes")) > 0):
+            counted = np.full(len(plans), math.nan)
+        nodes = self.preparation.get("n_nodes", math.nan)
+        return {"plan_steps": plans, "steps": counted, "backups": nodes * counted}
 
     @cached_property
     def faults(self) -> list[tuple[Record, str]]:

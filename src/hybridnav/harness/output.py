@@ -13,7 +13,7 @@ from hybridnav.harness import columns, tables
 from hybridnav.harness.analysis import Study, load_study, pairs_in_common
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import Outcome, nanmean, nanquantile
+from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile
 from hybridnav.harness.report import (
     MapSection,
     ReportData,
@@ -239,9 +239,9 @@ def _tables(study: Study, rows: Sequence[tables.Row]) -> list[tables.Table]:
     presets = study.presets
     found = [tables.table_of(rows, columns.CONSISTENCY_COLUMNS, "Consistency")]
     for optimum in YARDSTICKS[study.metric]:
-        known = tables.with_values(rows, f"{optimum} loss mean %")
+        chosen = columns.loss_columns(optimum)
+        known = [row for row in rows if _has_loss(row, optimum)]
         if known:
-            chosen = columns.loss_columns(optimum)
             note = tables.ahead_of_presets(known, chosen, presets)
             found.append(tables.table_of(known, chosen, f"Loss over {OPTIMA[optimum]}", note))
     timed = any(tables.with_values(rows, column) for column in columns.EFFICIENCY_COLUMNS)
@@ -249,6 +249,14 @@ def _tables(study: Study, rows: Sequence[tables.Row]) -> list[tables.Table]:
         note = tables.ahead_of_presets(rows, columns.EFFICIENCY_COLUMNS, presets)
         found.append(tables.table_of(rows, columns.EFFICIENCY_COLUMNS, _EFFICIENCY, note))
     return found
+
+
+def _has_loss(row: tables.Row, optimum: Optimum) -> bool:
+    """Return whether a method has losses over an optimum: of its paths, or of its plans alone,
+    which are compared with paths of cells."""
+    of_plans = row["metric"] == REGIONS and optimum != "any-angle"
+    column = "loss of the plan %" if of_plans else f"{optimum} loss mean %"
+    return bool(tables.with_values([row], column))
 
 
 def _section(
@@ -297,7 +305,9 @@ def _losses(outcomes: Sequence[Outcome], study: Study) -> FloatArray:
 
 
 def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
-    """Return the methods for charts, each with those that its losses are compared with."""
+    """Return the methods for charts, each with those that its losses are compared with; none that
+    has no paths."""
+    outcomes = [outcome for outcome in outcomes if not outcome.has_plans_alone]
     if study.metric == "octile":
         return [outcome for outcome in outcomes if not outcome.is_any_angle]
     others = [outcome for outcome in outcomes if outcome.label != REFERENCE]

@@ -15,7 +15,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.judges import paired_difference
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import loss_of, nanmean
+from hybridnav.harness.outcome import REGIONS, loss_of, nanmean
 from hybridnav.harness.records import query_key
 from hybridnav.harness.yardstick import OPTIMA
 from hybridnav.planner import Preset
@@ -144,7 +144,7 @@ def shown(column: str) -> str:
 def ahead_of_presets(rows: Sequence[Row], columns: Iterable[str], presets: Collection[str]) -> str:
     """Return a sentence on the methods that are ahead of every preset in some column of a table.
 
-    Methods with a contradiction are not: what they found is no path. Figures that differ by less
+    Methods with a contradiction are not, and methods without paths. Figures that differ by less
     than half a per cent are equal.
 
     `rows`: rows of the table, with `method` and `faults`; `presets`: methods that are presets.
@@ -157,6 +157,7 @@ def ahead_of_presets(rows: Sequence[Row], columns: Iterable[str], presets: Colle
         for row in rows
         if row["method"] not in presets
         and not row.get("faults")
+        and row.get("metric") != REGIONS
         and row.get("maps", 1) == n_maps  # not of the easier maps alone
     ]
     sign_of = dict.fromkeys(_LOWER, 1) | dict.fromkeys(_HIGHER, -1)

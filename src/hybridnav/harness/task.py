@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from hybridnav._base.clock import clock
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.harness.adapters import checked
-from hybridnav.harness.judging import Judge
+from hybridnav.harness.judging import Judge, status_of
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.records import (
@@ -310,9 +310,8 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
     if not faults:
         known, wrong = judge.oracles(answer, pair, length_m)
         faults = [Fault("bounds", text) for text in wrong]
-    unsolved = answer.gave_up or "no path"
     return {
-        "status": "solved" if answer.is_path else unsolved,
+        "status": status_of(answer),
         "length_m": length_m,
         "bound": float(answer.bound) if math.isfinite(answer.bound) else None,
         "plan_steps": _plan_steps(answer),

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.timing import TimingTask
     from hybridnav.planner.planner import HybridPlanner
 
-    Work = Task | TimingTask
+    Work: TypeAlias = Task | TimingTask
 
 _FLUSH_S = 0.2
 _ATTEMPTS = 2

@@ -105,7 +105,10 @@ cut each corner by as much."""
 ARC_SLACK = 1e-5
 """That of costs of arcs, which judges read by chords."""
 
-ANSWERED = ("solved", "no path")
+PLANNED = "planned"
+"""Status of records whose answer is a plan of regions, without a path."""
+
+ANSWERED = ("solved", PLANNED, "no path")
 """Statuses of records that hold an answer."""
 
 NOT_ASKED = "not asked"
@@ -140,8 +143,9 @@ def contradiction(record: Record, reference: Record) -> Fault | None:
 
     `reference`: the reference's record of the same pair, which holds both optima.
     """
-    if {record["status"], reference["status"]} == set(ANSWERED):
-        text = f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
+    here, there = record["status"], reference["status"]
+    if {here, there} <= set(ANSWERED) and (here == "no path") != (there == "no path"):
+        text = f"solvability: {here}, but on the whole grid: {there}"
         return Fault("no path", text)
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None

@@ -180,8 +180,8 @@ class MethodResult:
     if the method found none, or an `any_angle` one."""
     nodes: tuple[int, ...] | None = None
     """The topological plan: labels of `Solver.region_of` in the order passed, the start's first;
-    None if the method has no topological layer or made no plan. A plan without a path contradicts
-    consistency, which the harness reports unless the method `gave_up`."""
+    None if the method has no topological layer or made no plan. Without a path they are the whole
+    answer: the harness checks that they are a route, and measures what it loses."""
     arcs: tuple[int, ...] | None = None
     """Dense ids of the edges between those nodes, if the method's edges have ids."""
     plan_steps: int | None = None
