@@ -271,9 +271,9 @@ _FINDINGS = tuple(
             "optimum itself is {grid_any} % longer."
         ),
         (
-            "Speed-up over A\\*, median of the ratios, and ratio of the mean times: `octile` "
-            "{octile_speed} and {octile_means}, `shortest` {shortest_speed} and {shortest_means}, "
-            "HPA\\* {hpa_speed} and {hpa_means}."
+            "Against A\\*, by the median of the ratios of times: `octile` is {octile_speed}, "
+            "`shortest` {shortest_speed}, HPA\\* {hpa_speed}. By mean times `octile` is "
+            "{octile_means}, `shortest` {shortest_means}, HPA\\* {hpa_means}."
         ),
         (
             "By cost, over the least cost of paths of cells: `robot`, which is not bound to cells, "

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from benchmarks.subjects._study_data import Data
 
-_FIGURE = r"(?P<{}>(?:< )?-?\d+(?:,\d{{3}})*(?:\.\d+)?)"
+_FIGURE = r"(?P<{}>(?:< )?-?\d+(?:,\d{{3}})*(?:\.\d+)?(?:\s+times\s+(?:faster|slower))?)"
 _HOLE = re.compile(r"\{(\w+)\}")
 
 
@@ -54,7 +54,7 @@ def quoted(data: Data) -> dict[str, str]:
         row = _row(parts.get(part), method)
         value = row.get(column)
         if isinstance(value, int | float):
-            found[name] = text_of(value)
+            found[name] = _pace(value) if column.startswith("speed-up") else text_of(value)
     return found | _of_ompl(parts.get("ompl"))
 
 
@@ -81,6 +81,11 @@ _FIGURES = {
     "shortest_cost": ("costs", "shortest", "weighted loss mean %"),
 }
 """Part, method and column of each figure."""
+
+
+def _pace(ratio: float) -> str:
+    """Return in words a ratio of A*'s time to that of a method."""
+    return f"{text_of(ratio)} times faster" if ratio >= 1 else f"{text_of(1 / ratio)} times slower"
 
 
 def _row(part: Data | None, method: str) -> Data:
@@ -160,8 +165,8 @@ QUOTES = (
     Quote(
         "docs/peers.md",
         _SOBERING + "on the study's maps. It is {paper_any} % longer than the any-angle one (the "
-        "octile optimum itself is {grid_any} % longer), and {paper_means} times as fast as our "
-        "A\\* by mean times",
+        "octile optimum itself is {grid_any} % longer), and {paper_means} than our A\\* "
+        "by mean times",
     ),
     Quote("docs/harness.md", "asks all methods on {maps} public maps"),
     Quote(
@@ -184,9 +189,8 @@ QUOTES = (
     ),
     Quote(
         "paper/paper.md",
-        "is {octile_speed} for `octile`, {shortest_speed} for `shortest` and {paper_speed} for "
-        "`paper`; the ratios of the mean times are {octile_means}, {shortest_means} and "
-        "{paper_means}",
+        "`octile` is {octile_speed}, `shortest` {shortest_speed} and `paper` {paper_speed}; by "
+        "mean times they are {octile_means}, {shortest_means} and {paper_means}",
     ),
     Quote(
         "paper/paper.md",

@@ -130,8 +130,8 @@ _NOTES = {
     "order, of the best path that passes them in the plan's order. The presets that read the plan "
     "off a path have zeros by construction. A path may be better than its plan: `paper` and "
     "`simple-graph` also search places beside the route.",
-    "time": "Medians over the pairs in common; a speed-up is the reference's time over the "
-    "method's: the median of the ratios, and the ratio of the means.",
+    "time": "Medians over the pairs in common. A speed-up is the reference's time over the "
+    "method's, below 1 where it is slower: the median of the ratios, and the ratio of the means.",
     "work": "Backups are Thrun's count, nodes times mean steps of a plan (for the grid cells times "
     "mean steps of a path), a mean over the maps. The next column is the median of the grid's over "
     "it. They leave out the search of cells inside the plan, which expansions hold. An expansion "
