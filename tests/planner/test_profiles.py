@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import pytest
 
@@ -55,6 +56,71 @@ def test_a_chain_of_private_rooms_is_open_for_the_room_behind_it_alone() -> None
         "profile visitor forbids every route: the way is by private rooms (ward a)"
     )
     assert clinic({"ward a": PRIVATE}).under("staff").plan("hall", "bath").solved
+
+
+def drawn(ink: tuple[str, ...]) -> hn.HybridPlanner:
+    """Rooms of the letters of a drawing, upper case private; cells of 0.5 m, `.` in no room."""
+    cells = np.array([list(line) for line in ink])[::-1]
+    names = sorted(set(cells.ravel().tolist()) - {"#", "."})
+    label_of = np.select([cells == name for name in names], range(len(names)), -1)
+    uses = {name: PRIVATE for name in names if name.isupper()}
+    rooms = hn.RoomLabels(tuple(names), label_of, uses=uses)
+    grid = hn.OccupancyGrid((cells == "#").astype(np.float32), hn.Frame(0.5))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    return hn.HybridPlanner(topology, preset="grid-astar")
+
+
+def test_a_way_through_the_second_part_of_an_own_room_opens_no_other_private_room() -> None:
+    """From the left part of A: through hall h and the right part of A to k. B is the shortcut."""
+    ink = (
+        "##########",
+        "#AABBBkkk#",
+        "#AA####kk#",
+        "#hh####kk#",
+        "#hhhhAAkk#",
+        "##########",
+    )
+    start, goal = (0.75, 2.25), (4.25, 1.25)
+    for pair in ((start, goal), (goal, start)):
+        visitor = drawn(ink).under("visitor")
+        path = visitor.plan(*pair).path
+        assert path is not None
+        assert "B" not in {ink[::-1][row][col] for row, col in path.cells.tolist()}
+        shut = drawn((*ink[:4], "#hhhh##kk#", ink[5])).under("visitor")
+        assert shut.plan(*pair).solved, "B must be crossed, for there is no other way"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_ways_of_a_visitor_are_those_of_all_ways_over_parts(seed: int) -> None:
+    """Drawings of 3 x 4 cells, whose rooms are often of two parts: every simple way is listed."""
+    rng = np.random.default_rng(seed)
+    blocks = rng.choice(list("ABCDhk#"), (3, 4))
+    ink = tuple("".join(row) for row in blocks.tolist())
+    planner = drawn(ink).under("visitor")
+    graph: nx.Graph[tuple[int, int]] = nx.grid_2d_graph(3, 4)
+    graph.remove_nodes_from([(r, c) for r, c in list(graph) if blocks[r, c] == "#"])
+    part_at: dict[tuple[int, int], tuple[int, int]] = {}
+    for names in (*"ABCD", "hk"):
+        same = graph.subgraph([at for at in graph if blocks[at] in names])
+        part_at |= {at: min(part) for part in nx.connected_components(same) for at in part}
+    for start, goal in itertools.permutations(sorted(graph), 2):
+        own = {blocks[start], blocks[goal]}
+        asked: dict[int, set[str]] = {}
+        for way in nx.all_simple_paths(graph, start, goal):
+            parts = [one for one, _ in itertools.groupby(part_at[at] for at in way)]
+            names = [blocks[one] if blocks[one].isupper() else "" for one in parts]
+            kinds = "".join("u" if not name else "o" if name in own else "p" for name in names)
+            if "up" in kinds and "pu" in kinds[kinds.index("up") :]:
+                continue
+            asked.setdefault(kinds.count("p"), set()).update(names)
+        opened = own | asked.get(min(asked, default=0), set()) | {"h", "k"}
+        free = graph.subgraph([at for at in graph if blocks[at] in opened])
+        ends = [(0.5 * (col + 0.5), 0.5 * (2.5 - row)) for row, col in (start, goal)]
+        result = planner.plan(*ends)
+        assert result.solved is nx.has_path(free, start, goal), (ink, start, goal)
+        if result.path is not None:
+            passed = {ink[::-1][row][col] for row, col in result.path.cells.tolist()}
+            assert passed <= opened, (ink, start, goal)
 
 
 def test_a_door_must_be_as_wide_as_the_profile() -> None:

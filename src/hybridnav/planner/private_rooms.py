@@ -77,78 +77,61 @@ class PartGround(NamedTuple):
 
 
 def opened(
-    room_of: Sequence[Any], beside: Sequence[Iterable[int]], ends: tuple[set[int], set[int]]
+    room_of: Sequence[Any],
+    beside: Sequence[Iterable[int]],
+    ends: tuple[set[int], set[int]],
+    own: Collection[Any],
 ) -> set[Any]:
     """Return the private rooms that must be crossed to leave those of start and goal.
 
-    They are few: a way leads out of the start's room through private rooms to a public part, on
-    through public parts, and by private rooms into that of the goal. Those ways count that pass the
-    fewest private parts beside their ends, and their rooms are open. A way that enters private
-    rooms in its middle, between public parts, does not count.
+    They are few: a way leads out of an own room through private rooms to a public part, on through
+    public parts and own rooms, and by private rooms into an own room and to the goal. Those ways
+    count that enter the fewest private parts besides, and their rooms are open. A way that enters
+    a private room from a public part, and leaves it to one, does not count.
 
     `room_of`: the private room of each part, None for a public part; `beside`: the parts that each
     part touches, or a link joins with it; `ends`: the parts of the start and of the goal; none for
-    an end that cannot be entered. Result: rooms of `room_of`, those of the ends not among them.
+    an end that cannot be entered; `own`: the rooms of `room_of` that are open anyway, those of the
+    ends among them. Result: rooms of `room_of`, own ones not among them.
     """
-    ways = _PartSearch(room_of, beside, {room_of[part] for end in ends for part in end})
+    ways = _PartSearch(room_of, beside, own)
     first, last = (ways.away(end) for end in ends)
-    near = ways.nearest(first), ways.nearest(last)
-    sums = {area: near[0][area] + near[1][area] for area in near[0] if area in near[1]}
-    direct = min((first[part] for part in ends[1] if part in first), default=math.inf)
-    fewest = min([*sums.values(), direct])
-    if not 0 < fewest < math.inf:
+    sums = {part: first[part] + last[part] for part in first if part in last and ways.free(part)}
+    fewest = min(sums.values(), default=0)
+    if not fewest:
         return set()
-    best = [area for area, count in sums.items() if count == fewest]
-    found: set[Any] = set()
-    for known, least in zip((first, last), near, strict=True):
-        goals = {(area, least[area]) for area in best}
-        found |= ways.passed(
-            known, [part for part in known if (ways.areas.get(part), known[part]) in goals]
-        )
-    if direct == fewest:
-        found |= ways.passed(first, [part for part in ends[1] if first.get(part) == direct])
-    return found
+    best = [part for part, count in sums.items() if count == fewest]
+    return ways.passed(first, best) | ways.passed(last, best)
 
 
 class _PartSearch:
-    """Ways through private parts, counted by those that they enter beside some own rooms."""
+    """Ways away from an end, counted by the private parts, not of own rooms, that they enter."""
 
     def __init__(
-        self, room_of: Sequence[Any], beside: Sequence[Iterable[int]], own: set[Any]
+        self, room_of: Sequence[Any], beside: Sequence[Iterable[int]], own: Collection[Any]
     ) -> None:
-        self._room_of, self._beside = room_of, beside
-        self._weight = [int(room is not None and room not in own) for room in room_of]
-        self.areas: dict[int, int] = {}
-        """For each public part the first one of those that it is joined with."""
-        for first, room in enumerate(room_of):
-            todo = [first] if room is None and first not in self.areas else []
-            while todo:
-                part = todo.pop()
-                if part not in self.areas:
-                    self.areas[part] = first
-                    todo += [other for other in beside[part] if room_of[other] is None]
+        self._room_of, self._beside, self._own = room_of, beside, own
+
+    def free(self, part: int) -> bool:
+        """Return whether a part is public or of an own room."""
+        return self._room_of[part] is None or self._room_of[part] in self._own
+
+    def _leads(self, part: int, other: int) -> bool:
+        """Return whether a way goes on to a part: none enters a private room from a public part."""
+        return self._room_of[part] is not None or self.free(other)
 
     def away(self, sources: set[int]) -> dict[int, int]:
-        """Return how many parts are entered on the way to each part; public ones end a way."""
+        """Return how many parts are entered on the way to each part."""
         found = dict.fromkeys(sources, 0)
         queue = deque(sources)
         while queue:
             part = queue.popleft()
-            for other in () if self._room_of[part] is None else self._beside[part]:
-                count = found[part] + self._weight[other]
-                if count < found.get(other, math.inf):
+            for other in self._beside[part]:
+                count = found[part] + (not self.free(other))
+                if self._leads(part, other) and count < found.get(other, math.inf):
                     found[other] = count
-                    (queue.append if self._weight[other] else queue.appendleft)(other)
+                    (queue.appendleft if self.free(other) else queue.append)(other)
         return found
-
-    def nearest(self, known: dict[int, int]) -> dict[int, int]:
-        """Return the fewest parts on the way to each area of public parts."""
-        least: dict[int, int] = {}
-        for part, count in known.items():
-            if part in self.areas:
-                area = self.areas[part]
-                least[area] = min(count, least.get(area, count))
-        return least
 
     def passed(self, known: dict[int, int], targets: Iterable[int]) -> set[Any]:
         """Return the rooms, not own ones, of all ways to some parts that enter the fewest."""
@@ -158,13 +141,13 @@ class _PartSearch:
             if part in seen:
                 continue
             seen.add(part)
-            if self._weight[part]:
+            if not self.free(part):
                 found.add(self._room_of[part])
-            before = known[part] - self._weight[part]
+            before = known[part] - (not self.free(part))
             todo += [
                 other
                 for other in self._beside[part]
-                if self._room_of[other] is not None and known.get(other) == before
+                if self._leads(other, part) and known.get(other) == before
             ]
         return found
 
@@ -325,7 +308,7 @@ class Privacy:
         found: set[tuple[int, int]] = set()
         for one, other in pairwise(ends):
             if any((at[0], self._floors[at[0]].label_at(at[1])) in own for at in (one, other)):
-                found |= opened(room_of, beside, (parts_at(*one), parts_at(*other)))
+                found |= opened(room_of, beside, (parts_at(*one), parts_at(*other)), own)
         return found
 
     def _ground(self, floor: int, shut: ClosedCells | None) -> PartGround:

@@ -140,8 +140,11 @@ class Oracle:
         least, found = math.inf, set[tuple[int, int] | None]()
         ways = nx.all_simple_paths(graph, part_of[start], part_of[goal])
         for way in [[part_of[start]]] if part_of[start] == part_of[goal] else ways:
-            text = "".join("u" if room[part] is None else "p" for part in way)
-            if not re.fullmatch("p*u*p*", text):
+            text = "".join(
+                "u" if room[part] is None else "o" if room[part] in own else "p" for part in way
+            )
+            # No private room is entered from a public part, and then left to one.
+            if re.search("up", text) and re.search("pu", text[text.index("up") :]):
                 continue
             more = [room[part] for part in way if room[part] is not None and room[part] not in own]
             if len(more) < least:
