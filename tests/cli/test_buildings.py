@@ -1,5 +1,6 @@
 """`hybridnav` with buildings of several floors: `plan`, `build`, `check`, `evaluate`, `export`."""
 
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -27,11 +28,12 @@ def test_a_route_over_floors_is_printed(cli: Any, file: Path) -> None:
     building = hn.ext.fleet.load_building(file, robot_radius_m=0)
     plan = building.plan(("1", (1.5, 0.6)), ("2", (0.5, 0.5)))
     assert told[0] == "query      house.yaml, 1:1.5,0.6 to 2:0.5,0.5, robot radius 0 m"
-    assert told[1] == "status     solved"
-    assert told[2] == f"length     {plan.length_m:.2f} m (any-angle)"
-    assert told[3] == "rides      ladder from floor 1 to floor 2, 0 s, charged 1.00 m"
-    assert told[4] == f"cost       {plan.cost:.2f} m, {plan.travel_s:.0f} s"
-    assert told[5] == f"bound      {plan.cost:.2f} m, the route is optimal"
+    assert told[1] == "preset     shortest"
+    assert told[2] == "status     solved"
+    assert told[3] == f"length     {plan.length_m:.2f} m (any-angle)"
+    assert told[4] == "rides      ladder from floor 1 to floor 2, 0 s, charged 1.00 m"
+    assert told[5] == f"cost       {plan.cost:.2f} m, {plan.travel_s:.0f} s"
+    assert told[6] == f"bound      {plan.cost:.2f} m, the route is optimal"
     answer = json.loads(cli("plan", file, *QUERY, "--json").out)
     assert answer["cost"] == plan.cost
     assert answer["floors"] == ["1", "2"]
@@ -409,3 +411,41 @@ def test_profiles_go_into_the_model(cli: Any, file: Path, tmp_path: Path) -> Non
     plan = cli("plan", model, *QUERY[:4], "--profile", "bed", "--json").answer
     assert [ride["link"] for ride in plan["rides"]] == ["lift"]
     assert plan["profile"] == "bed"
+
+
+def test_a_tour_over_floors_is_planned_leg_by_leg(cli: Any, file: Path) -> None:
+    tour = "plan", file, *QUERY, "--via", "2:2.0,2.5", "--via", "1:0.5,0.5"
+    answer = json.loads(cli(*tour, "--json").out)
+    building = hn.ext.fleet.load_building(file, robot_radius_m=0)
+    stops = [("1", (1.5, 0.6)), ("2", (2.0, 2.5)), ("1", (0.5, 0.5)), ("2", (0.5, 0.5))]
+    legs = [building.plan(*pair) for pair in itertools.pairwise(stops)]
+    assert answer["cost"] == pytest.approx(sum(leg.cost for leg in legs))
+    assert answer["lower_bound"] == pytest.approx(answer["cost"])
+    assert [leg["cost"] for leg in answer["legs"]] == [leg.cost for leg in legs]
+    assert len(answer["rides"]) == 3
+    told = cli(*tour).out
+    assert "query      house.yaml, 1:1.5,0.6 via 2:2.0,2.5 via 1:0.5,0.5 to 2:0.5,0.5" in told
+    assert f"leg 3      cost {legs[2].cost:.2f} m" in told
+
+
+def test_a_tour_by_rooms_goes_on_where_a_leg_ended(cli: Any, file: Path) -> None:
+    ran = cli("plan", file, *QUERY, "--via", "2:room-1", "--json")
+    answer = json.loads(ran.out)
+    first, second = answer["legs"]
+    assert second["start"][1] == pytest.approx(first["results"][-1]["points"][-1][:2])
+    assert (answer["lower_bound"], answer["gap"]) == (None, None)
+    assert "bound      none for the tour" in cli("plan", file, *QUERY, "--via", "2:room-1").out
+    lost = cli("plan", file, *QUERY, "--via", "2:9,9")
+    assert lost.code == 1
+    assert "why        Floor 2: The goal lies outside the map." in lost.out
+    refused = cli("plan", file, *QUERY, "--via", "2:room-1", "--alternatives", "2")
+    assert (refused.code, "--alternatives does not go with --via" in refused.err) == (2, True)
+
+
+@pytest.mark.parametrize(("language", "word"), [("en", "Floor"), ("de", "Etage")])
+def test_the_tightest_places_of_a_route_have_their_floors(
+    cli: Any, file: Path, language: str, word: str
+) -> None:
+    told = cli("plan", file, *QUERY, "--why", "--language", language).out
+    assert f"why        {word} 1: " in told
+    assert f"           {word} 2: " in told

@@ -59,12 +59,14 @@ def plan_over_floors(
     goal: Any,
     origin: str | None,
     to: str | None,
+    via: Sequence[str] | None,
     at: str,
     alternatives: int,
     max_stretch: float | None,
     blocked: Sequence[str] | None,
     no_stairs: bool,
     profile: str | None,
+    why: bool,
     plot: Path | None,
     language: str,
     as_json: bool,
@@ -78,28 +80,35 @@ def plan_over_floors(
         raise common.UsageError(
             "--max-stretch is for alternatives: add --alternatives N, or leave it out"
         )
-    typed = _typed("start", start, "from", origin), _typed("goal", goal, "to", to)
+    if via and alternatives > 1:
+        raise common.UsageError("--alternatives does not go with --via")
+    ends = _typed("start", start, "from", origin), _typed("goal", goal, "to", to)
+    typed = [ends[0], *(via or ()), ends[1]]
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    first, last = (_endpoint(text, building) for text in typed)
+    stops = [_endpoint(text, building) for text in typed]
     how["closed_links"], how["blocked"] = _closures(building, blocked or ())
     shut = [item.what for item in building.journal.items()] if building.journal else []
     others: BuildingAlternatives | None = None
     with common.stage("planning", {}, "plan"):
         if alternatives == 1:
-            plans: Sequence[hn.ext.fleet.BuildingPlan] = (building.plan(first, last, **how),)
+            plans: Sequence[hn.ext.fleet.BuildingPlan] = _legs(building, stops, how)
         else:
             how["max_stretch"] = 2.0 if max_stretch is None else max_stretch
-            plans = others = building.alternatives(first, last, alternatives, **how)
-    figures = plans[0].to_dict() | {
+            plans = others = building.alternatives(stops[0], stops[1], alternatives, **how)
+    legs = plans if others is None else plans[:1]
+    figures = _tour_figures(legs, stops, at, language) if via else legs[0].to_dict()
+    figures |= {
         "building": str(map_file),
         "preset": _preset_of(building, plans[0]),
-        "words": plans[0].words(language),
-        "query": f"{typed[0]} to {typed[1]}",
+        "words": [line for leg in legs for line in leg.words(language)],
+        "query": " via ".join(typed[:-1]) + f" to {typed[-1]}",
         "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
     }
-    if not plans[0].solved:
-        figures["why"] = {"words": list(plans[0].reasons.get(language, ()))}
+    if not legs[-1].solved:
+        figures["why"] = {"words": list(legs[-1].reasons.get(language, ()))}
+    elif why:
+        figures["why"] = {"words": _tightest(building, legs, how["blocked"], language)}
     if profile is not None:
         asks = next(one.described for one in building.profiles if one.name == profile)
         figures["asks"] = asks
@@ -119,8 +128,73 @@ def plan_over_floors(
         from hybridnav.viz import save_figure  # noqa: PLC0415
 
         save_figure(plot_building(building, plans)[0], plot)
-    if not plans[0].solved:
+    if not legs[-1].solved:
         raise typer.Exit(common.EXIT_NOT_SOLVED)
+
+
+def _legs(
+    building: hn.ext.fleet.Building, stops: Sequence[Any], how: dict[str, Any]
+) -> list[hn.ext.fleet.BuildingPlan]:
+    """Plan from each stop to the next, up to a leg without a route.
+
+    A leg begins where the one before it ended, also in a named room.
+    """
+    legs: list[hn.ext.fleet.BuildingPlan] = []
+    start = stops[0]
+    for goal in stops[1:]:
+        legs.append(building.plan(start, goal, **how))
+        if not legs[-1].solved:
+            break
+        path = legs[-1].results[-1].path
+        assert path is not None  # noqa: S101 - it is solved
+        start = legs[-1].goal[0], tuple(map(float, path.points[-1][:2]))
+    return legs
+
+
+def _tour_figures(
+    legs: Sequence[hn.ext.fleet.BuildingPlan], stops: Sequence[Any], at: str, language: str
+) -> dict[str, Any]:
+    """Return the figures of a tour, with those of its legs.
+
+    Bounds add up where no stop leaves a choice: else the tour has none, and each leg its own.
+    """
+    each = [leg.to_dict() | {"words": leg.words(language)} for leg in legs]
+    solved = legs[-1].solved
+    sums = ("length_m", "charge_m", "cost", "travel_s")
+    figures = each[-1] | {name: sum(leg[name] for leg in each) if solved else None for name in sums}
+    for name in ("floors", "rides", "results", "instructions"):
+        figures[name] = [item for leg in each for item in leg[name]]
+    is_fixed = at == "point" or not any(_is_name(stop) for stop in stops[1:-1])
+    bound = sum(leg.lower_bound for leg in legs) if solved and is_fixed else None
+    gap = None if bound is None else figures["cost"] / bound - 1 if bound else 0.0
+    seconds: dict[str, float] = {}
+    for leg in each:
+        for stage, spent in leg["seconds"].items():
+            seconds[stage] = seconds.get(stage, 0.0) + spent
+    own = {"start": each[0]["start"], "legs": each, "seconds": seconds}
+    return figures | own | {"lower_bound": bound, "gap": gap}
+
+
+def _is_name(stop: Any) -> bool:
+    return isinstance(stop, str) or isinstance(stop[1], str)
+
+
+def _tightest(
+    building: hn.ext.fleet.Building,
+    legs: Sequence[hn.ext.fleet.BuildingPlan],
+    blocked: dict[str, hn.Blocked],
+    language: str,
+) -> list[str]:
+    """Return, for each floor of a route, the widest robot that could go, and the tightest place."""
+    word = {"en": "floor", "de": "Etage"}[language].capitalize()
+    lines = []
+    for leg in legs:
+        for name, result in zip(leg.floors, leg.results, strict=True):
+            assert result.path is not None  # noqa: S101 - it is solved
+            ends = result.path.points[0][:2], result.path.points[-1][:2]
+            found = building.floor(name).planner.explain(*ends, blocked=blocked.get(name))
+            lines += [f"{word} {name}: {line}" for line in found.words(language)]
+    return list(dict.fromkeys(lines))  # a tour passes a place again
 
 
 def _preset_of(building: hn.ext.fleet.Building, plan: hn.ext.fleet.BuildingPlan) -> str:
@@ -195,11 +269,18 @@ def _route_lines(figures: dict[str, Any]) -> list[str]:
         floors = f"from floor {ride['from_floor']} to floor {ride['to_floor']}"
         worth = f"{ride['seconds']:.0f} s, charged {ride['charge_m']:.2f} m"
         lines.append(f"{'' if number else 'rides':<10} {ride['link']} {floors}, {worth}")
+    cost = f"cost       {figures['cost']:.2f} m, {figures['travel_s']:.0f} s"
+    for number, leg in enumerate(figures.get("legs", ()), start=1):
+        on = rounded_bound(leg["lower_bound"], leg["gap"])[0]
+        lines.append(f"leg {number:<6} cost {leg['cost']:.2f} m, bound {on} m")
+    if figures["lower_bound"] is None:
+        note = "none for the tour: each leg begins where the one before it ended"
+        return [*lines, cost, f"bound      {note}"]
     bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
     stated = stated.replace("long", "dear")
     return [
         *lines,
-        f"cost       {figures['cost']:.2f} m, {figures['travel_s']:.0f} s",
+        cost,
         f"bound      {bound} m, the route is {stated}",
     ]
 
