@@ -83,13 +83,14 @@ def read_map(path, thresholds):
     is_read &= value["negate"].lower() in NEGATE
     need(is_read, "expected a resolution, origin [x, y, yaw] and negate 0 or 1", ValueError)
     data = (path.parent / value["image"]).read_bytes()
-    gap = rb"(?:\s|#[^\n]*\n)+"
+    gap = rb"\s(?:\s|#[^\r\n]*[\r\n])*"
     head = re.match(rb"P([25])" + 2 * (gap + rb"(\d+)") + gap + rb"255\s", data)
-    is_pgm = head and value["mode"].lower() != "raw"
-    need(is_pgm, "no PGM of 8 bits: write the map as one", ValueError)
+    is_pgm = head and value["mode"].lower() in ("", "trinary", "scale")
+    need(is_pgm, "no PGM of 8 bits, trinary or scale: write the map as one", ValueError)
     kind, cols, rows = map(int, head.groups())
     pixels = np.frombuffer(data, np.uint8, offset=head.end())
     pixels = np.array(data[head.end() :].split(), int) if kind == 2 else pixels
+    need((pixels >= 0).all(), "a grey is negative", ValueError)
     level, (low, high) = np.arange(256, dtype=np.float32) / np.float32(255), np.float32(thresholds)
     occupancy = level if NEGATE[value["negate"].lower()] else 1 - level
     kinds = np.where(occupancy <= low, 1, np.where(occupancy >= high, 0, 2)).astype(np.uint8)

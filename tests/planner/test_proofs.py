@@ -1,6 +1,7 @@
 """Proofs of results: the checker accepts the true ones, and none that was altered."""
 
 import base64
+import io
 import json
 import pickle
 import subprocess
@@ -9,12 +10,14 @@ import zlib
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.subjects.proofs import false_proofs, frame_of, is_accepted
 from hybridnav import check_proof
 from hybridnav.errors import HybridNavError, PlanError
+from hybridnav.maps.files.ros import occupancy_of_greys
 from hybridnav.search.proofs import parting_chain, strings_near
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
@@ -231,6 +234,65 @@ def test_the_checker_reads_other_images_too(kind, negate, tmp_path):
     assert frame == frame_of(grid)
 
 
+GREYS = np.arange(256, dtype=np.uint8).reshape(8, 32)
+COLOURS = np.stack([GREYS, GREYS[::-1], GREYS.T.reshape(8, 32), 255 - GREYS], axis=-1)
+DEEP = np.arange(256, dtype=np.uint16).reshape(8, 32) * 257 - 1
+TEXT = " ".join(map(str, GREYS.ravel().tolist())).encode()
+
+
+def saved(values, file_format="PNG"):
+    """Return the bytes of an image."""
+    stream = io.BytesIO()
+    Image.fromarray(values).save(stream, file_format)
+    return stream.getvalue()
+
+
+IMAGES = {
+    "P5": (b"P5\r\n# a\r\n 32 #b\n8\n255\n" + GREYS.tobytes(), True),
+    "P5 and more": (b"P5 32 8 255 " + GREYS.tobytes() + b"more", True),
+    "comment that CR ends": (b"P5 #1 2\r32 8 #\n255 " + GREYS.tobytes(), True),
+    "comment in a number": (b"P5 3#\n2 8 255 " + GREYS.tobytes(), False),
+    "P2": (b"P2 32 8 255\n" + TEXT, True),
+    "P2 with a comment": (b"P2 32 8 255\n" + TEXT.replace(b"\x20", b" #1\n", 1), False),
+    "P2 below 0": (b"P2 32 8 255 -9" + TEXT[1:], False),
+    "P2 above 255": (b"P2 32 8 255 256" + TEXT[1:], False),
+    "P2, 16 bits": (b"P2 32 8 65535 " + TEXT, False),
+    "P5, 16 bits": (b"P5 32 8 65535 " + DEEP.astype(">u2").tobytes(), False),
+    "P5, 7 bits": (b"P5 32 8 127 " + (GREYS // 2).tobytes(), False),
+    "P5 cut off": (b"P5 32 8 255 " + GREYS.tobytes()[1:], False),
+    "P4": (b"P4 32 8 " + GREYS.tobytes()[:32], False),
+    "P6": (b"P6 32 8 255 " + COLOURS[..., :3].tobytes(), False),
+    "grey": (saved(GREYS), False),
+    "grey, 16 bits": (saved(DEEP), False),
+    "grey and opacity": (saved(COLOURS[..., [0, 3]].copy()), False),
+    "colours": (saved(COLOURS[..., :3].copy()), False),
+    "colours and opacity": (saved(COLOURS), False),
+    "TIFF": (saved(GREYS, "TIFF"), False),
+    "BMP": (saved(GREYS, "BMP"), False),
+}
+"""Images of 256 cells, and whether the checker reads them."""
+EDGES = [float(p) for p in occupancy_of_greys()[[0, 50, 100, 205, 206, 254, 255]]]
+THRESHOLDS = [(0.196, 0.65), (0.25, 0.25), (0.0, 1.0), (0.0, 0.0), (1.0, 1.0)]
+THRESHOLDS += [(low, high) for low in EDGES for high in EDGES if low <= high]
+
+
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
+@pytest.mark.parametrize("kind", IMAGES)
+def test_the_checker_reads_an_image_as_the_package_does_or_not_at_all(kind, tmp_path):
+    image, is_read = IMAGES[kind]
+    (tmp_path / "m.pgm").write_bytes(image)
+    head = "image: m.pgm\nresolution: 0.05\norigin: [1, 2, 0.5]\n"
+    modes = {"": True, "trinary": True, "Scale": True, "raw": False, "other": False}
+    for mode, is_known in modes.items():
+        for negate in "01":
+            for low, high in THRESHOLDS if is_read and is_known else THRESHOLDS[:1]:
+                text = f"{head}negate: {negate}\nfree_thresh: {low}\noccupied_thresh: {high}\n"
+                text += f"mode: {mode}\n" * bool(mode)
+                ours, theirs = read_by_both(tmp_path, text, [low, high])
+                assert (theirs is not None) == (is_read and is_known)
+                assert theirs is None or ours == theirs, text
+
+
 LINES = {
     "image": [
         "image: m.pgm",
@@ -252,7 +314,7 @@ LINES = {
 """Lines of YAML that the checker promises to read."""
 
 
-def read_by_both(folder, text):
+def read_by_both(folder, text, thresholds=(0.25, 0.65)):
     """Return what the package and the checker read of a file, None where they refuse it."""
     (folder / "m.yaml").write_text(text)
     answers: list[object] = []
@@ -262,9 +324,9 @@ def read_by_both(folder, text):
     except HybridNavError:
         answers.append(None)
     try:
-        cells, frame = check_proof.read_map(folder / "m.yaml", [0.25, 0.65])
+        cells, frame = check_proof.read_map(folder / "m.yaml", thresholds)
         answers.append((cells.tolist(), frame))
-    except (ValueError, OSError):
+    except (ValueError, OSError, IndexError):
         answers.append(None)
     return answers
 

@@ -204,7 +204,8 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     -------
     RouteGraph
         Parts of free space below 1 m² have no nodes, nor has free space outside the building that
-        no door joins with it, as the margin of its image.
+        no door joins with it, as the margin of its image. Where one node sees all, it is alone,
+        without an edge; Nav2 and RMF need a smaller `spacing_m` there.
 
     Raises
     ------

@@ -161,10 +161,15 @@ def test_measures_beside_an_edge_are_those_of_the_walls(folder):
 
 
 def test_what_nav2_would_refuse_is_refused_in_one_line(folder):
-    grid = hn.OccupancyGrid(np.zeros((1, 1), dtype=np.float32), robot_radius_m=0)
-    alone = hn.ext.graphs.build_route_graph(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    with pytest.raises(hn.errors.InvalidValueError, match="no edge"):
-        hn.ext.graphs.export_nav2(alone, folder / "alone.geojson")
+    grid = hn.OccupancyGrid(np.zeros((2, 2)), hn.Frame(0.5), robot_radius_m=0)
+    small = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    for build in (hn.ext.graphs.build_route_graph, hn.ext.graphs.build_lane_graph):
+        alone = build(small)
+        assert (alone.n_nodes, alone.n_edges) == (1, 0)
+        with pytest.raises(hn.errors.InvalidValueError, match=r"no edge.*a smaller spacing_m"):
+            hn.ext.graphs.export_nav2(alone, folder / "alone.geojson")
+    joined = hn.ext.graphs.build_route_graph(small, spacing_m=0.4)
+    hn.ext.graphs.export_nav2(joined, folder / "joined.geojson")
     built = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
     with pytest.raises(hn.errors.MapError, match="geojson"):
         hn.ext.graphs.export_nav2(built, folder / "graph.txt")

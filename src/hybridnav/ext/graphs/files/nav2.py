@@ -77,8 +77,8 @@ def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[st
         raise InvalidValueError("frame must be the name of the map frame, got an empty text")
     if not graph.n_edges:
         raise InvalidValueError(
-            f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: give it "
-            "more nodes"
+            f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: "
+            "build it by build_route_graph, with a smaller spacing_m (--spacing)"
         )
     if graph.n_nodes + graph.n_edges > rules.MOST_ID:
         raise InvalidValueError(

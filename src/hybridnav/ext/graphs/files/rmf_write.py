@@ -97,7 +97,10 @@ def export_rmf(
     if not all(0 < side < math.inf for side in cabin_m):
         raise InvalidValueError(f"cabin_m is {cabin_m}, expected two positive numbers of metres")
     if not any(floor.graph.n_edges for floor in building.floors):
-        raise InvalidValueError(f"building {building.name!r:.60} has no edge, expected lanes")
+        raise InvalidValueError(
+            f"building {building.name!r:.60} has no edge, expected lanes: build its graphs by "
+            "build_route_graph, with a smaller spacing_m (--spacing)"
+        )
     links = tuple(_aligned(link) for link in building.links)
     moved = [
         f"lift {link.name}: its own ends, {_apart(link)[0]:.2f} m apart: vertices lie at their mean"
