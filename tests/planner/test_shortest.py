@@ -6,8 +6,9 @@ import importlib
 import itertools
 import math
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,14 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
+from hybridnav.planner.methods import shortest as methods_shortest
 from hybridnav.planner.methods.shortest import OverMesh
+from hybridnav.search.mesh import build_mesh
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 seeds = st.integers(0, 2**32 - 1)
 FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5, 4e6), -2.0))
@@ -278,3 +284,30 @@ def test_preparing_reports_every_step_and_nothing_that_is_done_already(preset: s
         again: list[int] = []
         planner.prepare(progress=lambda done, _: again.append(done))
         assert not again
+
+
+@pytest.mark.filterwarnings("default:the map has")
+def test_a_large_mesh_is_announced_before_it_is_built(
+    monkeypatch: pytest.MonkeyPatch, cli: Any, tmp_path: Path
+) -> None:
+    free = np.ones((40, 50), dtype=bool)
+    free[1:-1:3, 1:-1:3] = False
+    grid = hn.OccupancyGrid(np.where(free, 0, 1).astype(np.float32), robot_radius_m=0)
+    hn.write_ros_map(grid, tmp_path / "m.yaml")
+    ends = (0.025, 0.025), (2.475, 1.975)
+    n_corners = len(build_mesh(free).corners)
+    monkeypatch.setattr(methods_shortest, "_LARGE", n_corners)
+    monkeypatch.setattr(methods_shortest, "_S", 0.5)
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    with pytest.warns(UserWarning, match=f"about {n_corners * 0.5:.0f} s") as told:
+        planner.plan(*ends)
+    assert len(told) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        planner.plan(*ends)
+    command = ["plan", tmp_path / "m.yaml", "--robot-radius", 0]
+    command += ["--start", "0.025,0.025", "--goal", "2.475,1.975"]
+    assert cli(*command).err.count("million corners") == 1
+    assert "corners" not in cli(*command, "--preset", "grid-astar").err
+    monkeypatch.setattr(methods_shortest, "_LARGE", n_corners + 1)
+    assert "corners" not in cli(*command).err

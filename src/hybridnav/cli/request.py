@@ -141,6 +141,11 @@ class Request:
                 "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
             )
         settings = self.settings
+        allowed = settings.planner.allow_unexplored
+        if settings.planner.underlying.method == "shortest" and not model.is_filed:
+            from hybridnav.planner.methods.shortest import announce_mesh  # noqa: PLC0415 - numba
+
+            announce_mesh(model.grid.enterable(allow_unexplored=allowed))
         with compiling_beside(settings) as compiled:
             topology = grow_topology(
                 model,

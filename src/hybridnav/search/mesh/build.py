@@ -140,6 +140,11 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     return ConvexMesh(*arrays)
 
 
+def count_corners(free: BoolArray) -> int:
+    """Return how many corners the mesh of free cells, bool (rows, cols), will have."""
+    return int(np.count_nonzero(kinds_of(np.ascontiguousarray(free)) != NO_CORNER))
+
+
 def triangulate(corners: IntArray, walls: IntArray) -> tuple[AnyArray, AnyArray]:
     """Triangulate corners so that walls are sides of triangles.
 

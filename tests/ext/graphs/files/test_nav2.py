@@ -161,7 +161,7 @@ def test_measures_beside_an_edge_are_those_of_the_walls(folder):
 
 
 def test_what_nav2_would_refuse_is_refused_in_one_line(folder):
-    grid = hn.OccupancyGrid(np.zeros((2, 2)), hn.Frame(0.5), robot_radius_m=0)
+    grid = hn.OccupancyGrid(np.zeros((2, 2), np.float32), hn.Frame(0.5), robot_radius_m=0)
     small = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     for build in (hn.ext.graphs.build_route_graph, hn.ext.graphs.build_lane_graph):
         alone = build(small)
