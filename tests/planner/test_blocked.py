@@ -547,7 +547,10 @@ def test_a_map_without_arcs_says_so() -> None:
         ({"rooms": "kitchen"}, "rooms must be a sequence of names, got 'kitchen'"),
         ({"rooms": [3]}, "rooms must be a sequence of names"),
         ({"rooms": 3}, "rooms must be a sequence of names"),
-        ({"door": [1]}, "takes arcs, places, cells, polygons, doors, rooms, keepout, got door"),
+        (
+            {"door": [1]},
+            "takes arcs, places, cells, polygons, doors, rooms, keepout, named, got door",
+        ),
         ("door:39", "must be a Blocked, a Door"),
         ([1, 2], "must be a Blocked, a Door, a shapely geometry or a mapping"),
     ],

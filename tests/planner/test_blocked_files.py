@@ -273,7 +273,7 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
     both = (*query, *NAMED, "--blocked", shut, "--blocked", "room:hall")
     done = cli(*both)
     assert done.code == 1
-    assert f"blocked    {shut}, room:hall\nstatus     no path\n" in done.out
+    assert f"blocked    {shut}, room:hall\npreset     shortest\nstatus     no path\n" in done.out
     done = cli(*query, *NAMED, "--blocked", "room:kitchen")
     assert done.code == 1
     assert "status     start blocked" in done.out

@@ -286,11 +286,12 @@ class Closing:
         from hybridnav.planner import Blocked, load_blocked  # noqa: PLC0415
 
         closed = Blocked(doors=self.doors, rooms=self.rooms)
-        for path in self.files:
-            closed |= load_blocked(path, grid)
+        named = {printable(path): load_blocked(path, grid) for path in self.files}
         for mask in self.masks:
-            closed |= load_blocked(mask.file, grid, keepout=True, pose=mask.pose)
-        return closed
+            name = f"keepout: {printable(mask.file)}"
+            own = Blocked(named={name: load_blocked(mask.file, grid, keepout=True, pose=mask.pose)})
+            closed |= own
+        return closed | Blocked(named=named)
 
 
 def closing_lines(figures: dict[str, Any]) -> list[str]:

@@ -138,6 +138,13 @@ WithinOption = Annotated[
         "metres from it.",
     ),
 ]
+LeaveZoneOption = Annotated[
+    bool,
+    typer.Option(
+        "--leave-zone",
+        help="Let a start that --blocked closes leave the closed cells by the shortest way.",
+    ),
+]
 
 
 @with_map(
@@ -154,6 +161,7 @@ def plan(
     via: ViaOption = None,
     at: AtOption = "anywhere",
     within: WithinOption = None,
+    leave_zone: LeaveZoneOption = False,
     rooms_file: options.RoomsOption = None,
     alternatives: AlternativesOption = 1,
     max_overlap: OverlapOption = None,
@@ -207,6 +215,7 @@ def plan(
         rooms_file=rooms_file,
         at=where,
         within_m=within,
+        leave_zone=leave_zone,
         wanted=wanted,
         compare=compare,
         why=why,
@@ -246,6 +255,11 @@ def _check_fits(request: Request) -> None:
         raise UsageError(f"--within must be metres, 0 or more, got {request.within_m:g}")
     if request.is_tour and request.within_m is not None:
         raise UsageError("--within goes with --start and --goal alone, and files as --blocked")
+    if request.leave_zone and (request.is_tour or request.within_m is not None or request.compare):
+        raise UsageError(
+            "--leave-zone goes with --start, --goal and files as --blocked, without --within and "
+            "--compare: leave one out"
+        )
     if request.is_tour and request.compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
 

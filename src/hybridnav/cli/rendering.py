@@ -111,9 +111,7 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
         stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
-        if figures["short_m"]:
-            far = f"{figures['short_m']:.2f} m"
-            lines.append(f"short      {far} of the goal, at the nearest point that can be reached")
+        lines += _end_lines(figures)
         if figures["grid_bound"] is not None:
             lines.append(_beside_cells(figures["grid_bound"], figures["grid_gap"]))
     if figures["steps"] is not None:
@@ -132,6 +130,19 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     if expanded:
         lines.append(f"expanded   {', '.join(expanded)}")
     return lines + _whole_grid_lines(figures)
+
+
+def _end_lines(figures: dict[str, Any]) -> list[str]:
+    """State what the path leaves at its start, and how far from the goal it ends."""
+    lines = []
+    if figures["leaves_m"] is not None:
+        lines.append(
+            f"leaves     {' and '.join(figures['leaves'])} over {figures['leaves_m']:.2f} m"
+        )
+    if figures["short_m"]:
+        far = f"{figures['short_m']:.2f} m"
+        lines.append(f"short      {far} of the goal, at the nearest point that can be reached")
+    return lines
 
 
 def _duration_lines(figures: dict[str, Any]) -> list[str]:

@@ -54,6 +54,7 @@ class Request:
     rooms_file: Path | None
     at: At
     within_m: float | None
+    leave_zone: bool
     wanted: Wanted
     compare: bool
     why: bool
@@ -104,7 +105,7 @@ class Request:
             beside = _alternatives_figures(found)
         elif self.compare and isinstance(outcome, hn.PlanResult):
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
-        beside |= self._why(planner, outcome, closed, seconds)
+        beside |= _leaving(outcome, closed, topology) | self._why(planner, outcome, closed, seconds)
         self._respond(grid, outcome, beside, seconds)
         if self.poses is not None:
             hn.export_path(outcome, self.poses)
@@ -165,7 +166,12 @@ class Request:
         spent: dict[str, float] = {}
         with stage("planning", spent, "plan"):
             if not self.is_tour:  # the result has the seconds of its stages
-                return planner.plan(*self.waypoints, blocked=closed, within_m=self.within_m)
+                return planner.plan(
+                    *self.waypoints,
+                    blocked=closed,
+                    within_m=self.within_m,
+                    leave_zone=self.leave_zone,
+                )
             tour = hn.plan_tour(planner, self.waypoints, at=self.at, blocked=closed)
         counted = sum(sum(result.stats.seconds.values()) for result in tour.results)
         seconds["plan"] = round(max(spent["plan"] - counted, 0.0), 6)  # what no stage counts
@@ -202,7 +208,7 @@ class Request:
         results = (outcome,) if isinstance(outcome, hn.PlanResult) else outcome.results
         with stage("explaining", seconds, "why"):
             found = [
-                planner.explain(one.start, one.goal, blocked=closed)
+                planner.explain(one.start, one.goal, blocked=_closed_for(one, closed))
                 for one in results
                 if one.start is not None and one.goal is not None and one.solved == outcome.solved
             ]
@@ -277,6 +283,29 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
         "grid_cost": cost,
         "grid_expanded": grid_result.stats.expanded,
         "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
+    }
+
+
+def _closed_for(result: hn.PlanResult, closed: hn.Blocked | None) -> Any:
+    """Return what is closed for a result: all but the way out of a zone that it leaves."""
+    source = result.proof_source
+    return closed if result.leaves_m is None or source is None else source[2]
+
+
+def _leaving(
+    outcome: hn.PlanResult | hn.Tour, closed: hn.Blocked | None, topology: hn.TopologicalMap
+) -> dict[str, Any]:
+    """Return what reasons call the closures that a plan leaves; nothing of others."""
+    if closed is None or not isinstance(outcome, hn.PlanResult) or outcome.leaves_m is None:
+        return {}
+    from hybridnav.planner.why import each_closure  # noqa: PLC0415 - loads shapely
+    from hybridnav.planner.why_words import closure_words  # noqa: PLC0415
+
+    assert outcome.start is not None  # noqa: S101 - every plan has one
+    row, col = topology.grid.frame.cell_of(*outcome.start[:2])
+    flat, closures = row * topology.grid.shape[1] + col, each_closure(closed)
+    return {
+        "leaves": [closure_words(k, "en") for k, own in closures if flat in own.cells_of(topology)]
     }
 
 

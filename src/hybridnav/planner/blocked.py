@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -67,6 +67,9 @@ class Blocked:
         two cells that were measured as occupied crosses no door.
     rooms
         Names of rooms; all their cells are closed.
+    named
+        Other closures by what reasons call them: `{"keepout: zone.yaml": Blocked(...)}`. In a union
+        a name is that of both.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class Blocked:
     doors: Sequence[int | Door] = ()
     rooms: Sequence[str] = ()
     keepout: Sequence[BaseGeometry | ArrayLike] = ()
+    named: Mapping[str, Blocked] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         checked = {
@@ -98,6 +102,7 @@ class Blocked:
             "keepout": _checked_areas("keepout", self.keepout),
             "doors": _checked_ids("doors", self.doors, Door),
             "rooms": _checked_names(self.rooms),
+            "named": _checked_named(self.named),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -109,10 +114,13 @@ class Blocked:
         both = {
             one.name: (*getattr(self, one.name), *getattr(other, one.name))
             for one in fields(self)
-            if one.name != "cells"
+            if one.name not in {"cells", "named"}
         }
         cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
-        return Blocked(**both, cells=cells)
+        named = {**self.named, **other.named}
+        for name in self.named.keys() & other.named.keys():
+            named[name] = self.named[name] | other.named[name]
+        return Blocked(**both, cells=cells, named=named)
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -122,7 +130,8 @@ class Blocked:
             for given in (self.polygons, self.keepout)
         ]
         cells = np.asarray(self.cells).tobytes()
-        return tuple(self.arcs), tuple(self.places), cells, *areas, self.doors, self.rooms
+        named = tuple((name, one.key) for name, one in self.named.items())
+        return tuple(self.arcs), tuple(self.places), cells, *areas, self.doors, self.rooms, named
 
     def cells_of(self, topology: TopologicalMap) -> LongArray:
         """Find the cells that may not be entered; occupied ones may be among them.
@@ -149,6 +158,7 @@ class Blocked:
         """Find the cells as `cells_of` does, on a grid whose places may not be built: None."""
         cells = _inside(np.asarray(self.cells), grid.shape)
         found = [cells[:, 0] * grid.shape[1] + cells[:, 1]]
+        found += [one.cells_on(grid, topology) for one in self.named.values()]
         if self.arcs or self.places or self.doors or self.rooms:
             if topology is None:
                 no_places()
@@ -168,7 +178,10 @@ class Blocked:
         without any."""
         areas = cast("Sequence[BaseGeometry]", self.polygons)
         runs = [runs_near(area, grid, radius_m=0.0) for area in areas]
-        return _cells_in_runs(np.concatenate(runs)) if runs else None
+        found = [one.solid_on(grid) for one in self.named.values()]
+        found.append(_cells_in_runs(np.concatenate(runs)) if runs else None)
+        solid = [cells for cells in found if cells is not None]
+        return np.unique(np.concatenate(solid)) if solid else None
 
     def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
         if not len(self.places):
@@ -298,6 +311,14 @@ def _checked_names(names: Any) -> tuple[str, ...]:
     if not all(isinstance(name, str) for name in given):
         raise InvalidValueError(f"rooms must be a sequence of names, got {shown(names)}")
     return tuple(map(str, given))
+
+
+def _checked_named(named: Any) -> dict[str, Blocked]:
+    if not isinstance(named, Mapping) or not all(
+        isinstance(name, str) and isinstance(one, Blocked) for name, one in named.items()
+    ):
+        raise InvalidValueError(f"named must be a mapping of names to Blocked, got {shown(named)}")
+    return dict(named)
 
 
 def _checked_areas(name: str, areas: Any) -> tuple[BaseGeometry, ...]:

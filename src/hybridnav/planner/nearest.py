@@ -1,7 +1,8 @@
-"""The nearest point to a goal that a robot can reach."""
+"""The nearest point to a goal that a robot can reach, and the nearest out of closed cells."""
 
 from __future__ import annotations
 
+import heapq
 import math
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.search.found import ClosedCells
 
 _INSIDE = 1e-6
 """Cells that the point lies inside its cell, so that rounding takes it into no other."""
@@ -59,3 +61,45 @@ def nearest_reachable(
         return None
     x, y = grid.frame.points_of_grid(nearest[squared.argmin()]).tolist()
     return x, y
+
+
+def way_out(
+    may_enter: BoolArray, closed: ClosedCells, start: int, *, corner_cutting: bool
+) -> tuple[list[int], float] | None:
+    """Find the shortest way of cells from a closed cell to the nearest one that is open.
+
+    `may_enter`: bool (rows, cols), cells without walls; `start`: a flat cell. Returns the flat
+    cells of the way, with those that its diagonals need beside them, and its length in cells; None
+    where walls leave no way. Equal ways are broken by the order of rows.
+
+    A way that left one of these cells but the last would have been shorter: so no path through
+    them is longer inside, or passes the closed cells elsewhere.
+    """
+    rows, cols = may_enter.shape
+    before: dict[int, tuple[int, list[int]]] = {}
+    queue: list[tuple[float, int, int, list[int]]] = [(0.0, start, start, [])]
+    while queue:
+        length, cell, source, beside = heapq.heappop(queue)
+        if cell in before:
+            continue
+        before[cell] = source, beside
+        if not closed.holds(np.array([cell]))[0]:
+            break
+        row, col = divmod(cell, cols)
+        for down, right in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+            if not (0 <= row + down < rows and 0 <= col + right < cols):
+                continue
+            to = cell + down * cols + right
+            sides = [cell + down * cols, cell + right] if down and right else []
+            needed = [] if corner_cutting else sides
+            if all(may_enter.flat[each] for each in (to, *needed)):
+                # Rounded, so that equal ways are equal in whatever order they are added up.
+                further = round(length + (math.sqrt(2) if sides else 1.0), 9)
+                heapq.heappush(queue, (further, to, cell, needed))
+    else:
+        return None
+    way = [cell]
+    while cell != start:
+        cell, beside = before[cell]
+        way += [cell, *beside]
+    return way, length

@@ -221,6 +221,7 @@ class HybridPlanner(Questions):
         at: At = "anywhere",
         keep: PlanResult | None = None,
         within_m: float | None = None,
+        leave_zone: bool = False,
     ) -> PlanResult:
         """Plan a path between two points, or rooms.
 
@@ -254,6 +255,10 @@ class HybridPlanner(Questions):
             Where the goal cannot be reached, plan to the nearest point that can be, if it lies at
             most so many metres from the goal, by the crow. The status is then `near the goal`,
             `short_m` is the distance, and cost and bound are those of that point. Not with OMPL.
+        leave_zone
+            Whether a start that `blocked` closes may leave the closed cells by the shortest way.
+            The cells of that way are open for this plan, cost and bound are those with them open,
+            and `leaves_m` is the length of the way. Not with OMPL, nor `within_m`.
 
         Returns
         -------
@@ -265,12 +270,16 @@ class HybridPlanner(Questions):
         InvalidValueError
             When a point is not two or three finite numbers, a name is not known, or a closed item
             is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or
-            another method is given `keep`.
+            another method is given `keep`. With `leave_zone`, when costs close the start.
         """
         with self._query():
             now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
-            request = now.read(start, goal, smooth, closed, at, keep)
+            request, leaves_m = now.read(start, goal, smooth, closed, at, keep), None
+            if leave_zone:
+                request, leaves_m = now.leaving(request, within_m)
             result = now.plan(request)
+            if leaves_m is not None:
+                closed, result = request.closed, replace(result, leaves_m=leaves_m)
             if within_m is not None:
                 result = now.near(request, result, within_m)
         if not result.solved and (result.path is None or result.ends_well):

@@ -27,7 +27,7 @@ from hybridnav.planner.endpoints import (
     read_end,
     refusal,
 )
-from hybridnav.planner.nearest import check_within, nearest_reachable
+from hybridnav.planner.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planner.path import path_of
 from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
@@ -250,6 +250,40 @@ class Planning:
         layer = CostLayer(np.ones(self.grid.shape, np.float32))
         allowed = self.preset.planner.allow_unexplored
         return CostLine(self.grid, layer, allow_unexplored=allowed)
+
+    def leaving(
+        self, request: PlanRequest, within_m: float | None
+    ) -> tuple[PlanRequest, float | None]:
+        """Return a request whose closed start may leave the closed cells, and how long the way out
+        is; as it is, and None, where nothing closes the start alone, or no way leads out."""
+        if self.ompl is not None or within_m is not None:
+            given = (
+                "within_m" if self.ompl is None else f"OMPL, which preset {self.preset.name} has"
+            )
+            raise InvalidValueError(f"leave_zone does not go with {given}: leave one out")
+        closed, always = request.closed, self.costs.closed
+        cells = self.grid.frame.cells_of(np.stack([pose[:2] for pose in request.poses]))
+        on_map = ((cells >= 0) & (cells < self.grid.shape)).all()
+        if not on_map:
+            return request, None
+        ends = cells @ np.array([self.grid.shape[1], 1])
+        may_enter = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
+        if always is not None:
+            if may_enter.ravel()[ends[0]] and always.holds(ends[:1])[0]:
+                raise InvalidValueError(
+                    "leave_zone opens cells that blocked closes, and the costs close the start: "
+                    "give the zone as blocked, such as --blocked keepout:FILE"
+                )
+            may_enter.ravel()[always.flat] = False
+        if closed is None or not may_enter.ravel()[ends].all():
+            return request, None
+        if closed.holds(ends).tolist() != [True, False]:
+            return request, None
+        way = way_out(may_enter, closed, int(ends[0]), corner_cutting=self.grid.corner_cutting)
+        if way is None:
+            return request, None
+        left = ClosedCells(np.setdiff1d(closed.flat, way[0]), closed.solid)
+        return request._replace(closed=left), way[1] * self.grid.resolution_m
 
     def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
         """Return a result, or where its goal cannot be reached one to the nearest point that can

@@ -167,6 +167,8 @@ class PlanResult:
     """The instructions, or the data to find them from."""
     why_source: Callable[[], Reasons] | Reasons | None = field(default=None, repr=False)
     """The explanation, or how to find it."""
+    leaves_m: float | None = None
+    """Metres from the start out of closed cells, which `leave_zone` opened; None of others."""
     proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
         default=None, repr=False
     )
@@ -348,6 +350,7 @@ class PlanResult:
             "length_m": self.path.length_m if self.path else None,
             "duration_s": self.duration_s,
             "short_m": self.short_m if self.ends_well else None,
+            "leaves_m": self.leaves_m,
             "cost": self.cost if self.ends_well else None,
             "lower_bound": self.lower_bound if self.ends_well else None,
             "gap": self.gap if self.ends_well else None,

@@ -324,10 +324,14 @@ def each_closure(blocked: Blocked) -> Iterator[tuple[Closure, Blocked]]:
             if len(items):
                 yield Closure("cells", None), Blocked(cells=items)
             continue
+        if one.name == "named":
+            yield from ((Closure("named", name), closure) for name, closure in items.items())
+            continue
         for k, item in enumerate(items):
             is_area = one.name in {"polygons", "keepout"}
             which = k if is_area else _number_of(item) if one.name == "doors" else item
-            yield Closure(one.name, which), Blocked(**{one.name: (item,)})
+            alone: Any = {one.name: (item,)}
+            yield Closure(one.name, which), Blocked(**alone)
 
 
 def _number_of(door: int | Door) -> int:
