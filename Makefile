@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+TOOLS := $(VENV)/.tools
 READY := $(VENV)/.ready
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
@@ -37,7 +38,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 # The documentation's site, out/docs/index.html: a warning is an error, and nothing is fetched.
-docs: setup
+docs: $(TOOLS)
 	$(SPHINX) docs out/docs
 
 # The same with the notebooks executed, out/site/index.html: minutes, and seconds where nothing that
@@ -77,9 +78,12 @@ $(INSTALLED): requirements.lock pyproject.toml
 	$(INSTALL) --constraint requirements.lock --no-build-isolation --editable .
 	touch $(INSTALLED)
 
-$(READY): $(INSTALLED)
-	@echo "setting up the tests: about two minutes the first time"
+$(TOOLS): $(INSTALLED)
+	@echo "setting up the tools: about two minutes the first time"
 	$(INSTALL) -r requirements.lock
+	touch $(TOOLS)
+
+$(READY): $(TOOLS)
 	@echo "compiling kernels: about a minute"
 	$(BIN)/python -m hybridnav.cli.warm
 	touch $(READY)

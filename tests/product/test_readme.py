@@ -182,3 +182,11 @@ def test_pictures_of_a_page_are_sound_and_small(page: str) -> None:
         else:
             with Image.open(picture) as image:
                 image.verify()
+
+
+def test_the_documentation_is_built_without_compiling_kernels(tmp_path: Path) -> None:
+    for target, warms in (("docs", False), ("site", True)):
+        command = ["make", "-n", target, f"VENV={tmp_path}"]
+        steps = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        assert ("hybridnav.cli.warm" in steps) == warms
+        assert "-r requirements.lock" in steps
