@@ -256,6 +256,17 @@ def test_what_is_out_of_order_and_who_goes_are_told_and_changed(
     )
 
 
+@pytest.mark.parametrize(("language", "reason"), [("en", "Link "), ("de", "Verbindung ")])
+def test_why_there_is_no_route_is_told_in_the_language_of_the_page(
+    building: Client, folder: Path, language: str, reason: str
+) -> None:
+    links = [link.name for link in _own(folder).links]
+    shut = QUERY | {"language": language, "closed": {"links": links}}
+    told = building.post("plan", shut).value
+    assert not told["solved"]
+    assert reason.lower() in told["why"].lower()
+
+
 def test_a_map_has_them_too(client: Client, folder: Path) -> None:
     query = query_of([10.5, 40.5], [70.5, 10.5])
     assert client.post("plan", query).value["solved"]

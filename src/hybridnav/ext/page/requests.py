@@ -391,14 +391,15 @@ def lines_of(
     return [line | {"text": text} for line, text in zip(lines, texts, strict=False)]
 
 
-def facts_of(plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the figures of a plan, and its lines floor by floor; None stands for what is not
-    finite."""
-    why = ""
-    if not isinstance(plan, PlanResult):
-        why = plan.note or " ".join(plan.reasons.get("en", ()))
+def facts_of(
+    plan: PlanResult | BuildingPlan, parts: list[dict[str, Any]], language: str = "en"
+) -> dict[str, Any]:
+    """Return the figures of a plan, its lines floor by floor, and why there is none, over floors in
+    a language; None stands for what is not finite."""
     if isinstance(plan, PlanResult):
         why = plan.settings.get("profile", {}).get("forbids", "")
+    else:
+        why = plan.note or " ".join(plan.reasons.get(language, ()))
     return {
         "status": str(plan.status),
         "why": why,

@@ -317,14 +317,14 @@ class _OverFloors:
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan over floors with its certificate; unless it is brief, with words."""
         plan = self._outcome(query)
-        return self._facts(plan) | ({} if query.brief else self._words(plan, query))
+        return self._facts(plan, query.language) | ({} if query.brief else self._words(plan, query))
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by different links."""
         start, goal = self._ends(query)
         building, how = self._with(query.preset), self._how(query)
         found = building.alternatives(start, goal, query.count, **how)
-        routes = [self._facts(plan) | self._words(plan, query) for plan in found]
+        routes = [self._facts(plan, query.language) | self._words(plan, query) for plan in found]
         few = len(routes) < query.count
         note = "there are no more routes by other links up to twice as dear" if few else ""
         return {"routes": routes, "complete": not few, "note": note}
@@ -382,8 +382,8 @@ class _OverFloors:
         how = {"blocked": blocked, "closed_links": links, "stairs": stairs}
         return how | {"profile": query.profile}
 
-    def _facts(self, plan: BuildingPlan) -> dict[str, Any]:
-        """Return the figures and lines of a plan, and its rides."""
+    def _facts(self, plan: BuildingPlan, language: str) -> dict[str, Any]:
+        """Return the figures and lines of a plan, its rides, and why there is none."""
         number_of = self._number_of
         parts = []
         for name, result in zip(plan.floors, plan.results, strict=True):
@@ -404,7 +404,7 @@ class _OverFloors:
         ]
         figures = ("length_m", "charge_m", "travel_s")
         return (
-            facts_of(plan, parts)
+            facts_of(plan, parts, language)
             | {"rides": rides}
             | {name: finite(getattr(plan, name)) for name in figures}
         )
