@@ -129,18 +129,22 @@ def test_a_number_in_yaml_is_that_number(number):
 # --- names --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["1,2", " 1 , 2.5,-3e2", "nan,inf", "1_0,2"])
-def test_no_room_and_no_point_has_the_name_of_a_point(tmp_path, name):
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [(name, "point") for name in ("1,2", " 1 , 2.5,-3e2", "nan,inf", "1_0,2")]
+    + [(name, "door") for name in ("door 1", "Door  20", "Tür 1", "TUER 3", "door7")],
+)
+def test_no_room_and_no_point_has_the_name_of_a_point_or_a_door(tmp_path, name, what):
     grid = hn.load_map(FIGURE, robot_radius_m=0)
     label_of = np.zeros(grid.shape, dtype=np.int32)
-    with pytest.raises(hn.errors.InvalidValueError, match="must not read as a point"):
+    with pytest.raises(hn.errors.InvalidValueError, match=f"must not read as a {what}"):
         hn.RoomLabels((name,), label_of)
-    with pytest.raises(hn.errors.InvalidValueError, match="must not read as a point"):
+    with pytest.raises(hn.errors.InvalidValueError, match=f"must not read as a {what}"):
         hn.RoomLabels(("hall",), label_of, {name: (0.5, 1.5)})
     path = tmp_path / "rooms.yaml"
     ring = [[0, 0], [4, 0], [4, 3], [0, 3]]
     path.write_text(json.dumps({"rooms": [{"name": name, "polygon": ring}]}))
-    with pytest.raises(hn.errors.RoomsError, match="must not read as a point"):
+    with pytest.raises(hn.errors.RoomsError, match=f"must not read as a {what}"):
         hn.load_rooms(path, grid)
 
 

@@ -18,6 +18,10 @@ MAX_NUMBER = 1_000_000_000
 """Number of a door at most."""
 
 
+_DOOR = re.compile(r"(door|tur|tuer) ?[0-9]+")
+"""What sentences call doors, folded: "door 4", and "Tür 4"."""
+
+
 def read_point(text: str) -> tuple[float, ...] | None:
     """Return the numbers of a text like `1,2` or `1,2,0.5`; None for a name."""
     try:
@@ -28,7 +32,8 @@ def read_point(text: str) -> tuple[float, ...] | None:
 
 
 def check_names(names: tuple[str, ...]) -> None:
-    """Refuse names that are empty, too long, not one printable line, a point's, or given twice."""
+    """Refuse names that are empty, too long, not one printable line, a point's or a door's, or
+    given twice."""
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
@@ -38,6 +43,10 @@ def check_names(names: tuple[str, ...]) -> None:
         if read_point(name) is not None:
             raise InvalidValueError(
                 f"a name must not read as a point, got {brief(name)}: a plan could not go there"
+            )
+        if _DOOR.fullmatch(folded(name)):
+            raise InvalidValueError(
+                f"a name must not read as a door, got {brief(name)}: give the room another one"
             )
         if name in seen:
             raise InvalidValueError(f"room {brief(name)}: the name is given twice")
