@@ -128,6 +128,20 @@ def test_type_base_and_multiplier_are_read(of: Any, full: Any, expected: list[fl
         assert layer.keepout.tolist() == [[False, False, False, True]]
 
 
+@pytest.mark.parametrize(
+    ("of", "pose", "words"),
+    [
+        (info(1, 100.0, -1.0), (0.0, 0.0, 0.0), "filter mask: value 100 limits nothing"),
+        (info(1, 50.0, -0.25), (100.0, 0.0, 0.0), "filter mask: no cell of the mask lies on"),
+        (info(0, 0.0, 1.0), (100.0, 0.0, 0.0), "filter mask: no cell of the mask lies on"),
+    ],
+)
+def test_messages_warn_as_files_do(of: Any, pose: Any, words: str) -> None:
+    with pytest.warns(hn.errors.MapWarning, match=words) as caught:
+        filter_costs(GRID, of, MASK, pose=pose)
+    assert [each.filename for each in caught] == [__file__]
+
+
 def test_the_frame_of_the_mask_has_a_pose() -> None:
     # Half a turn about (4, 1): the last cell of the mask lies on the first one of the map.
     layer = filter_costs(GRID, info(0, 0, 1), MASK, pose=(4.0, 1.0, math.pi))
@@ -408,7 +422,8 @@ def test_a_mask_of_another_resolution_that_covers_little_says_how_much(tmp_path:
 
 
 def test_value_100_of_a_speed_mask_limits_nothing(tmp_path: Path) -> None:
-    # nav2_costmap_2d/plugins/costmap_filters/speed_filter.cpp: a limit of 0 is NO_SPEED_LIMIT.
+    # Nav2, main of 2026, nav2_costmap_2d/plugins/costmap_filters/speed_filter.cpp: 100 * -1 + 100
+    # is within 0 to 100 %, so 0 is published, which is NO_SPEED_LIMIT in filter_values.hpp.
     grid = grid_of(np.zeros((1, 12)), hn.Frame(1.0, (0.0, 0.0)), robot_radius_m=0)
     with pytest.warns(hn.errors.MapWarning, match="value 100 limits nothing, as in Nav2"):
         layer = hn.load_speed_mask(mask_file(tmp_path, "trinary"), grid)
@@ -440,11 +455,11 @@ def test_the_command_takes_masks_in_other_frames(floor: Any, cli: Any, tmp_path:
         assert done["length_m"] > straight + 1.9
     assert cli(*query, "--blocked", placed).answer["blocked"] == [placed]
     for option in ("--blocked", "--costs"):
-        with warnings.catch_warnings(record=True) as caught:
+        with warnings.catch_warnings():
             warnings.simplefilter("always")
             done = cli(*query, option, f"keepout:{path}")
-        told = done.err + "".join(str(each.message) for each in caught)
-        assert "no cell of the mask lies on the map: its origin is" in told
+        assert "warning: mask" in done.err, option
+        assert "no cell of the mask lies on the map: its origin is" in done.err
         assert done.answer["length_m"] == straight
 
 

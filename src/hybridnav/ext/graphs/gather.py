@@ -35,6 +35,10 @@ KINDS = {
     "bad-id": "ids that Nav2 cannot hold",
     "unknown-node": "edges to nodes that are not there",
     "link-unread": "lifts, stairs and ramps of the file that cannot be placed, and are left out",
+    "stop-unread": "stops of lifts at levels that are not there, or without a vertex in the cabin",
+    "level-unaligned": "levels without two fiducials in common with the reference level",
+    "fiducial-off": "fiducials that contradict the others, or the measurements",
+    "scale-unsure": "measurements without a length, and levels without a measurement",
     "bad-cost": "costs that are negative or no number",
     "stops-loader": "values at which Nav2's loader stops: it takes nothing of the file",
     "fails-later": "values that Nav2 loads, and fails at later or takes for others",
@@ -76,6 +80,7 @@ _WARNINGS = frozenset(
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
         *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
         *("link-missing", "link-kind", "link-unread", "stop-missing", "fails-later"),
+        *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure"),
     }
 )
 _NOTES = frozenset({"missing-door", "missing-room", "missing-part"})

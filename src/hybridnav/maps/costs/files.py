@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.maps import Frame, OccupancyGrid
+    from hybridnav.maps.costs.factors import SpeedLimits
 
 _KEYS = {
     "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
@@ -188,17 +189,10 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     >>> hn.load_speed_mask("slow.yaml", grid).factors
     array([[1., 2., 4.]], dtype=float32)
     """
-    values, frame = _read_mask(path, grid, pose, max_cells)
+    values, frame = read_mask(path, max_cells=max_cells)
+    frame = frame.moved(pose)
     limits = checked_speeds(base, multiplier, unit, full_speed_mps)
-    idle = sorted(set(np.unique(values[values > 0])) - set(limits.limiting))
-    if idle:
-        warnings.warn(
-            f"mask {printable(path)}: value {idle[-1]} limits nothing, as in Nav2, for which a "
-            "limit of 0 or out of range is none: state a slower value that is one, or close the "
-            "zone by a keepout mask",
-            MapWarning,
-            stacklevel=2,
-        )
+    _warn_of(f"mask {printable(path)}", grid, values, frame, limits)
     return CostLayer.speed_mask(
         grid,
         values,
@@ -258,7 +252,9 @@ def load_keepout_mask(
     >>> hn.load_keepout_mask("zones.yaml", grid).keepout
     array([[False,  True, False]])
     """
-    values, frame = _read_mask(path, grid, pose, max_cells)
+    values, frame = read_mask(path, max_cells=max_cells)
+    frame = frame.moved(pose)
+    _warn_of(f"mask {printable(path)}", grid, values, frame)
     return CostLayer.keepout_mask(grid, values, frame, multiplier=multiplier)
 
 
@@ -266,14 +262,24 @@ _FEW = 0.1
 """Part of a map below which a mask of another resolution is said to cover few cells."""
 
 
-def _read_mask(
-    path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float], max_cells: int
-) -> tuple[NDArray[np.int8], Frame]:
-    """Return the values of a mask and its place on a map; warn where it covers few cells of it."""
-    values, own = read_mask(path, max_cells=max_cells)
-    frame = own.moved(pose)
+def _warn_of(
+    what: str,
+    grid: OccupancyGrid,
+    values: NDArray[np.int8],
+    frame: Frame,
+    limits: SpeedLimits | None = None,
+) -> None:
+    """Warn, for a public function, of a mask that covers few cells of a map or limits nothing."""
+    idle = sorted(set(np.unique(values[values > 0])) - set(limits.limiting)) if limits else []
+    if idle:
+        text = (
+            f"{what}: value {idle[-1]} limits nothing, as in Nav2, for which a limit of 0 or out "
+            "of range is none: state a slower value that is one, or close the zone by a keepout "
+            "mask"
+        )
+        warnings.warn(text, MapWarning, stacklevel=3)
     if frame == grid.frame and values.shape == grid.shape:
-        return values, frame
+        return
     covered = np.count_nonzero(mask_on_map(grid, np.zeros_like(values), frame) == 0)
     doubt = ""
     if not covered:
@@ -288,9 +294,8 @@ def _read_mask(
             f"{frame.resolution_m:g} m, those of the map {grid.resolution_m:g} m"
         )
     if doubt:
-        text = f"mask {printable(path)}: {doubt}: set its origin and resolution if that is wrong"
+        text = f"{what}: {doubt}: set its origin and resolution if that is wrong"
         warnings.warn(text, MapWarning, stacklevel=3)
-    return values, frame
 
 
 _KEEPOUT, _PERCENT, _ABSOLUTE = 0, 1, 2
@@ -334,6 +339,11 @@ def filter_costs(
         When a message lacks a field or holds a wrong value, or the filter is of another type. When
         a keepout filter has a base or multiplier other than 0 and 1, which Nav2 calls wrong.
 
+    Warns
+    -----
+    MapWarning
+        As of `load_keepout_mask` or `load_speed_mask`.
+
     Examples
     --------
     >>> from hybridnav.maps.costs import filter_costs
@@ -345,24 +355,29 @@ def filter_costs(
     what = "costmap filter info"
     kind, base, multiplier = (number_of(info, name, what) for name in _FIELDS)
     values, frame = read_cells(mask, "filter mask")
+    frame = frame.moved(pose)
     if kind == _KEEPOUT:
         if (base, multiplier) != (0.0, 1.0):
             raise InvalidValueError(
                 f"{what}: base and multiplier of a keepout filter must be 0 and 1, got {base:g} "
                 f"and {multiplier:g}"
             )
-        return CostLayer.keepout_mask(grid, values, frame.moved(pose))
+        _warn_of("filter mask", grid, values, frame)
+        return CostLayer.keepout_mask(grid, values, frame)
     if kind not in {_PERCENT, _ABSOLUTE}:
         raise InvalidValueError(
             f"{what}: type must be 0 (keepout), 1 (speed in percent) or 2 (speed in m/s), "
             f"got {kind:g}"
         )
+    unit = "percent" if kind == _PERCENT else "m/s"
+    limits = checked_speeds(base, multiplier, unit, full_speed_mps)
+    _warn_of("filter mask", grid, values, frame, limits)
     return CostLayer.speed_mask(
         grid,
         values,
-        frame.moved(pose),
+        frame,
         base=base,
         multiplier=multiplier,
-        unit="percent" if kind == _PERCENT else "m/s",
+        unit=limits.unit,
         full_speed_mps=full_speed_mps,
     )

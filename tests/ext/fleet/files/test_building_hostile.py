@@ -129,7 +129,7 @@ def test_what_can_be_read_around_is_a_finding(read):
     assert [floor.name for floor in building.floors] == ["L1", "L2"]
     first, second = (floor.graph for floor in building.floors)
     assert {found.kind: found.count for found in first.findings} == {
-        "no-coordinates": 1, "repeated-id": 1, "unknown-node": 3
+        "no-coordinates": 1, "repeated-id": 1, "unknown-node": 3, "link-unread": 1
     }  # fmt: skip
     assert (first.names, first.edges.tolist()) == (("a", 1), [[0, 1]])
     assert [found.kind for found in second.findings] == ["repeated-id"]

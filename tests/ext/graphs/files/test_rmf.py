@@ -365,8 +365,8 @@ def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
         ({"reference_level_name": "roof"}, "the reference level 'roof' is not there"),
         ({"lifts": {"a": {"x": 1, "y": 1, "yaw": 0, "width": 0, "depth": 1}}}, "width and depth"),
         ({"lifts": {"a": 7}}, "expected the lift as a mapping"),
-        ({"levels": {"a": {"vertices": [CORNER], "lanes": [[0, 0, LANE]]}}},
-         "its scale is not known"),
+        ({"lifts": {"a": {"x": 1, "y": 1, "yaw": 0, "width": 1, "depth": 1,
+                          "reference_floor_name": "attic"}}}, "level attic is not there"),
         ({"levels": {"a": {"vertices": [CORNER], "measurements": UNMEASURED, "lanes": []}}},
          "no lane of graph 0; graphs with lanes: none"),
         ({"levels": {"a": {"vertices": [CORNER], "measurements": UNMEASURED,
@@ -393,16 +393,94 @@ def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
         hn.ext.graphs.load_graph(write(tmp_path / "a.yaml", **changes))
 
 
-def test_a_level_without_lanes_needs_no_scale(tmp_path):
+def told(building):
+    """Kinds and places of all findings."""
+    return [
+        (found.kind, each.where)
+        for floor in building.floors
+        for found in floor.graph.findings
+        for each in found.examples
+    ]
+
+
+def changed(tmp_path, change):
     path = write(tmp_path / "a.yaml")
     data = yaml.safe_load(path.read_text())
-    data["levels"]["roof"] = {"vertices": [[0, 0, 0, ""]], "lanes": [], "elevation": 9}
+    change(data)
     path.write_text(yaml.safe_dump(data))
-    assert [floor.name for floor in hn.ext.fleet.load_building_graph(path).floors] == ["down", "up"]
-    data["lifts"]["hoist"]["reference_floor_name"] = "roof"
-    path.write_text(yaml.safe_dump(data))
-    with pytest.raises(hn.errors.MapError, match="lift hoist, level roof: its scale is not known"):
-        hn.ext.fleet.load_building_graph(path)
+    return hn.ext.fleet.load_building_graph(path)
+
+
+# rmf_building_map_tools of open-rmf/rmf_traffic_editor (main of 2025), building_map/level.py,
+# calculate_scale_using_measurements: set_scale(1.0) without measurements, "Nav graph generated in
+# pixel units, not meters!".
+def test_a_level_without_measurements_is_in_pixels(tmp_path):
+    building = changed(tmp_path, lambda data: data["levels"]["up"].pop("measurements"))
+    assert building.floor("up").graph.points.tolist() == [[300.0, -100.0], [200.0, -300.0]]
+    text = "level up: no measurement has a length: a pixel is taken as 1 m"
+    assert ("scale-unsure", text) in told(building)
+
+
+# There a measurement of 0 counts as the scale 0 in the mean, and one between two vertices at one
+# point divides by zero: both say nothing of the scale.
+@pytest.mark.parametrize("useless", [[0, 1, {"distance": [3, 0.0]}], [1, 1, {"distance": [3, 2]}]])
+def test_measurements_without_a_length_are_findings(tmp_path, useless):
+    building = changed(
+        tmp_path, lambda data: data["levels"]["down"]["measurements"].append(useless)
+    )
+    assert building.floor("down").graph.points.tolist() == [[15.0, -5.0], [10.0, -15.0]]
+    (text,) = [where for kind, where in told(building) if kind == "scale-unsure"]
+    assert text.startswith("level down: measurement 1 is ")
+
+
+def fiducials(data, of_up):
+    data["reference_level_name"] = "down"
+    corners = {"a": [0, 0], "b": [400, 0], "c": [0, 400], "d": [400, 400]}
+    for level, known in (("down", corners), ("up", corners | of_up)):
+        marks = [[*at, name] for name, at in known.items() if at]
+        data["levels"][level]["fiducials"] = marks
+
+
+# building.py and transform.py, set_from_fiducials, by which 1.87 m was computed apart: without two
+# fiducials of one name the level keeps the identity.
+@pytest.mark.parametrize(
+    ("of_up", "expected"),
+    [
+        ({}, []),
+        ({"d": [480, 400]}, ["fiducials lie up to 1.87 m from their fit, d the farthest"]),
+        ({"c": None, "d": None, "b": [800, 0]},
+         ["a pixel is 0.025 m by fiducials, 0.05 m by measurements"]),
+        ({"b": None, "c": None, "d": None},
+         ["fiducials as on down: a, expected two: it is not aligned"]),
+    ],
+)  # fmt: skip
+def test_fiducials_that_do_not_fit_are_findings(tmp_path, of_up, expected):
+    building = changed(tmp_path, lambda data: fiducials(data, of_up))
+    kinds = {"fiducial-off", "level-unaligned"}
+    found = [where for kind, where in told(building) if kind in kinds]
+    assert found == [f"level up: {text}" for text in expected]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"vertices": [[0, 0, 0, "x"], [50, 0, 0, "y"]], "lanes": [[0, 1, LANE]],
+          "measurements": [[0, 1, {"distance": [3, 2.5]}]]},
+         "lift hoist: no vertex in its cabin on level roof"),
+        (None, "lift hoist: level_doors names roof, which is not there"),
+        ({"vertices": [[0, 0, 0, "x"]], "lanes": []}, None),
+    ],
+)  # fmt: skip
+def test_a_stop_of_a_lift_that_is_lost_is_a_finding(tmp_path, change, text):
+    def change_all(data):
+        data["lifts"]["hoist"]["level_doors"]["roof"] = ["d"]
+        if change:
+            data["levels"]["roof"] = change
+
+    building = changed(tmp_path, change_all)
+    assert [end.floor for end in building.links[0].ends] == ["down", "up"]
+    found = [where for kind, where in told(building) if kind == "stop-unread"]
+    assert found == ([text] if text else [])
 
 
 def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
@@ -417,12 +495,8 @@ def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
     ids=["beside its vertices", "a level that is not there"],
 )
 def test_a_lift_that_is_lost_is_a_finding(tmp_path, change):
-    path = write(tmp_path / "a.yaml")
-    data = yaml.safe_load(path.read_text())
-    data["lifts"]["hoist"] |= change
-    path.write_text(yaml.safe_dump(data))
-    building = hn.ext.fleet.load_building_graph(path)
+    building = changed(tmp_path, lambda data: data["lifts"]["hoist"].update(change))
     assert building.links == ()
-    (found,) = building.floors[0].graph.findings
-    assert found.kind == "link-unread"
-    assert found.examples[0].where.startswith("lift hoist, vertices in its cabin on ")
+    ((kind, where),) = [each for each in told(building) if each[0].startswith(("link", "stop"))]
+    assert kind == "link-unread"
+    assert where.startswith("lift hoist, vertices in its cabin on ")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,10 @@ _MOST_GRAPHS = 10
 """The editor numbers graphs from 0 to 9."""
 _MOST_CROSSINGS = 2_000_000
 """Pairs of a lane and a door of one level that may cross."""
+_MOST_OFF_M = 0.5
+"""Metres between a fiducial and its place by the fit from which it is a finding."""
+_MOST_RATIO = 1.1
+"""Ratio of a level's scales by fiducials and by measurements from which it is a finding."""
 _GAP_M = 0.05
 """Gap between a cabin and its shaft, `gap` of `lift.py`."""
 _IN_FILE_ONLY = ("bidirectional", "graph_idx", "orientation")
@@ -57,8 +61,7 @@ def read_drawn(
     has none; `graph_index`: which of the graphs to read, from 0 to 9; None for the first that has
     lanes. Returns a floor for each level on which the graph has lanes, from the lowest to the
     highest, in metres, with y up, in the frame of the reference level. Raises `MapError` when it is
-    not of this form, its coordinates are degrees, the scale of a level is not known, or no lane
-    belongs to the graph.
+    not of this form, its coordinates are degrees, or no lane belongs to the graph.
     """
     levels = rmf.mapping_of(data["levels"], where, "levels", rmf.MOST_FLOORS)
     contents = {
@@ -89,8 +92,25 @@ def read_drawn(
                 found[lift].ends[level] = end
         floors.append(floor)
     floors.sort(key=lambda floor: floor.elevation_m or 0.0)
+    for lift, cabin in lifts.items():
+        if len(found[lift].ends) > 1:  # else the whole lift is a finding
+            _find_lost_stops(floors, f"lift {shown(lift)}", cabin.levels - found[lift].ends.keys())
     title = str(data.get("building_name") or data.get("name") or name)
     return rmf.building_of(floors, found, title, where)
+
+
+def _find_lost_stops(floors: list[rmf.RmfFloor], lift: str, levels: set[str]) -> None:
+    """Add the levels at which a lift has doors and no vertex, but those without lanes."""
+    by_name = {floor.name: floor for floor in floors}
+    first = next(floor for floor in floors if not floor.is_empty)
+    for level in sorted(levels):
+        on = by_name.get(level)
+        if on is None:
+            text = f"{lift}: level_doors names {shown(level)}, which is not there"
+            first.gathered.findings.add("stop-unread", text)
+        elif not on.is_empty:
+            text = f"{lift}: no vertex in its cabin on level {shown(level)}"
+            on.gathered.findings.add("stop-unread", text)
 
 
 def _graph_index(contents: dict[str, Any], where: str, wanted: int | None) -> int:
@@ -134,6 +154,8 @@ def _fill(
     at = f"{floor.where}, level {shown(floor.name)}"
     vertices = rmf.list_of(content.get("vertices"), at, "vertices")
     lanes = rmf.list_of(content.get("lanes"), at, "lanes")
+    for kind, doubt in drawing.doubts:
+        floor.gathered.findings.add(kind, f"level {shown(floor.name)}: {doubt}")
     chosen = []
     for number, lane in enumerate(lanes):
         ends = rmf.lane_ends(lane, f"{at}, lane {number}")
@@ -212,13 +234,13 @@ class _Cabin:
         drawing = drawing_of(drawings, str(facts.get("reference_floor_name", reference)), where)
         self.dims_m = width, depth
         self._at, self._yaw = drawing.point(raw), yaw
-        self._levels = {
+        self.levels = {
             str(key) for key in rmf.mapping_of(facts.get("level_doors"), where, "level_doors")
         }
 
     def holds(self, level: str, point: rmf.Point | None) -> bool:
         """Return whether a point lies inside, on a level where the lift has doors."""
-        if point is None or level not in self._levels:
+        if point is None or level not in self.levels:
             return False
         dx, dy = point[0] - self._at[0], point[1] - self._at[1]
         cosine, sine = cos(self._yaw), sin(self._yaw)
@@ -261,6 +283,8 @@ class Drawing:
     turn: complex = 1.0 + 0.0j
     shift: complex = 0.0 + 0.0j
     y_up: bool = True
+    doubts: tuple[tuple[str, str], ...] = ()
+    """Kinds of findings, and what is wrong."""
 
     def point(self, raw: rmf.Point) -> rmf.Point:
         """Return the point of coordinates of the drawing, `(x, y)` in metres."""
@@ -275,13 +299,13 @@ class Drawing:
 def drawings_of(
     data: dict[str, Any], contents: dict[str, dict[str, Any]], where: str
 ) -> dict[str, Drawing]:
-    """Return how each level is drawn, as far as its scale is known.
+    """Return how each level is drawn.
 
     In a drawing over an image y points down, and the scale is the mean of metres per pixel over the
-    measurements. The reference level, or else the first, has its origin at the corner of the image;
-    other levels are brought to it by two or more fiducials of one name, and without them have a
-    scale and an origin of their own. Metres (`cartesian_meters`) are taken as they are: the editor
-    does not apply `offset_x` and `offset_y` to them.
+    measurements, 1 without any. The reference level, or else the first, has its origin at the
+    corner of the image; other levels are brought to it by two or more fiducials of one name, and
+    without them have a scale and an origin of their own. Metres (`cartesian_meters`) are taken as
+    they are: the editor does not apply `offset_x` and `offset_y` to them.
 
     `where`: what messages begin with. Raises `MapError` when coordinates are degrees, or the
     reference level is not there.
@@ -298,43 +322,43 @@ def drawings_of(
     if reference not in contents:
         raise MapError(f"{where}: the reference level {reference!r:.60} is not there")
     at = f"{where}, level {shown(reference)}"
-    scale = _scale(contents[reference], at)
+    of_reference = _measured(contents[reference], at)
     marks = _fiducials(contents[reference], at)
-    drawings = {}
+    drawings = {reference: of_reference}
     for level, content in contents.items():
+        if level == reference:
+            continue
         at = f"{where}, level {shown(level)}"
-        own = _fiducials(content, at)
-        common = [name for name in marks if name in own]
-        if level == reference and scale is not None:
-            drawings[level] = Drawing(complex(scale), y_up=False)
-        elif level != reference and scale is not None and len(common) > 1:
-            pairs = [(marks[name], own[name]) for name in common]
-            drawings[level] = _fitted(pairs, scale, at)
+        own, measured = _fiducials(content, at), _measured(content, at)
+        pairs = {name: (marks[name], own[name]) for name in marks if name in own}
+        if len(pairs) > 1:
+            drawings[level] = _fitted(pairs, of_reference.turn.real, measured, at)
         else:
-            known = _scale(content, at)
-            if known is not None:
-                drawings[level] = Drawing(complex(known), y_up=False)
+            names = ", ".join(map(shown, pairs)) or "none"
+            doubt = f"fiducials as on {shown(reference)}: {names}, expected two: it is not aligned"
+            doubts = (*measured.doubts, ("level-unaligned", doubt))
+            drawings[level] = replace(measured, doubts=doubts)
     return drawings
 
 
 def drawing_of(drawings: dict[str, Drawing], level: str, where: str) -> Drawing:
     """Return how a level is drawn.
 
-    Raises `MapError` when its scale is not known.
+    Raises `MapError` when it is not there.
     """
-    found = drawings.get(level)
-    if found is None:
+    if level not in drawings:
         raise MapError(
-            f"{where}, level {shown(level)}: its scale is not known, expected measurements, or two "
-            "fiducials of the reference level"
+            f"{where}: level {shown(level)} is not there, expected one of the file: correct "
+            "reference_floor_name"
         )
-    return found
+    return drawings[level]
 
 
-def _scale(content: dict[str, Any], where: str) -> float | None:
-    """Return metres per pixel, the mean over measurements; None without any."""
+def _measured(content: dict[str, Any], where: str) -> Drawing:
+    """Return the drawing of a level by its measurements; those without a length are left out."""
     vertices = rmf.list_of(content.get("vertices"), where, "vertices")
-    scales = []
+    scales: list[float] = []
+    doubts: list[tuple[str, str]] = []
     for number, entry in enumerate(rmf.list_of(content.get("measurements"), where, "measurements")):
         at = f"{where}, measurement {number}"
         ends = [
@@ -344,12 +368,20 @@ def _scale(content: dict[str, Any], where: str) -> float | None:
         options = entry[2] if len(entry) > 2 and isinstance(entry[2], dict) else {}  # noqa: PLR2004
         given = options.get("distance")
         metres = number_of(given[1]) if isinstance(given, list) and len(given) > 1 else math.nan
-        if ends[0] is None or ends[1] is None or not metres > 0 or ends[0] == ends[1]:
+        if ends[0] is None or ends[1] is None or math.isnan(metres):
             raise MapError(
                 f"{at}: expected two points and distance: [3, METRES], got {entry!r:.60}"
             )
-        scales.append(metres / math.dist(ends[0], ends[1]))
-    return math.fsum(scales) / len(scales) if scales else None
+        pixels = math.dist(ends[0], ends[1])
+        if pixels > 0 and metres / pixels > 0:
+            scales.append(metres / pixels)
+        else:
+            text = f"measurement {number} is {metres:g} m on {pixels:g} pixels, and left out"
+            doubts.append(("scale-unsure", text))
+    if not scales:
+        doubts.append(("scale-unsure", "no measurement has a length: a pixel is taken as 1 m"))
+    scale = math.fsum(scales) / len(scales) if scales else 1.0
+    return Drawing(complex(scale), y_up=False, doubts=tuple(doubts))
 
 
 def _fiducials(content: dict[str, Any], where: str) -> dict[str, complex]:
@@ -363,10 +395,14 @@ def _fiducials(content: dict[str, Any], where: str) -> dict[str, complex]:
     return found
 
 
-def _fitted(pairs: list[tuple[complex, complex]], scale: float, where: str) -> Drawing:
+def _fitted(
+    marks: dict[str, tuple[complex, complex]], scale: float, measured: Drawing, where: str
+) -> Drawing:
     """Return the drawing of a level whose fiducials are known on the reference level, as
     `set_from_fiducials` computes it: circular mean of turns, mean of relative scales, and mean
-    shift."""
+    shift. Doubts are fiducials far from their fit, and a scale unlike the measured
+    one, which is all that two fiducials can show."""
+    pairs = list(marks.values())
     between = [
         (pairs[i][0] - pairs[j][0], pairs[i][1] - pairs[j][1])
         for i in range(len(pairs))
@@ -378,7 +414,18 @@ def _fitted(pairs: list[tuple[complex, complex]], scale: float, where: str) -> D
     relative = math.fsum(abs(other) / abs(one) for one, other in between) / len(between)
     turn = (_unit(turns) if turns else 1.0) * scale / relative
     shift = sum(scale * one - turn * other for one, other in pairs) / len(pairs)
-    return Drawing(turn, shift, y_up=False)
+    off, name = max(
+        (abs(turn * other + shift - scale * one), name) for name, (one, other) in marks.items()
+    )
+    doubts = []
+    if off > _MOST_OFF_M:
+        doubts.append(f"fiducials lie up to {off:.2f} m from their fit, {shown(name)} the farthest")
+    own = measured.turn.real
+    if not measured.doubts and not 1 / _MOST_RATIO < own * relative / scale < _MOST_RATIO:
+        doubts.append(
+            f"a pixel is {scale / relative:.3g} m by fiducials, {own:.3g} m by measurements"
+        )
+    return Drawing(turn, shift, y_up=False, doubts=tuple(("fiducial-off", each) for each in doubts))
 
 
 def _unit(vector: complex) -> complex:
