@@ -114,9 +114,10 @@ def false_proofs(
     if result.gap < MORE and not (
         proof["kind"] == "line" and proof["costs"]
     ):  # the prover itself states a bound that is too high, on a longer path
-        forged = replace(result, bound_source=proof["bound"] + more).proof()
-        yield "forged bound", {**forged, "cost": proof["cost"] + more}, measured
-        yield "forged bound", forged, measured
+        dearer = proof["cost"] + more
+        forged = replace(result, bound_source=proof["bound"] + more, weighted_cost=dearer).proof()
+        yield "forged bound", {**forged, "cost": dearer}, measured
+        yield "forged bound", {**forged, "cost": proof["cost"]}, measured
 
 
 def _moved(

@@ -21,8 +21,12 @@ POSE = st.tuples(LENGTH, LENGTH, YAW)
 
 def path_of(points: Any, headings: Any = None, **kind: Any) -> hn.Path:
     points = np.array(points, dtype=np.float64).reshape(-1, 2)
-    length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    chords_m = np.hypot(*np.diff(points, axis=0).T)
     headings = None if headings is None else np.array(headings, dtype=np.float64)
+    if kind.get("is_curved"):
+        half = np.angle(np.exp(1j * np.diff(headings))) / 2
+        chords_m = chords_m / np.sinc(half / np.pi)
+    length_m = float(chords_m.sum())
     return hn.Path(np.zeros((1, 2), np.int64), points, length_m, headings, **kind)
 
 

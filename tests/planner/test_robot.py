@@ -70,10 +70,12 @@ def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) 
     for i in np.flatnonzero(~arcs & ~spots):
         assert segment_faults(shut, path.points[i : i + 2]) == ()
     for i in np.flatnonzero(arcs):
+        half = np.angle(np.exp(1j * np.diff(path.headings_rad[i : i + 2])))[0] / 2
+        chord_m = np.hypot(*np.diff(path.points[i : i + 2], axis=0)[0])
         piece = hn.Path(
             path.cells,
             path.points[i : i + 2].copy(),
-            1.0,
+            float(chord_m / np.sinc(half / np.pi)),
             path.headings_rad[i : i + 2].copy(),
             True,
         )
