@@ -184,7 +184,8 @@ def test_an_answer_that_is_no_path_is_refused_in_one_line(
 
 
 def test_a_path_outside_the_corridor_is_refused(topology: TopologicalMap) -> None:
-    planner = planner_of(topology, f"{__name__}:Astray")
+    overrides = ["planner.levels=places", f"planner.refine={__name__}:Astray"]
+    planner = hn.HybridPlanner(topology, preset=hn.load_preset("paper", overrides=overrides))
     with pytest.raises(hn.errors.PresetError, match="a path that leaves its corridor"):
         planner.plan(START, (0.5, 2.5))
 

@@ -196,7 +196,8 @@ def test_within_one_cell_there_is_nothing_to_go_and_nothing_to_prove(preset: str
 
 def test_gap_is_what_separates_the_cost_from_the_bound() -> None:
     topology = map_of(SEALED, merge_distance_m=2.0)
-    hybrid = hn.HybridPlanner(topology, preset="paper").plan((0.5, 2.5), (8.5, 2.5))
+    by_places = hn.load_preset("paper", overrides=["planner.levels=places"])
+    hybrid = hn.HybridPlanner(topology, preset=by_places).plan((0.5, 2.5), (8.5, 2.5))
     whole = hn.HybridPlanner(topology, preset="grid-astar").plan((0.5, 2.5), (8.5, 2.5))
     assert hybrid.metric == whole.metric == "octile"
     # Round the box: on its near side no diagonal may cut its corner.
@@ -219,7 +220,7 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
         enterable = grid.classes != CellClass.OCCUPIED
     assume(enterable.any())
     topology = map_of(grid, merge_distance_m=scene.merge_distance_m, seed=scene.seed)
-    override = [f"planner.allow_unexplored={allow_unexplored}"]
+    override = ["planner.levels=places", f"planner.allow_unexplored={allow_unexplored}"]
     kinds = ("route", "joined", "neighbours")
     planner, joined, wider = (
         hn.HybridPlanner(
@@ -400,7 +401,7 @@ def test_a_result_records_how_the_pyramid_was_built_and_not_what_the_preset_says
 )
 @pytest.mark.parametrize("goal", [(8.5, 0.5), (3.5, 2.5), (99.0, 0.0)])
 @pytest.mark.parametrize(
-    ("preset", "seconds"), [("paper", {"coarse", "refine"}), ("grid-astar", {"refine"})]
+    ("preset", "seconds"), [("paper", {"descent"}), ("grid-astar", {"refine"})]
 )
 def test_a_result_is_json(
     build: dict[str, Any], goal: tuple[float, float], preset: str, seconds: set[str]
@@ -488,7 +489,9 @@ def test_every_public_name_loads_and_others_are_refused() -> None:
     assert set(hn.__all__) <= set(dir(hn))
     for name in hn.__all__:
         thing = getattr(hn, name)
-        assert thing.__name__ == (f"hybridnav.{name}" if name in {"errors", "ext"} else name)
+        assert thing.__name__ == (
+            f"hybridnav.{name}" if name in {"errors", "ext", "harness", "viz"} else name
+        )
     with pytest.warns(
         FutureWarning, match=r"^hybridnav\.MapError is now hybridnav\.errors\.MapErr"
     ):

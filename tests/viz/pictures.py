@@ -58,7 +58,8 @@ def two_rooms() -> hn.TopologicalMap:
 
 
 def _plan(ax: Axes) -> Axes:
-    result = hn.HybridPlanner(two_rooms(), preset="paper").plan((1.0, 1.0), (11.0, 5.0))
+    preset = hn.load_preset("paper", overrides=["planner.levels=places"])
+    result = hn.HybridPlanner(two_rooms(), preset=preset).plan((1.0, 1.0), (11.0, 5.0))
     return plot_plan(two_rooms(), result, ax=ax)
 
 

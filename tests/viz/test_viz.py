@@ -42,7 +42,10 @@ def _grid(cells, resolution_m=1.0, **settings):
     )
 
 
-def _plan(topology, start, goal, preset="paper"):
+BY_PLACES = hn.load_preset("paper", overrides=["planner.levels=places"])
+
+
+def _plan(topology, start, goal, preset=BY_PLACES):
     return hn.HybridPlanner(topology, preset=preset).plan(start, goal)
 
 
@@ -292,7 +295,7 @@ def test_unexplored_places_are_drawn_where_they_are_asked_for():
 
 
 def test_places_of_the_corridor_stand_out(rooms):
-    preset = hn.load_preset("paper", overrides=["planner.corridor=route"])
+    preset = hn.load_preset("paper", overrides=["planner.levels=places", "planner.corridor=route"])
     result = _plan(rooms, START, (2.0, 1.0), preset)
     ax = plot_plan(rooms, result)
     inside = set(result.route.places)
@@ -307,7 +310,7 @@ def test_places_of_the_corridor_stand_out(rooms):
 
 
 def test_neighbours_of_the_route_stand_out_where_they_are_in_the_corridor(rooms):
-    preset = hn.load_preset("paper")
+    preset = hn.load_preset("paper", overrides=["planner.levels=places"])
     wide = preset.planner.model_copy(update={"corridor": "neighbours"})
     result = _plan(rooms, START, (2.0, 1.0), preset.model_copy(update={"planner": wide}))
     endpoints = rooms.arcs[np.isin(rooms.arcs, result.route.places).any(axis=1)]

@@ -411,7 +411,7 @@ class Planning:
         """Return the bound of a path, or how to find it where it takes a search of its own."""
         if self.method.metric == "any-angle-weighted":
             return self._cost_bound(query, cost_m)
-        return min(found.lower_bound_m, cost_m)
+        return found.optimum or min(found.lower_bound_m, cost_m)
 
     def _cost_bound(self, query: Query, cost_m: float) -> Callable[[], float]:
         """Return how to find a bound on the cost of all any-angle paths, when somebody reads it."""

@@ -276,7 +276,7 @@ class GridSettings(_Refined):
 
 
 class PaperSettings(_Refined):
-    """Method `paper`: a route of places by max-distances, and a search of cells along it.
+    """Method `paper`: a route of places by max-distances, which comes down to cells.
 
     Examples
     --------
@@ -286,8 +286,20 @@ class PaperSettings(_Refined):
     """
 
     method: Literal["paper"] = "paper"
+    levels: Literal["descent", "places"] = "descent"
+    """Whether a route comes down from the places through the levels of the pyramid to small fields,
+    or its places are the corridor at once."""
+    field_cells: Annotated[_Int, Field(ge=1)] = 128
+    """Mean size of the fields in which a descent ends, in cells."""
+    step: Annotated[_Float, Field(ge=1, allow_inf_nan=False)] = 8.0
+    """How many times smaller the fields of each level of a descent are than those before."""
+    ring: Annotated[_Int, Field(ge=0, le=100)] = 1
+    """Rings of fields that a descent keeps beside its route; at the top two more."""
+    horizon_cells: Annotated[_Int, Field(ge=0)] = 128
+    """Cells that grid A* looks ahead in the last fields; 0 for one search of all of them."""
     corridor: Literal["route", "joined", "neighbours"] = "joined"
-    """Fields in which the refiner searches: see `hybridnav.route.corridor_of`."""
+    """With `levels: places`, the fields in which the refiner searches: see
+    `hybridnav.route.corridor_of`."""
 
     needs_places: ClassVar[bool] = True
 
@@ -321,7 +333,7 @@ class OmplPlannerSettings(PlannerSettings):
         allowed = self.allow_unexplored
         if self.along == "paper":
             wide = self.corridor if self.corridor == "neighbours" else "joined"
-            return PaperSettings(allow_unexplored=allowed, corridor=wide)
+            return PaperSettings(allow_unexplored=allowed, levels="places", corridor=wide)
         return SECTIONS[self.along](allow_unexplored=allowed)
 
     def refusal_of_costs(self) -> str | None:

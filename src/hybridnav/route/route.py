@@ -145,6 +145,27 @@ class RouteOfCells:
 
 
 @dataclass(frozen=True, eq=False)
+class RouteOfPlaces:
+    """A route of places whose arcs are chosen when somebody reads it."""
+
+    topology: TopologicalMap
+    places: IntArray
+    """int32 (n,), dense indices; an arc joins each to the next."""
+
+    def route(self) -> Route:
+        """Return the route, of parallel arcs the one with the least `through_m`."""
+        level, ids = self.topology.level, self.topology.arc_ids
+        ends = np.sort(level.arcs, axis=1)
+        chosen = []
+        for pair in itertools.pairwise(self.places.tolist()):
+            arcs = np.flatnonzero((ends == sorted(pair)).all(axis=1))
+            # The lengths through all arcs take a search of the whole map.
+            best = arcs[np.argmin(level.through_m[arcs])] if len(arcs) > 1 else arcs[0]
+            chosen.append(int(ids[best]))
+        return Route(tuple(self.topology.place_ids[self.places].tolist()), tuple(chosen))
+
+
+@dataclass(frozen=True, eq=False)
 class Corridor:
     """Union of the receptive fields of some places. Moves are judged on the whole grid: a corridor
     limits only the cells stood on."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.route import Route
+    from hybridnav.route.route import Route, RouteOfPlaces
     from hybridnav.search.distance_table import LabelSource
     from hybridnav.search.mesh import MeshSearch
     from hybridnav.search.octile import JumpSearch
@@ -43,7 +43,7 @@ class PlanStats:
     expanded: int = 0
     """Number of cells that the refiner expanded, or nodes of the lattice."""
     expanded_places: int = 0
-    """Number of places that the coarse search expanded."""
+    """Number of places that the coarse search expanded, with the fields below them in a descent."""
     expanded_intervals: int = 0
     """Number of intervals that the search on the mesh expanded."""
     corridor_cells: int = 0
@@ -144,8 +144,11 @@ class Found:
     """Proved bound on the cost of all paths; infinite where it is proved that there is none."""
     points: FloatArray | None = None
     """float64 (m, 2), centres of the cells if known already, or where an any-angle path turns."""
-    route: Route | None = None
+    route: Route | RouteOfPlaces | None = None
     """The route that was chosen before the path; None to derive it from the path."""
+    optimum: Callable[[], float] | None = None
+    """How to find the least cost of all paths of cells, metres, for those who read a gap; None
+    where `lower_bound_m` is all that is known."""
     stats: PlanStats = field(default_factory=PlanStats)
     proof: dict[str, Any] | None = None
     """A proof of the answer, for the harness; see `PlanResult.proof`. None for none."""

@@ -165,7 +165,9 @@ def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
     index = {place: at for at, place in enumerate(topology.place_ids.tolist())}
     on_route = np.array([index[place] for place in passed], dtype=np.int64)
     inside[on_route] = True
-    beside = result.settings.get("planner", {}).get("corridor", "route")
+    settings = result.settings.get("planner", {})
+    is_at_once = settings.get("levels", "places") == "places"  # a descent keeps smaller fields
+    beside: Any = settings.get("corridor", "route") if is_at_once else "route"
     if beside != "route" and len(on_route):
         from hybridnav.route import corridor_of  # noqa: PLC0415 - most presets search no corridor
 
@@ -260,7 +262,7 @@ def _entries(
     if result.route is not None:
         line = Line2D([], [], color=style.INK, lw=_ROUTE_WIDTH * width, marker="o")
         line.set(markerfacecolor=style.FREE, markersize=3.6 * width, markeredgewidth=width)
-        chosen = result.settings.get("planner", {}).get("method") == "paper"
+        chosen = result.settings.get("planner", {}).get("levels") == "places"
         words = ("coarse route", "corridor") if chosen else ("route", "its places")
         entries += [(line, words[0]), (swatch(style.PLACES), words[1])]
     entries.append((arc_handle(sizes), "place, arc"))

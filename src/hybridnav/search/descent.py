@@ -1,0 +1,294 @@
+"""A descent through the levels of a pyramid: routes of ever smaller fields, and a path of cells.
+
+A route of places is found first. Its fields and those beside them are kept, and the next route is
+found among their sons, two levels down; so on to fields of some hundred cells, in which A* finds
+the path. N. Sturtevant and M. Buro (Partial pathfinding using map abstraction and refinement, 2005)
+plan so on abstractions of a grid, and refine a part of the path at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.moves import legal_moves
+from hybridnav._base.threads import Pool
+from hybridnav.maps.costs.factors import UNIT_BITS
+from hybridnav.pyramid.record import SURVIVES
+from hybridnav.route.route import Corridor
+from hybridnav.search.grid_search import move_tables
+from hybridnav.search.kernels import descent as _kernels
+from hybridnav.search.kernels.descent import Fields, Ground, Marks
+from hybridnav.search.kernels.grid_search import BUCKETS
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.pyramid import DualGraphPyramid
+    from hybridnav.pyramid.record import Record
+
+Cell = tuple[int, int]
+_ROOM = 1024
+NEARLY = 0.85
+"""Part of `step` that is enough: no level has exactly so many fields."""
+MANY_PLACES = 1000
+"""Places above which small ones are too many to begin with."""
+REGION_CELLS = 32
+"""Size of the regions above such places, in fields of the last level."""
+
+
+class DescentSettings(NamedTuple):
+    """How a descent goes down."""
+
+    field_cells: int = 128
+    """Mean size of the fields at which it ends, in cells: the level that comes nearest."""
+    step: float = 8.0
+    """How many times smaller the fields of each level are than those of the one before."""
+    ring: int = 1
+    """Rings of fields kept beside the route at each level; places keep two more."""
+    horizon_cells: int = 128
+    """Cells that a window of A* looks ahead in the last fields; 0 for all of them at once."""
+
+
+class Descended(NamedTuple):
+    """The outcome of a descent."""
+
+    places: IntArray
+    """int32 (n,), the places of the route at the top, in their order; none without a route."""
+    cells: LongArray | None
+    """int64 (k, 2), the path of cells, None if none was asked for or found."""
+    expanded: int
+    """Cells expanded."""
+    expanded_fields: int
+    """Fields expanded, at all levels."""
+    corridor_cells: int
+    """Cells of the last fields."""
+
+
+def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]:
+    """Return the levels that a descent visits, from the top down.
+
+    The top is that of the places, or that of the regions, if the pyramid has any.
+    """
+    top = pyramid.place_level if pyramid.region_cells is None else pyramid.region_level
+    sizes = np.array([size.vertices for size in pyramid.stats.sizes[: top + 1]])
+    means = sizes[0] / np.maximum(sizes, 1)
+    off = np.maximum(means / settings.field_cells, settings.field_cells / np.maximum(means, 1))
+    levels = [int(np.argmin(off))]
+    for level in range(levels[0] + 1, top):
+        if means[level] >= settings.step * means[levels[-1]] * NEARLY:
+            levels.append(level)
+    if len(levels) > 1 and means[top] < settings.step * means[levels[-1]] * NEARLY:
+        levels.pop()
+    return [*([top] if top != levels[-1] else []), *reversed(levels)]
+
+
+def pack(
+    pyramid: DualGraphPyramid,
+    levels: list[int],
+    *,
+    enterable: BoolArray,
+    units: IntArray | None = None,
+) -> Fields:
+    """Return the fields of some levels for kernels.
+
+    At the top an arc costs its `max_distance_m`, which the source paper has, below it the octile
+    distance between the centres of gravity of its two fields (ours), with `units` times the
+    mean of their factors.
+
+    `levels`: those that are visited, the highest first; `enterable`: bool (rows, cols), the
+    cells that paths may use; `units`: int32 (rows, cols), factor of each cell; None for lengths.
+    """
+    lowest, record, cols = pyramid[levels[-1]], pyramid.record, pyramid.grid.shape[1]
+    survivors = lowest.cells[:, 0] * cols + lowest.cells[:, 1]
+    flat = None if units is None else np.ascontiguousarray(units).ravel()
+    sums = _kernels.field_sums(lowest.field_of.ravel(), cols, flat, lowest.n_vertices)
+    vertex_end, edge_end = record.vertex_end[survivors], record.edge_end[lowest.base_edges]
+    starts, parts, n_arcs = [0], [], 0
+    above: LongArray | None = None  # the field of the level above of each of the lowest level
+    for level in levels:
+        alive = np.flatnonzero(vertex_end > level)
+        of_level = _ancestors(record, survivors, level)
+        n_fields = len(alive)
+        total = np.stack([np.bincount(of_level, part, n_fields) for part in sums.T], axis=1)
+        means = total[:, 1:] / total[:, :1]
+        arcs = of_level[lowest.arcs[edge_end >= min(2 * level + 2, SURVIVES)]]
+        if above is None:
+            middle = np.stack(np.divmod(survivors[alive], cols), axis=1)
+            costs = pyramid[level].max_distance_m / pyramid.grid.resolution_m
+            parent = np.full(n_fields, -1)
+        else:
+            middle = means[:, :2]
+            rows_cols = np.abs(middle[arcs[:, 0]] - middle[arcs[:, 1]])
+            costs = rows_cols.max(axis=1) + (math.sqrt(2) - 1) * rows_cols.min(axis=1)
+            if units is not None:
+                costs *= means[arcs, 2].mean(axis=1) / (1 << UNIT_BITS)
+            parent = above[alive] + starts[-2]
+        first, neighbour, cost = _neighbours(arcs, costs, n_fields)
+        is_open = enterable.flat[survivors[alive]]
+        parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle, is_open))
+        n_arcs += len(neighbour)
+        starts.append(starts[-1] + n_fields)
+        above = of_level
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32, np.bool_]
+    arrays: list[Any] = [c.astype(dtype) for c, dtype in zip(columns, dtypes, strict=True)]
+    arrays[0] = np.append(arrays[0], n_arcs)
+    return Fields._make([np.array(starts), *arrays, survivors, lowest.areas])
+
+
+def _ancestors(record: Record, cells: LongArray, level: int) -> LongArray:
+    """Return the vertex of a level that holds each surviving cell, flat, of a level below."""
+    holder = cells.copy()
+    while (gone := record.vertex_end[holder] <= level).any():
+        holder[gone] = record.vertex_parent[holder[gone]]
+    return np.searchsorted(cells[record.vertex_end[cells] > level], holder)
+
+
+def _neighbours(
+    arcs: LongArray, costs: FloatArray, n_fields: int
+) -> tuple[LongArray, LongArray, FloatArray]:
+    """Return where the neighbours of each field begin, the neighbours, each once, and their costs.
+
+    Arcs between the same two fields cost the same; self-loops are left out.
+    """
+    ends = np.concatenate([arcs, arcs[:, ::-1]])
+    is_plain = ends[:, 0] != ends[:, 1]
+    keys, chosen = np.unique(
+        ends[is_plain, 0].astype(np.int64) * n_fields + ends[is_plain, 1], return_index=True
+    )
+    tails, heads = np.divmod(keys, max(n_fields, 1))
+    first = np.searchsorted(tails, np.arange(n_fields))
+    return first, heads, np.tile(costs, 2)[is_plain][chosen]
+
+
+class _Work:
+    """What one descent writes, and its number."""
+
+    def __init__(self, fields: Fields, n_cells: int) -> None:
+        n_fields, n_last = len(fields.open), len(fields.survivor)
+        self.number = 0
+        self.marks = Marks(
+            cost=np.empty(n_fields),
+            came=np.empty(n_fields, dtype=np.int32),
+            seen=np.zeros(n_fields, dtype=np.int64),
+            kept=np.zeros(n_fields, dtype=np.int64),
+            listed=np.zeros(n_fields + 1, dtype=np.int32),
+            inside=np.zeros(n_last, dtype=np.bool_),
+            told=np.zeros(5, dtype=np.int64),
+            heap=np.empty((_ROOM, 2)),
+            records=np.zeros(n_cells, dtype=np.int64),
+            waiting=np.empty(_ROOM * BUCKETS, dtype=np.int32),
+        )
+
+    def make_room(self) -> None:
+        """Make the open lists twice as large."""
+        heap, waiting = self.marks.heap, self.marks.waiting
+        self.marks = self.marks._replace(
+            heap=np.empty((2 * len(heap), 2)), waiting=np.empty(2 * waiting.size, dtype=np.int32)
+        )
+
+
+@copies_alike
+class Descent:
+    """The descents of one map; threads may share it.
+
+    Between queries it holds some 60 bytes for each field of its levels, and four bytes a cell for
+    the field of each. A search for a path takes eight bytes a cell for its records.
+
+    Parameters
+    ----------
+    pyramid
+        The pyramid; only its places and levels below are visited.
+    enterable
+        bool (rows, cols), the cells that paths may use.
+    settings
+        How it goes down.
+    units
+        int32 (rows, cols), the factor of each cell; None for lengths.
+
+    Examples
+    --------
+    >>> from hybridnav.search.descent import Descent
+    >>> grid = hn.example_map("figure1")
+    >>> pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=1.0)
+    >>> free = grid.enterable(allow_unexplored=False)
+    >>> descent = Descent(pyramid, free)
+    >>> found = descent.find((5, 5), (25, 20))
+    >>> found.cells[[0, -1]].tolist(), len(found.places) > 1
+    ([[5, 5], [25, 20]], True)
+    """
+
+    def __init__(
+        self,
+        pyramid: DualGraphPyramid,
+        enterable: BoolArray,
+        settings: DescentSettings = DescentSettings(),  # noqa: B008 - it does not change
+        *,
+        units: IntArray | None = None,
+        corner_cutting: bool = False,
+    ) -> None:
+        sizes = pyramid.stats.sizes
+        n_places = sizes[pyramid.place_level].vertices
+        if n_places > MANY_PLACES and sizes[0].vertices < settings.field_cells * n_places:
+            pyramid = pyramid.with_regions(REGION_CELLS * settings.field_cells)
+        self.levels = levels_of(pyramid, settings)
+        """The levels that it visits, from the places down."""
+        self.is_of_places = self.levels[0] == pyramid.place_level
+        """Whether its top is the level of the places."""
+        self.fields = pack(pyramid, self.levels, enterable=enterable, units=units)
+        self.field_of = pyramid[self.levels[-1]].field_of
+        """int32 (rows, cols), the last field of each cell."""
+        rings = np.full(len(self.levels), settings.ring)
+        rings[0] += 2 if settings.ring else 0
+        self._rings, self._horizon = rings, float(settings.horizon_cells)
+        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
+        tables = move_tables(corner_cutting=corner_cutting)
+        self._ground = Ground(moves.ravel(), enterable.shape[1], self.field_of.ravel(), *tables)
+        self._works = Pool(partial(_Work, self.fields, enterable.size))
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes held between descents that do not overlap."""
+        with self._works.lent() as work:
+            held = [*self.fields, *work.marks, *self._ground]
+            return sum(array.nbytes for array in held if isinstance(array, np.ndarray))
+
+    def find(self, start: Cell, goal: Cell) -> Descended:
+        """Find a path between the centres of two cells; it need not be a shortest one.
+
+        `start`, `goal`: cells of places that may be passed, (row, col).
+        """
+        found, _ = self._descend(start, goal, self._horizon)
+        return found
+
+    def corridor(self, start: Cell, goal: Cell) -> tuple[Descended, Corridor | None]:
+        """Find the last fields alone, and return them as a corridor, None without a route."""
+        return self._descend(start, goal, 0.0)
+
+    def _descend(
+        self, start: Cell, goal: Cell, horizon: float
+    ) -> tuple[Descended, Corridor | None]:
+        cols = self._ground.cols
+        ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
+        work = self._works.take()
+        while True:
+            marks = work.marks
+            route, cells = _kernels.descend(
+                self.fields, marks, self._ground, work.number + 1, ends, self._rings, horizon
+            )
+            status, last, expanded_fields, expanded, corridor_cells = marks.told.tolist()
+            if status != _kernels.FULL:
+                break
+            work.make_room()
+        work.number = max(work.number + 1, last)
+        corridor = None
+        if status >= 0 and horizon <= 0:
+            corridor = Corridor(self.field_of, marks.inside.copy(), corridor_cells)
+        self._works.give(work)
+        path = cells if len(cells) else None
+        effort = expanded, expanded_fields, corridor_cells
+        return Descended(route[::-1] if self.is_of_places else route[:0], path, *effort), corridor

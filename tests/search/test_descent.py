@@ -1,0 +1,156 @@
+"""Descents through the levels: what is packed, routes, and paths against scipy's searches."""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy import sparse
+from scipy.sparse import csgraph
+
+import hybridnav as hn
+from hybridnav.maps import CellClass
+from hybridnav.search.descent import Descent, DescentSettings, levels_of, pack
+from tests.oracle.grid import assert_legal, distances, move_graph, recounted
+from tests.strategies import examples, free_cells, scenes
+
+HOW = st.builds(
+    DescentSettings,
+    field_cells=st.sampled_from([1, 4, 16]),
+    step=st.sampled_from([1.0, 2.0, 8.0]),
+    ring=st.integers(0, 2),
+    horizon_cells=st.sampled_from([1, 4, 1000]),
+)
+
+
+def made(scene: Any, how: DescentSettings) -> tuple[Any, Descent]:
+    """The pyramid of a scene, and its descents over free cells."""
+    pyramid = scene.pyramid("radius")
+    return pyramid, Descent(pyramid, scene.classes == CellClass.FREE, how)
+
+
+@given(scenes(), HOW, st.integers(0, 2**32 - 1))
+@settings(max_examples=examples(300))
+def test_a_path_is_legal_and_there_whenever_one_is(scene: Any, how: Any, seed: int) -> None:
+    enterable = scene.classes == CellClass.FREE
+    cells = free_cells(scene.classes, seed, 6)
+    assume(cells)
+    _, descent = made(scene, how)
+    graph = move_graph(enterable)
+    for start, goal in itertools.pairwise(cells):  # a sequence: each leaves its marks to the next
+        optimum = distances(graph, enterable.shape, start)[goal]
+        found = descent.find(start, goal)
+        assert (found.cells is None) == math.isinf(optimum)
+        corridor = descent.corridor(start, goal)[1]
+        assert (corridor is None) == math.isinf(optimum)
+        if found.cells is None or corridor is None:
+            continue
+        assert_legal(found.cells, enterable, corridor.mask())
+        assert tuple(found.cells[0]) == start
+        assert tuple(found.cells[-1]) == goal
+        assert recounted(found.cells) >= optimum - 1e-9
+        assert corridor.n_cells == found.corridor_cells == corridor.mask().sum()
+
+
+@given(scenes(), HOW)
+@settings(max_examples=examples(150))
+def test_the_levels_are_packed_as_the_pyramid_has_them(scene: Any, how: Any) -> None:
+    pyramid = scene.pyramid("radius")
+    enterable = scene.classes == CellClass.FREE
+    levels = levels_of(pyramid, how)
+    fields = pack(pyramid, levels, enterable=enterable)
+    assert levels[0] == pyramid.place_level
+    assert (np.diff(levels) < 0).all()
+    for k, index in enumerate(levels):
+        level, start = pyramid[index], fields.starts[k]
+        assert fields.starts[k + 1] - start == level.n_vertices
+        joined = {tuple(sorted(pair)) for pair in level.arcs.tolist() if pair[0] != pair[1]}
+        packed = []
+        for v in range(level.n_vertices):
+            own = slice(*fields.first[start + v : start + v + 2])
+            packed += [(v, int(w) - start) for w in fields.neighbour[own]]
+        assert sorted(packed) == sorted([*joined, *(pair[::-1] for pair in joined)])
+        assert (fields.open[start:][: level.n_vertices] == (level.classes == 1)).all()
+        if k == 0:
+            continue
+        parents = pyramid.ancestor(np.arange(level.n_vertices), level=index, to=levels[k - 1])
+        own = slice(start, start + level.n_vertices)
+        assert (fields.parent[own] == parents + fields.starts[k - 1]).all()
+        middles = [level.receptive_field(v).mean(axis=0) for v in range(level.n_vertices)]
+        np.testing.assert_allclose(fields.middle[own], np.reshape(middles, (-1, 2)), atol=1e-4)
+
+
+@given(scenes(), st.integers(0, 2**32 - 1))
+@settings(max_examples=examples(200))
+def test_the_route_of_places_is_the_cheapest_by_max_distance(scene: Any, seed: int) -> None:
+    cells = free_cells(scene.classes, seed, 2)
+    assume(cells)
+    pyramid, descent = made(scene, DescentSettings(field_cells=1))
+    level = pyramid[pyramid.place_level]
+    places = descent.find(*cells).places
+    free = level.classes == CellClass.FREE
+    arcs = level.arcs[free[level.arcs].all(axis=1) & ~level.is_self_loop]
+    costs = level.max_distance_m[free[level.arcs].all(axis=1) & ~level.is_self_loop]
+    table = np.full((level.n_vertices, level.n_vertices), np.inf)
+    np.minimum.at(table, (arcs[:, 0], arcs[:, 1]), costs)
+    table = np.minimum(table, table.T)
+    ends = [int(level.field_of[cell]) for cell in cells]
+    least = csgraph.dijkstra(sparse.csr_array(np.where(np.isinf(table), 0, table)))[ends[0]]
+    if math.isinf(least[ends[1]]):
+        assert not len(places)
+        return
+    assert [places[0], places[-1]] == ends
+    total = sum(table[u, v] for u, v in itertools.pairwise(places.tolist()))
+    assert total == pytest.approx(least[ends[1]], rel=1e-6)
+
+
+def test_small_places_are_planned_from_regions_above_them() -> None:
+    grid = hn.OccupancyGrid(np.zeros((60, 60), dtype=np.float32), robot_radius_m=0)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=0.1)
+    descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=64))
+    found = descent.find((0, 0), (59, 59))
+    assert not descent.is_of_places
+    assert not len(found.places)
+    assert found.cells is not None
+    assert recounted(found.cells) == pytest.approx(59 * math.sqrt(2))
+    assert found.expanded_fields < 60
+
+
+@given(scenes(), st.integers(0, 2**32 - 1), st.sampled_from(["", "unexplored", "costs", "both"]))
+@settings(max_examples=examples(150))
+def test_paper_is_right_with_closures_costs_and_unexplored_cells(
+    scene: Any, seed: int, kind: str
+) -> None:
+    unexplored, by_costs = kind in {"unexplored", "both"}, kind in {"costs", "both"}
+    rng = np.random.default_rng(seed)
+    grid = scene.grid
+    overrides = [f"planner.allow_unexplored={str(unexplored).lower()}", "planner.field_cells=4"]
+    factors = rng.uniform(1, 3, grid.shape)
+    closed = rng.random(grid.shape) < 0.1
+    costs = hn.CostLayer(factors, closed=closed) if by_costs else None
+    preset = hn.load_preset("paper", overrides=overrides)
+    topology = hn.TopologicalMap(scene.pyramid("radius"))
+    planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
+    enterable = grid.classes != CellClass.OCCUPIED if unexplored else grid.classes == CellClass.FREE
+    if by_costs:
+        enterable = enterable & ~closed
+    assume(enterable.any())
+    for _ in range(3):
+        shut = rng.random(grid.shape) < 0.15
+        ends = [tuple(cell) for cell in rng.choice(np.argwhere(enterable), 2).tolist()]
+        if shut[ends[0]] or shut[ends[1]]:
+            continue
+        left = enterable & ~shut
+        optimum = distances(move_graph(left), grid.shape, ends[0])[ends[1]]
+        points = grid.frame.points_of(np.array(ends))
+        result = planner.plan(*points, blocked={"cells": np.argwhere(shut & enterable)})
+        assert result.solved is bool(np.isfinite(optimum))
+        if result.path is None:
+            continue
+        assert_legal(result.path.cells, left)
+        assert result.lower_bound <= result.cost * (1 + 1e-12)
+        if not by_costs:
+            assert result.lower_bound == pytest.approx(optimum * grid.resolution_m, rel=1e-9)
