@@ -323,6 +323,25 @@ def test_links_that_are_areas_stop_in_their_middle_on_every_level(tmp_path, tags
     assert link.ends[0].position_m == pytest.approx((10.0, 1.0), abs=0.1)
 
 
+# OpenStreetMap's wiki, highway=elevator, of 2026: a node or an area, and in buildings often both.
+@pytest.mark.parametrize("on_area", ["0-2", "0"])
+def test_a_lift_drawn_as_node_and_area_is_one_link(tmp_path, on_area):
+    nodes = [(5, 0.0, 11.0), (6, 2.0, 11.0), (7, 2.0, 9.0), (8, 1.0, 10.0)]
+    area = [2, 5, 6, 7, 2], {"indoor": "room", "room": "elevator", "level": on_area}
+    tags = {8: {"highway": "elevator", "level": "0-2"}}
+    building = drawn(tmp_path, [*ROOMS, area], nodes, tags)
+    (link,) = building.links
+    assert [end.floor for end in link.ends] == ["0", "1", "2"]
+    assert left_out(building) == []
+
+
+def test_steps_without_a_level_between_levels_are_a_finding(tmp_path):
+    building = drawn(tmp_path, [*WALKS, ([2, 3], {"highway": "steps"})])
+    assert building.links == ()
+    assert left_out(building) == ["stairs, way 102: no level, beside 1"]
+    assert left_out(drawn(tmp_path, [*WALKS, ([1, 2], {"highway": "steps"})])) == []
+
+
 @pytest.mark.parametrize(
     "stated", [{"door": "yes"}, {"indoor": "door"}, {"entrance": "main"}, {"door": "hinged"}]
 )

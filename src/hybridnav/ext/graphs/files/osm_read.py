@@ -229,6 +229,8 @@ class _Links:
         """Links that cannot be placed."""
         self._levels_at: dict[int, set[float]] = {}
         """Levels of the foot ways that pass a node."""
+        self._lifts: list[tuple[osm.OsmWay, bool]] = []
+        """Ways that are lifts, and whether they are links."""
 
     def found(self, floors: list[OsmFloor]) -> list[Link]:
         """Return all links."""
@@ -255,10 +257,24 @@ class _Links:
             kind = osm.link_kind(way.tags, is_line=not way.is_closed)
             if kind is not None and len(osm.levels_of(way.tags)) > 1:
                 links.append(self._link(way.tags.get("name", ""), kind, self._stops(way), way.tags))
-                self._note(links[-1], kind, f"way {way.id}")
-            elif kind == "lift":
-                self._note(None, kind, f"way {way.id}")
+                if kind != "lift":
+                    self._note(links[-1], kind, f"way {way.id}")
+            if kind == "lift":
+                placed = len(osm.levels_of(way.tags)) > 1 and links[-1] is not None
+                self._lifts.append((way, placed))
+            elif kind == "stairs" and not osm.levels_of(way.tags):
+                self._note_astray(way)
         return links
+
+    def _note_astray(self, way: osm.OsmWay) -> None:
+        """Note steps without a level, which are read as a way of level 0, beside other levels."""
+        beside = {0.0}
+        for node in way.refs:
+            beside |= self._levels_at.get(node, set())
+            beside.update(osm.levels_of(self._data.tags.get(node, {})))
+        if len(beside) > 1:
+            levels = ", ".join(f"{level:g}" for level in sorted(beside - {0.0}))
+            self.findings.add("link-unread", f"stairs, way {way.id}: no level, beside {levels}")
 
     def _stops(self, way: osm.OsmWay) -> list[tuple[float, Point]]:
         """Return where a link stops: at nodes that state one level, or that a foot way of the level
@@ -288,14 +304,30 @@ class _Links:
         return list(stops.items())
 
     def _from_nodes(self) -> list[Link | None]:
-        links = []
+        links: list[Link | None] = []
+        shapes: list[Any] = [
+            _shape(way, self._points) if way.is_closed else None for way, _ in self._lifts
+        ]
+        areas = shapely.STRtree(shapes)
+        is_placed = [placed for _, placed in self._lifts]
         for node, tags in self._data.tags.items():
             kind, levels = osm.link_kind(tags, is_line=False), osm.levels_of(tags)
             point = self._points.get(node)
-            if kind is not None and (kind == "lift" or len(levels) > 1):
-                stops = [(level, point) for level in levels if point is not None]
-                links.append(self._link(tags.get("name", ""), kind, stops, tags))
-                self._note(links[-1], kind, f"node {node}")
+            if kind is None or not (kind == "lift" or len(levels) > 1):
+                continue
+            around = []
+            if kind == "lift" and point is not None:
+                around = areas.query(shapely.Point(point), predicate="intersects").tolist()
+            if any(self._lifts[k][1] for k in around):
+                continue  # the lift is its area
+            stops = [(level, point) for level in levels if point is not None]
+            links.append(self._link(tags.get("name", ""), kind, stops, tags))
+            self._note(links[-1], kind, f"node {node}")
+            for k in around:
+                is_placed[k] |= links[-1] is not None
+        for (way, _), placed in zip(self._lifts, is_placed, strict=True):
+            if not placed:
+                self.findings.add("link-unread", f"lift, way {way.id}")
         return links
 
     def _note(self, link: Link | None, kind: LinkKind, where: str) -> None:
