@@ -65,6 +65,14 @@ TopicOption = Annotated[
         help="Topic of a bag: of scans, or of a map, whose last message is written.",
     ),
 ]
+YawOption = Annotated[
+    float | None,
+    typer.Option(
+        "--yaw",
+        metavar="RAD",
+        help="Yaw of the map of --topic in a bag, where its quaternion is zero and states none.",
+    ),
+]
 MaxRangeOption = Annotated[
     float,
     typer.Option("--max-range", metavar="R", help="Readings of R metres or more are no obstacles."),
@@ -116,6 +124,7 @@ def map(  # noqa: A001 - the command's name
     least: LeastOption = 0.0,
     max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     topic: TopicOption = None,
+    yaw_rad: YawOption = None,
     frame: options.FrameOption[str | None] = None,
     force: options.ForceOption = False,
     as_json: options.JsonOption = False,
@@ -135,8 +144,15 @@ def map(  # noqa: A001 - the command's name
             )
         if file.exists() and not force:
             raise UsageError(f"{printable(file)} exists: add --force to write over it")
-    if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
-        return
+    if topic is not None and is_bag(log_file):
+        grid = _kept(log_file, topic, yaw_rad)
+        if grid is not None:
+            _write_kept(grid, out, as_json)
+            return
+    if yaw_rad is not None:
+        raise UsageError(
+            "--yaw goes with --topic of a map in a bag: state that topic, or leave it out"
+        )
     from hybridnav.ext.live.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
 
     model = LaserModel(when_hit, when_passed, max_range_m, min_range_m, clear_range_m, tolerance_m)
@@ -160,13 +176,17 @@ def map(  # noqa: A001 - the command's name
     answer(describe(grid, log, seconds, out))
 
 
-def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noqa: FBT001 - private
-    """Write the last map of a topic, and return whether the topic holds maps."""
+def _kept(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid | None:
+    """Return the last map of a topic, None for a topic without maps."""
     from hybridnav.ext.live.files.bag_files import GRID, Bag  # noqa: PLC0415 - on demand
 
     if topic not in Bag(bag).topics_of({GRID}):
-        return False
-    grid = hn.ext.live.load_bag_map(bag, topic=topic, robot_radius_m=0.0)
+        return None
+    return hn.ext.live.load_bag_map(bag, topic=topic, yaw_rad=yaw_rad, robot_radius_m=0.0)
+
+
+def _write_kept(grid: hn.OccupancyGrid, out: Path, as_json: bool) -> None:  # noqa: FBT001 - private
+    """Write the map of a bag."""
     hn.write_ros_map(grid, out)
     rows, cols = grid.shape
     if as_json:
@@ -174,7 +194,6 @@ def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noq
         answer(json.dumps(figures | {"cells": grid.class_counts()}) + "\n")
     else:
         answer("\n".join(map_lines(grid, out)) + "\n")
-    return True
 
 
 def map_lines(grid: hn.OccupancyGrid, name: str | Path) -> list[str]:

@@ -6,6 +6,7 @@ import math
 import struct
 import sys
 import tracemalloc
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -324,7 +325,7 @@ def test_the_last_map_of_a_topic_counts_and_topics_are_named(tmp_path: Path) -> 
     assert grid.classes.tolist() == [[0]]
 
 
-def test_a_wrong_map_names_bag_and_topic(tmp_path: Path) -> None:
+def test_a_map_without_a_yaw_takes_the_stated_one(tmp_path: Path, cli: Any) -> None:
     bag = BagWriter("mcap")
     values = hn.OccupancyGrid(np.zeros((1, 1), np.float32)).to_message()
     origin = bag.make(
@@ -343,10 +344,25 @@ def test_a_wrong_map_names_bag_and_topic(tmp_path: Path) -> None:
     bag.add("/floor", GRID, 0, message)
     path = bag.write(tmp_path)
     with pytest.raises(
-        hn.errors.MapError, match=r"bag .*drive, /floor: .* quaternion of zeros"
+        hn.errors.MapError, match=r"bag .*drive, /floor: .* quaternion of zeros.*; state .*--yaw"
     ) as error:
         hn.ext.live.load_bag_map(path)
     assert "\n" not in str(error.value)
+    with pytest.warns(hn.errors.MapWarning, match=r"drive, /floor: .* taken is the stated yaw 0.5"):
+        grid = hn.ext.live.load_bag_map(path, yaw_rad=0.5, robot_radius_m=0)
+    assert grid.frame.yaw_rad == pytest.approx(0.5)
+    with pytest.raises(hn.errors.InvalidValueError, match="yaw_rad"):
+        hn.ext.live.load_bag_map(path, yaw_rad=math.nan)
+    out = tmp_path / "floor.yaml"
+    call = ("map", path, "--topic", "/floor", "-o", out)
+    assert cli(*call).refuses(3, "quaternion of zeros", "--yaw")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        done = cli(*call, "--yaw", "0")
+    assert (done.code, done.err.count("\n")) == (0, 1)
+    assert "the quaternion of the origin is zero, taken is the stated yaw 0" in done.err
+    assert "origin: [0.0, 0.0, 0.0]" in out.read_text()
+    assert cli("map", path, "-o", tmp_path / "b.yaml", "--yaw", "0").refuses(2, "--yaw goes with")
 
 
 # --- what cannot be read or written -------------------------------------------------------------

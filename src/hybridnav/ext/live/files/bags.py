@@ -14,13 +14,13 @@ import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav._base.messages import number_of, stamp_ns_of, value_of
-from hybridnav._base.trig import atan2, cos
+from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.errors import InvalidValueError, MapError, MapWarning
 from hybridnav.ext.live.files import bag_files
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
 from hybridnav.maps import OccupancyGrid
-from hybridnav.maps.checks import checked_radius, checked_thresholds, checked_type
+from hybridnav.maps.checks import checked_between, checked_radius, checked_thresholds, checked_type
 from hybridnav.planner import PlanResult, Tour
 
 if TYPE_CHECKING:
@@ -30,14 +30,17 @@ if TYPE_CHECKING:
 
 _MOST_TILT_RAD = 0.1
 """Angle between the vertical and the axis of a laser up to which its scans count as level."""
+_MOST_YAW_RAD = 7.0
+"""Yaw in radians that may be stated: one turn to either side, and what rounding adds."""
 _FIXED = ("map", "odom")
 """Usual names of the frame in which a robot moves, the better first."""
 
 
-def load_bag_map(
+def load_bag_map(  # noqa: PLR0913 - the settings have defaults
     path: PathLike,
     *,
     topic: str | None = None,
+    yaw_rad: float | None = None,
     robot_radius_m: float | None = None,
     free_threshold: float = 0.196,
     occupied_threshold: float = 0.65,
@@ -50,6 +53,9 @@ def load_bag_map(
         A file (.bag, .mcap, .db3), or the folder of a bag of ROS 2.
     topic
         Topic of `nav_msgs/OccupancyGrid`; None for `/map`, or the only one.
+    yaw_rad
+        Yaw, in radians, of maps whose origin has the quaternion 0, 0, 0, 0, which states none; None
+        to refuse them.
     robot_radius_m, free_threshold, occupied_threshold
         As in `OccupancyGrid`.
 
@@ -66,7 +72,12 @@ def load_bag_map(
         When it is no bag or damaged, holds no such topic or several, its map is wrong, or rosbags
         is not installed.
     InvalidValueError
-        When the radius or a threshold is out of range.
+        When the radius, the yaw or a threshold is out of range.
+
+    Warns
+    -----
+    MapWarning
+        When the last map is wrong and an earlier one is taken, or `yaw_rad` is.
 
     Examples
     --------
@@ -78,6 +89,8 @@ def load_bag_map(
     checked_thresholds(free_threshold, occupied_threshold)
     if robot_radius_m is not None:
         checked_radius(robot_radius_m)
+    if yaw_rad is not None:
+        yaw_rad = checked_between("yaw_rad", yaw_rad, -_MOST_YAW_RAD, _MOST_YAW_RAD)
     bag = bag_files.Bag(path)
     if topic is None and "/map" in bag.topics_of({bag_files.GRID}):
         topic = "/map"
@@ -89,18 +102,39 @@ def load_bag_map(
         occupied_threshold=occupied_threshold,
         name=topic.strip("/") or "map",
     )
+    where, taken = f"{bag.where}, {topic}", bag.last(topic)
+    is_blank, doubts = _turned(taken, yaw_rad), []
     try:
-        return read(bag.last(topic))
+        grid = read(taken)
     except InvalidValueError as error:
-        where, fault, good = f"{bag.where}, {topic}", error, None
-    for _, message in bag.messages([topic]):
-        with suppress(InvalidValueError):
-            good = read(message)
-    if good is None:
-        raise MapError(f"{where}: {fault}")
-    text = f"{where}: the last map is wrong ({fault}), taken is the last good one"
-    warnings.warn(text, MapWarning, stacklevel=2)
-    return good
+        fault, good = error, None
+        is_asked = is_blank and yaw_rad is None
+        hint = "; state its yaw by yaw_rad, --yaw of hybridnav map" if is_asked else ""
+        for _, message in bag.messages([topic]):
+            of_this = _turned(message, yaw_rad)
+            with suppress(InvalidValueError):
+                good, is_blank = read(message), of_this
+        if good is None:
+            raise MapError(f"{where}: {fault}{hint}") from None
+        grid = good
+        doubts.append(f"the last map is wrong ({fault}{hint}), taken is the last good one")
+    if is_blank:
+        doubts.append(f"the quaternion of the origin is zero, taken is the stated yaw {yaw_rad:g}")
+    for doubt in doubts:
+        warnings.warn(f"{where}: {doubt}", MapWarning, stacklevel=2)
+    return grid
+
+
+def _turned(message: Any, yaw_rad: float | None) -> bool:
+    """Return whether the quaternion of a map's origin is zero; give it the yaw that is stated."""
+    path = "info.origin.orientation"
+    with suppress(InvalidValueError):  # a message of another definition, which `read` refuses
+        if not any(number_of(message, f"{path}.{axis}", "occupancy grid") for axis in "xyzw"):
+            if yaw_rad is not None:
+                turn = value_of(message, path, "occupancy grid")
+                turn.z, turn.w = sin(yaw_rad / 2), cos(yaw_rad / 2)
+            return True
+    return False
 
 
 class BagLog(ScanLog):
