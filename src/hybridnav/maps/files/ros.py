@@ -193,7 +193,16 @@ def _read_description(
     values |= given
     absent = [key for key in required if key not in values]
     if absent:
-        raise MapError(f"{where}: lacks {', '.join(absent)}")
+        usual = {"free_thresh": "0.196", "occupied_thresh": "0.65"}  # as map_saver writes them
+        ways = [
+            f"add {key}: {usual[key]}, or state it by --{key.replace('_thresh', '-threshold')}"
+            for key in absent
+            if key in usual
+        ]
+        hint = "; ".join(ways) if len(ways) == len(absent) else "add what is missing"
+        raise MapError(
+            f"{where}: lacks {', '.join(absent)}, expected {', '.join(required)}: {hint}"
+        )
     low = _threshold(values, "free_thresh", where)
     high = _threshold(values, "occupied_thresh", where)
     if low > high:
