@@ -188,7 +188,7 @@ def test_thresholds_of_the_command_win_over_the_maps(raw_map, capsys):
     assert "cells      33 free, 0 unexplored, 48 occupied" in told.out
     assert "count as free at a free threshold of 0.2" in told.err
     assert run(["show", str(raw_map), *POINT, "--free-threshold", "0.7"]) == 2
-    assert "free_thresh must be less than occupied_thresh" in capsys.readouterr().err
+    assert "free_thresh must be at most occupied_thresh" in capsys.readouterr().err
 
 
 def test_smooth_wins_over_the_preset(raw_map, capsys):

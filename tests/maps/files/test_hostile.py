@@ -316,7 +316,7 @@ def read(tmp_path):
 
 def _same(first, second):
     opaque = [np.ones(r.level.shape) if r.opaque is None else r.opaque for r in (first, second)]
-    return first.white == second.white and all(
+    return first.level.dtype == second.level.dtype and all(
         np.array_equal(*pair) for pair in ((first.level, second.level), opaque)
     )
 

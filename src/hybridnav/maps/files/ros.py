@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePath
@@ -279,7 +280,10 @@ def _image_path(value: Any, path: Path, where: str) -> Path:
         image = Path(value)
     image = path.parent / image
     beside = path.parent / PurePath(value.replace("\\", "/")).name
-    if not image.exists() and beside.is_file():
+    is_beside = False
+    with suppress(OSError):  # a name that no file can have: who opens it says so
+        is_beside = not image.exists() and beside.is_file()
+    if is_beside:
         raise MapError(
             f"{where}: image {brief(value)} does not exist, the file lies beside the map: "
             f"write `image: {printable(beside.name)}`"
