@@ -1,5 +1,6 @@
 """Poses along a path: even, complete, and turned the way the robot drives."""
 
+import itertools
 import math
 from typing import Any
 
@@ -9,6 +10,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.planner import MotionLimits
 from hybridnav.refine.curves import shortest_curve
 from tests.strategies import drawn, occupancy_grid
 
@@ -112,21 +114,30 @@ def test_poses_on_curves(
     assert poses[-1, :2] == pytest.approx(path.points[-1], abs=1e-9)
     assert turned(poses[-1, 2] - goal[2]) == pytest.approx(0, abs=1e-6)
     assert turned(poses[0, 2] - start[2]) == pytest.approx(0, abs=1e-9)
-    # Driven: chords as long as arcs of the turning circle at the most.
-    turns = turned(np.diff(poses[:, 2]))
-    assert np.abs(turns).max(initial=0) < 3
-    driven = gaps(poses) / np.sinc(turns / (2 * np.pi))
-    assert driven.max(initial=0) <= spacing_m * (1 + 1e-6)
-    assert driven.sum() == pytest.approx(path.length_m, rel=1e-6)
-    # Each step is tangent to the headings at both of its endpoints, ahead or backwards.
-    steps = np.diff(poses[:, :2], axis=0)
-    moves = gaps(poses) > 1e-6
-    travel = np.arctan2(steps[:, 1], steps[:, 0]) + np.where(ahead[:-1] < 0, np.pi, 0)
-    off = turned(travel - (poses[:-1, 2] + turns / 2))[moves]
-    np.testing.assert_allclose(off, 0, atol=1e-4)
+    # The steps between two changes of direction are equal, as few as possible, on the curve.
+    pieces = shortest_curve(start, goal, radius_m=radius_m, reverses=reverses).lengths_m.tolist()
+    kept = [length for length in pieces if abs(length) > 1e-10]
+    stretches = [sum(each) for _, each in itertools.groupby(kept, key=lambda length: length > 0)]
+    counts = [math.ceil(abs(length) / spacing_m - 1e-9) for length in stretches]
+    assert len(poses) == 1 + sum(counts)
+    along = np.append(0, np.cumsum(np.repeat(np.abs(stretches) / counts, counts)))
+    dense = path.profile(MotionLimits(), spacing_m / 50)
+    for axis in range(2):
+        on_curve = np.interp(along, dense.along_m, dense.poses[:, axis])
+        np.testing.assert_allclose(poses[:, axis], on_curve, atol=spacing_m**2 / 1e4 / radius_m)
+    assert ahead[:-1].tolist() == np.repeat(np.sign(stretches), counts).tolist()
     if not reverses:
         assert (ahead == 1).all()
         assert path.reversals.size == 0
+
+
+def test_short_arcs_between_lines_make_no_short_steps() -> None:
+    # A line, an arc of 0.3 mm, and a line: 1.0003 m in 21 equal steps.
+    turn, arc_m = 0.003, 0.0003
+    end = (0.5 + arc_m * math.cos(turn / 2), arc_m * math.sin(turn / 2))
+    goal = (end[0] + 0.5 * math.cos(turn), end[1] + 0.5 * math.sin(turn))
+    path = path_of([(0, 0), (0.5, 0), end, goal], [0.0, 0.0, turn, turn], is_curved=True)
+    assert gaps(path.poses(0.05)) == pytest.approx([path.length_m / 21] * 21, rel=1e-5)
 
 
 def test_a_reversal_is_marked_where_it_is() -> None:

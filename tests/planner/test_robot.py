@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
+from tests._base.test_poses import path_of
 from tests.layers import grid_of, layer_of
 from tests.planner.test_costs import optimum_m, scene, seeds, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -70,15 +71,7 @@ def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) 
     for i in np.flatnonzero(~arcs & ~spots):
         assert segment_faults(shut, path.points[i : i + 2]) == ()
     for i in np.flatnonzero(arcs):
-        half = np.angle(np.exp(1j * np.diff(path.headings_rad[i : i + 2])))[0] / 2
-        chord_m = np.hypot(*np.diff(path.points[i : i + 2], axis=0)[0])
-        piece = hn.Path(
-            path.cells,
-            path.points[i : i + 2].copy(),
-            float(chord_m / np.sinc(half / np.pi)),
-            path.headings_rad[i : i + 2].copy(),
-            True,
-        )
+        piece = path_of(path.points[i : i + 2], path.headings_rad[i : i + 2], is_curved=True)
         cells = grid.frame.cells_of(piece.poses(grid.resolution_m / 100)[:, :2])
         assert is_open[tuple(cells.T)].all()
 

@@ -142,12 +142,16 @@ class Motion:
             leaves |= np.diff(self.headings_rad) != 0
         return np.append(leaves, True)
 
-    def bends(self) -> LongArray:
-        """Return the indices of points that even spacing must keep, with both endpoints, int64."""
+    def bends(self, *, of_rate: bool) -> LongArray:
+        """Return the indices of points that even spacing must keep, with both endpoints, int64.
+
+        `of_rate`: whether those count at which the turn of a metre changes, as where a line and an
+        arc meet.
+        """
         lengths, turns = self.lengths_m, self._turns
         moves = lengths > 0
         rate = np.divide(turns, lengths, out=np.zeros_like(turns), where=moves)
-        bent = np.abs(np.diff(rate)) > BEND
+        bent = of_rate & (np.abs(np.diff(rate)) > BEND)
         if not self.curved:
             bent |= np.abs(wrapped(np.diff(self._travel))) > BEND
         else:
@@ -157,8 +161,8 @@ class Motion:
         kept = np.flatnonzero(bent) + 1
         return np.unique(np.concatenate([[0], kept, [len(self.points) - 1]]))
 
-    def spread(self, spacing_m: float) -> Spread:
-        """Return poses at most `spacing_m` apart.
+    def spread(self, spacing_m: float, *, of_rate: bool = False) -> Spread:
+        """Return poses at most `spacing_m` apart, even between `bends`.
 
         No pose occurs twice in a row; two poses at one point are a turn on the spot.
 
@@ -169,7 +173,7 @@ class Motion:
         if not left.all():  # turns by less than a bend are none
             headings = None if self.headings_rad is None else self.headings_rad[left]
             distinct = replace(self, points=self.points[left], headings_rad=headings)
-            return distinct.spread(spacing_m)
+            return distinct.spread(spacing_m, of_rate=of_rate)
         lengths = self.lengths_m
         total_m = float(lengths.sum())
         if not spacing_m > 0 or total_m / spacing_m > _MAX_POSES:
@@ -181,7 +185,7 @@ class Motion:
             pose, still = np.append(self.points[0], wrapped(self._faced))[None], np.zeros(0)
             return self._turned_at_ends(Spread(pose, np.ones(1, np.int8), still, still))
         along = np.concatenate([[0.0], np.cumsum(lengths)])
-        bends = self.bends()
+        bends = self.bends(of_rate=of_rate)
         steps, wanted = [], []
         for first, last in zip(bends[:-1].tolist(), bends[1:].tolist(), strict=True):
             count = max(1, int(np.ceil((along[last] - along[first]) / spacing_m - _ROUNDING)))
@@ -197,9 +201,9 @@ class Motion:
         return self._turned_at_ends(Spread(poses, ahead, np.diff(at), np.diff(turned)))
 
     def driven(self, spacing_m: float) -> Spread:
-        """Return poses as `spread` does, with two at each turn on the spot, also where lines
-        without headings bend."""
-        found = self.spread(spacing_m)
+        """Return poses as `spread` does, also where lines and arcs meet, with two at each turn on
+        the spot, also where lines without headings bend."""
+        found = self.spread(spacing_m, of_rate=True)
         if self.headings_rad is not None:
             return found
         yaw, moves = found.poses[:, 2], found.lengths_m > 0

@@ -102,14 +102,16 @@ class Path:
         return self._motion.headings_at_points
 
     def poses(self, spacing_m: float = 0.05) -> FloatArray:
-        """Return poses along the path for a controller, evenly spaced between the points where it
-        bends.
+        """Return poses along the path for a controller, evenly spaced.
+
+        Poses lie where straight lines bend, where the robot turns on the spot and where it
+        reverses. Between two of these all steps are equal, as few as keep the spacing, along lines
+        and arcs alike. A step is shorter than half of it only where two of these are so close.
 
         Parameters
         ----------
         spacing_m
-            Most metres from one pose to the next; every straight line or arc is divided into as few
-            equal parts as possible.
+            Most metres from one pose to the next, driven on arcs along them.
 
         Returns
         -------
@@ -155,7 +157,8 @@ class Path:
         limits
             Most speed, acceleration, braking, lateral acceleration and turning rate.
         spacing_m
-            As in `poses`; it changes neither speeds nor times, but with `speed_map`.
+            As in `poses`, with further ones where lines and arcs meet; it changes neither speeds
+            nor times, but with `speed_map`.
         speed_map
             Limits of zones; each step from pose to pose keeps the least limit that the straight
             line between them touches. None for no zones.
