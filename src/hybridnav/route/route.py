@@ -32,15 +32,23 @@ class Route:
     """
 
     places: tuple[int, ...]
-    """Ids of the places, from that of the start to that of the goal."""
+    """Ids of the places, from that of the start to that of the goal, one for each visit but grazes
+    of a border (`docs/reference/results.md`)."""
     arcs: tuple[int, ...]
     """Ids of the arcs, one fewer than places; -1 for a step between two occupied cells, if corners
     may be cut."""
 
 
+_GRAZE = 10
+"""Most cells of a visit that does not count if it leaves by the arc it came by."""
+
+
 @copies_alike
 class RouteFinder:
     """The places and arcs that paths pass.
+
+    A visit of at most ten cells that leaves by the arc it came by is left out: a straight line cuts
+    the teeth of a border.
 
     Parameters
     ----------
@@ -86,8 +94,8 @@ class RouteFinder:
         return places, arcs
 
     def crossings(self, cells: LongArray) -> tuple[list[int], list[int], list[int]]:
-        """Return the result of `of`, and the step that crosses each arc: from `cells[step]` to the
-        next cell."""
+        """Return the result of `of`, and the step that crosses each arc, the first one if grazes
+        follow: from `cells[step]` to the next cell."""
         steps: list[int] = []
         flat = cells[:, 0] * self._cols + cells[:, 1]
         place = self._place_of[flat]
@@ -102,6 +110,9 @@ class RouteFinder:
                     arcs.append(self._arc_between(tail, head))
                     places.append(int(self._place_of[head]))
                     steps.append(step)
+                    is_back = len(arcs) > 1 and arcs[-1] == arcs[-2] >= 0
+                    if is_back and step - steps[-2] <= _GRAZE:
+                        del places[-2:], arcs[-2:], steps[-2:]
         return places, arcs, steps
 
     def _arc_between(self, tail: int, head: int) -> int:
