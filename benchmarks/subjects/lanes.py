@@ -70,7 +70,7 @@ class Floor:
         self.rooms = hn.find_rooms(grid)
         self.topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=self.rooms))
         self.grid, self.space = grid, FreeSpace.of(grid)
-        kept = self.space.kept(self.rooms)
+        kept = self.space.kept(self.topology.rooms)
         rng = np.random.default_rng(1)
         self.starts, self.goals = self.space.random_pairs(pairs, rng, kept)
         self.optimum = self.space.paths(self.starts, self.goals).length_cells

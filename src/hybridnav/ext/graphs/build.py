@@ -240,7 +240,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     )
     progress(1, _STEPS)
     chosen = Nodes(space, most)
-    is_kept = space.kept(topology.pyramid.rooms)
+    is_kept = space.kept(topology.rooms if topology.pyramid.rooms is not None else None)
     add_landmarks(chosen, topology, is_kept, min(wanted.bend, wanted.spacing))
     if not len(chosen):
         raise InvalidValueError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -158,6 +158,7 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
     values = np.array([numbers.get(name, 0) for name in (*topology.rooms.names, "")], np.int8)
     masks = [_Mask("rooms", values[topology.rooms.labels.label_of], grid.frame, type=4)]
     masks += [_read(spec) for spec in specs.values()]
+    n_edges, graph = graph.n_edges, without_keepout(graph, specs)
     features = nav2_features(graph, frame)
     nodes, edges = features[: graph.n_nodes], features[graph.n_nodes :]
     for node in nodes:  # else the semantic scorer would count a node as an edge of that class
@@ -169,11 +170,8 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
     services = _services(graph, lifts)
     if operations:
         _add_operations(edges, graph, doors, services)
-    kept = [edge for edge, is_open in zip(edges, _open(graph, specs), strict=True) if is_open]
-    if not kept:
-        raise InvalidValueError("keepout zones leave the graph no edge: give another mask")
-    if len(kept) < len(edges):
-        left_out += [f"{len(edges) - len(kept):,} edges through keepout zones"]
+    if graph.n_edges < n_edges:
+        left_out += [f"{n_edges - graph.n_edges:,} edges through keepout zones"]
     facts = {
         "name": grid.name,
         "folder": str(Path(folder).resolve()),
@@ -185,7 +183,7 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
         "classes": _CLASSES,
         "poses": _poses(topology.rooms, graph, doors, services),
     }
-    files = {_GRAPH: nav2_bytes(grid.name, nodes + kept)}
+    files = {_GRAPH: nav2_bytes(grid.name, nodes + edges)}
     for mask in masks:
         files |= mask.files()
     for name in (_NAMES, _PARAMS, "poses.yaml", "README.md"):
@@ -295,12 +293,35 @@ def _edge_facts(
     return found
 
 
-def _open(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> list[bool]:
-    """Return which edges touch no cell of a keepout zone."""
+def without_keepout(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> RouteGraph:
+    """Return a graph without the edges that touch a cell of a keepout zone, and without nodes that
+    these leave alone; `specs`: masks by kind, as of `checked_masks`.
+
+    Raises `InvalidValueError` when no edge is left.
+    """
     shut = specs["keepout"].layer(graph.grid).keepout if "keepout" in specs else None
     if shut is None:
-        return [True] * graph.n_edges
-    return [least == 1 for least in _least(graph, np.where(shut, 0.5, 1.0)).tolist()]
+        return graph
+    edges = np.flatnonzero(_least(graph, np.where(shut, 0.5, 1.0)) == 1)
+    if not len(edges):
+        raise InvalidValueError("keepout zones leave the graph no edge: give another mask")
+    nodes = np.setdiff1d(np.arange(graph.n_nodes), np.setdiff1d(graph.edges, graph.edges[edges]))
+    return replace(
+        graph,
+        positions=graph.positions[nodes],
+        kinds=tuple(graph.kinds[node] for node in nodes),
+        rooms=tuple(graph.rooms[node] for node in nodes),
+        doors=graph.doors[nodes],
+        names=tuple(graph.names[node] for node in nodes),
+        edges=np.searchsorted(nodes, graph.edges[edges]),
+        edge_rooms=tuple(graph.edge_rooms[edge] for edge in edges),
+        edge_doors=tuple(graph.edge_doors[edge] for edge in edges),
+        widths_m=graph.widths_m[edges],
+        clearances_m=graph.clearances_m[edges],
+        left_m=graph.left_m[edges],
+        right_m=graph.right_m[edges],
+        ids=(graph.ids[0][nodes], graph.ids[1][edges]),
+    )
 
 
 def _services(graph: RouteGraph, lifts: Iterable[str]) -> dict[str, str]:

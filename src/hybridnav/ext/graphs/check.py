@@ -19,6 +19,7 @@ from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.maps.islands import unique_rows
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
+from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
@@ -131,7 +132,7 @@ def check_graph(
     rooms = topology.pyramid.rooms
     _add_nodes(findings, graph, placed, (grid, space.outside(rooms)), component)
     _add_edges(findings, graph, placed, space, is_clear)
-    is_kept = space.kept(rooms)
+    is_kept = space.kept(None if rooms is None else topology.rooms)
     add_components(findings, graph, component)
     _add_parts(findings, space, is_kept, component)
     met = add_rooms_and_doors(findings, topology, placed, is_clear, space, is_kept)
@@ -331,8 +332,10 @@ def _add_rooms(findings: Findings, rooms: Rooms, placed: PlacedGraph, is_kept: B
     inside = np.zeros(len(rooms.names), dtype=np.bool_)
     labels = label_of.ravel()[is_kept]
     inside[labels[labels >= 0]] = True
+    inside &= rooms.is_listed
     wanted = [name for name in rooms.names if inside[rooms.labels.index(name)]]
     missing = [name for name in wanted if rooms.labels.index(name) not in visited]
     for name in missing:
-        findings.add("missing-room", f"room {name}", rooms.point_of(name))
+        kind = "missing-room" if FOUND_NAME.fullmatch(name) else "missing-named-room"
+        findings.add(kind, f"room {name}", rooms.point_of(name))
     return len(wanted) - len(missing), len(wanted)

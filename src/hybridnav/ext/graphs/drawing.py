@@ -94,6 +94,10 @@ class ChainGraph:
             lack = 1 - min(line.narrow / comfort, 1) if comfort else 0.0
             limit = small_narrow[0] + (small_narrow[1] - small_narrow[0]) * lack
             rest = (limit if lack else small) - line.length
+            ends = {line.tail, line.head}
+            # A door keeps both its sides.
+            if any(self._kinds[end] >= DOOR and len(self._at[end]) < 3 for end in ends):  # noqa: PLR2004
+                continue
             if rest >= 0 and len(self._at[line.tail]) > 1 and self._detour(key, rest) <= rest:
                 self._drop(key)
         self._join()

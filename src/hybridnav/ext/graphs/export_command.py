@@ -105,9 +105,8 @@ def export(
         "--report": report,
         "--plot": plot,
     }
-    given.check_homes(
-        of_graphs, [each for each in _ENDINGS if each not in _PARTS], f"--format {kind}"
-    )
+    homes = [each for each in _ENDINGS if each not in _PARTS]
+    given.check_homes(of_graphs, homes, f"--format {kind}")
     given.check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
     named, lifts = given.read_points(points) if points else ({}, ())
     settings = reading.settings(map_file)
@@ -122,8 +121,8 @@ def export(
             parts = _write_parts(topology, kind, (out, map_file), frame)
         given.respond(*parts, seconds, as_json=as_json)
         return
-    own = keep is not None and keep.suffix in given.ENDINGS.get(kind, ())
-    before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=floor if own else None)
+    own = floor if keep is not None and keep.suffix in given.ENDINGS.get(kind, ()) else None
+    before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=own)
     for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
     began = time.perf_counter()
     build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
@@ -134,7 +133,9 @@ def export(
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with common.stage(f"writing {out}", seconds, "write"):
         aim = fleet or (robot and robot._replace(lifts=lifts))
-        left_out = _write_graph(topology, graph, aim, out, frame)
+        missing = list(_write_graph(topology, graph, aim, out, frame))
+        graph, keepout = given.opened(graph, robot)  # as the file holds it
+        missing += given.left_out(topology, graph)
     is_few = fleet is not None or nodes is not None
     pairs = given.LOSS_PAIRS if report is None and is_few else report
     judged = None
@@ -142,19 +143,13 @@ def export(
         with common.stage("comparing routes", seconds, "report"):
             judged = hn.ext.graphs.judge_route_graph(graph, pairs=pairs)
     figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
-    figures |= {} if fleet is None and robot is None else {"left_out": list(left_out)}
-    lines = [*_summary(out, graph, judged), *_left_out_lines(left_out)]
-    lines += _ids_line(graph) if fleet is None else []
-    # A bundle leaves out edges in keepout zones.
-    after = graph if bundle is None else hn.ext.graphs.load_graph(bundle / "graph.geojson")
-    changes = {} if before is None else hn.ext.graphs.graph_changes(before, after)
-    figures |= {"changes": changes} if changes else {}
+    ids = _ids_line(graph) if fleet is None else []
+    lines = [*_summary(out, graph, judged), *_left_out_lines(missing), *ids]
+    changes = {} if before is None else hn.ext.graphs.graph_changes(before, graph)
+    figures |= {"left_out": missing} | ({"changes": changes} if changes else {})
     given.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
     given.warn_of_loss({graph.grid.name: judged} if judged is not None and is_few else {})
-    if plot is not None:
-        from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
-
-        save_figure(hn.ext.graphs.plot_route_graph(graph), plot)
+    given.draw(graph, keepout, plot)
 
 
 def _builder(
@@ -202,9 +197,11 @@ def _export_over_floors(
         return
     build = _builder(style, nodes, spacing_m, reading.seed or 0)
     reports: list[GraphReport] = []
+    bare: list[str] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
         built = build(topology)
+        bare.extend(f"{topology.grid.name}: {each}" for each in given.left_out(topology, built))
         reports.append(hn.ext.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
         return built
 
@@ -216,7 +213,7 @@ def _export_over_floors(
     judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with common.stage(f"writing {out}", seconds, "write"):
-        left_out = fleet.write_building(align_floors(graph), out)
+        left_out = [*fleet.write_building(align_floors(graph), out), *bare]
     figures = {
         "graph": str(out),
         "map": str(map_file),
@@ -225,7 +222,7 @@ def _export_over_floors(
             for floor in graph.floors
         },
         "links": [link.name for link in graph.links],
-        "left_out": list(left_out),
+        "left_out": left_out,
         "report": {name: asdict(each) for name, each in judged.items()},
     }
     lines = [f"graph      {printable(out)}"]

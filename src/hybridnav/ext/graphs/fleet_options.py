@@ -17,6 +17,7 @@ from hybridnav.errors import MapError, brief
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from hybridnav._base.typing import BoolArray
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import GraphReport, RouteGraph
 
@@ -145,6 +146,30 @@ class Bundle(NamedTuple):
         checked_masks(given.costs)
         check_bundle(folder)
         return given
+
+
+def left_out(topology: hn.TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
+    """Return what has no node in a graph; see `cover.left_out`."""
+    from hybridnav.ext.graphs import cover  # noqa: PLC0415 - on demand
+
+    return cover.left_out(topology, graph)
+
+
+def draw(graph: RouteGraph, keepout: BoolArray | None, plot: Path | None) -> None:
+    """Save the picture of a graph, if one is wanted."""
+    if plot is not None:
+        from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
+
+        save_figure(hn.ext.graphs.plot_route_graph(graph, keepout=keepout), plot)
+
+
+def opened(graph: RouteGraph, robot: Bundle | None) -> tuple[RouteGraph, BoolArray | None]:
+    """Return a graph as its bundle holds it, and the cells of keepout zones, None for no mask."""
+    from hybridnav.ext.graphs.bundle import checked_masks, without_keepout  # noqa: PLC0415
+
+    specs = checked_masks(robot.costs) if robot else {}
+    keepout = specs["keepout"].layer(graph.grid).keepout if "keepout" in specs else None
+    return without_keepout(graph, specs), keepout
 
 
 @dataclass(frozen=True)

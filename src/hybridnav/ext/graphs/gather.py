@@ -58,6 +58,7 @@ KINDS = {
     "one-way": "nodes that cannot be both reached and left",
     "missing-door": "doors that the robot fits through and no edge passes",
     "missing-room": "rooms that the robot fits in and no node lies in",
+    "missing-named-room": "the same, of rooms with a name of their own",
     "missing-part": "parts of free space without nodes",
 }
 """Kinds of findings, in the order of a report, and what each counts."""
@@ -80,7 +81,7 @@ _WARNINGS = frozenset(
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
         *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
         *("link-missing", "link-kind", "link-unread", "stop-missing", "fails-later"),
-        *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure"),
+        *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure", "missing-named-room"),
     }
 )
 _NOTES = frozenset({"missing-door", "missing-room", "missing-part"})

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.search.mesh import MeshPaths
+    from hybridnav.topology.rooms import Rooms
 
 LEAST_AREA_M2 = 1.0
 """Area in square metres below which a part of free space gets no nodes: scans have many."""
@@ -74,13 +75,18 @@ class FreeSpace:
         outside: BoolArray = np.bincount(part_of, weights=is_inside, minlength=1) == 0
         return outside & (self._is_large & ~outside).any()
 
-    def kept(self, rooms: RoomLabels | None = None) -> BoolArray:
+    def kept(self, rooms: Rooms | None = None) -> BoolArray:
         """Return which parts of free space get nodes, bool (n_components,): those of 1 m² or more
-        that do not lie outside the building.
+        that do not lie outside the building, nor in rooms alone that lists leave out.
 
         `rooms`: the rooms, if there are some.
         """
-        return self._is_large & ~self.outside(rooms)
+        if rooms is None:
+            return self._is_large & ~self.outside()
+        is_kept: BoolArray = self._is_large & ~self.outside(rooms.labels)
+        shown = rooms.listed_cells[self.free]
+        is_shown = np.bincount(self.component_of[self.free], weights=shown, minlength=1) > 0
+        return is_kept & is_shown if (is_kept & is_shown).any() else is_kept
 
     @property
     def _is_large(self) -> BoolArray:

@@ -13,6 +13,7 @@ from hybridnav._base.progress import no_progress
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
+from hybridnav.ext.graphs.cover import complete
 from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.nav2_rules import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
@@ -143,15 +144,15 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     checked_between("margin_m", margin_m, 0, 100)
     grid, cell_m = topology.grid, topology.grid.resolution_m
     space = FreeSpace.of(grid)
-    is_kept = np.append(space.kept(topology.pyramid.rooms), np.False_)
+    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    is_kept = np.append(space.kept(rooms), np.False_)
     part_of = np.where(is_kept[space.component_of], space.component_of, np.int32(-1))
     if not (part_of >= 0).any():
         raise InvalidValueError(
             f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
             f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
         )
-    if spacing_m is None:
-        spacing_m = _spacing_m(int((part_of >= 0).sum()) * grid.cell_area_m2)
+    spacing_m = spacing_m or _spacing_m(int((part_of >= 0).sum()) * grid.cell_area_m2)
     named = {name: _place_of(space, part_of, name, at) for name, at in (points or {}).items()}
     if len({tuple(at) for at in named.values()}) < len(named):
         raise InvalidValueError(f"points must lie apart, got two at one place: {brief(points)}")
@@ -169,13 +170,12 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
     near = min(_MERGED * layout.apart, _MOST_MERGED_M / cell_m)
     drawing.merge(near)
-    sketch = drawing.straightened(max(1, round(_STEP_M / cell_m)), _BEND_M / cell_m)
+    step = max(1, round(_STEP_M / cell_m))
+    sketch = drawing.straightened(step, _BEND_M / cell_m)
     progress(3, _STEPS)
-    sketch.repair()
-    for _ in range(2):
-        sketch.simplify(near, 2 * layout.apart)
-        sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
-    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, max(1, round(_STEP_M / cell_m)))
+    _set_edges(sketch, layout, near, cell_m)
+    _connect(sketch, space)
+    complete(sketch, rooms, is_kept, near / 2, step)
     add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
     sketch.split(_LONGEST * layout.apart)
     _connect(sketch, space)
@@ -185,10 +185,11 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
         old = sketch.freed(settled(known), _SAME_M / cell_m)
         sketch.keep(old, keep.edges, same, _STANDS * layout.apart)
         _connect(sketch, space)
-    if named:
-        sketch.add_points(np.array([*named.values()]), near / 2)
-        _connect(sketch, space)
+    sketch.add_points(np.array([*named.values()]).reshape(-1, 2), near / 2)
+    _connect(sketch, space)
     sketch.make_plane()
+    if len(sketch.edges) and not named:  # no route leads to or from a single node
+        sketch.keep_nodes(np.unique(sketch.edges))
     progress(4, _STEPS)
     graph = _described(topology, space, sketch, named)
     progress(_STEPS, _STEPS)
@@ -277,6 +278,16 @@ def _mark_doors(kinds: LongArray, passed: LongArray, rooms: Rooms) -> None:
             middle = frame.position_of(*middles[arc.index])
             away = ((cells + 0.5 - middle) ** 2).sum(axis=1)
             kinds[tuple(cells[int(away.argmin())])] = DOOR - 1 + door.number
+
+
+def _set_edges(sketch: Sketch, layout: Layout, near: float, cell_m: float) -> None:
+    """Make edges free, few, and along walls, with few dead ends."""
+    sketch.repair()
+    for _ in range(2):
+        sketch.simplify(near, 2 * layout.apart)
+        sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
+    step = max(1, round(_STEP_M / cell_m))
+    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, step)
 
 
 def _freed(cells: LongArray, part_of: IntArray) -> LongArray:

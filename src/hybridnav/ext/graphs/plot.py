@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._base.typing import FloatArray
+    from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.ext.graphs import GraphCheck, RouteGraph
     from hybridnav.maps import OccupancyGrid
     from hybridnav.viz.canvas import View
@@ -31,6 +32,8 @@ one point are all seen."""
 _ARROW_IN = 0.07
 """Length of the arrow on an edge that leads one way, in inches."""
 _MARGIN_M = 0.5
+_SHADE = 96
+"""Opacity of keepout zones, of 255."""
 
 
 def plot_graph_check(
@@ -199,6 +202,7 @@ _KINDS = {
 def plot_route_graph(
     graph: RouteGraph,
     *,
+    keepout: BoolArray | None = None,
     ax: Axes | None = None,
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
@@ -209,6 +213,8 @@ def plot_route_graph(
     ----------
     graph
         The graph.
+    keepout
+        bool (rows, cols), cells of keepout zones; None for none.
     ax
         Axes to draw on; by default new ones in a new figure.
     title
@@ -235,6 +241,11 @@ def plot_route_graph(
     line = canvas.sizes.line
     canvas.add_lines(graph.points[ends], colors=style.ARC, linewidths=0.35 * line, zorder=2)
     entries: list[Entry] = [(Line2D([], [], color=style.ARC, linewidth=0.5 * line), "edges")]
+    if keepout is not None and keepout.any():
+        shades = np.zeros((*keepout.shape, 4), dtype=np.uint8)
+        shades[keepout] = np.append(style.rgb(style.HOLE)[0], _SHADE)
+        draw_shades(canvas, grid, shades, gid="keepout")
+        entries.append((Patch(fc=style.HOLE, alpha=_SHADE / 255), "keepout zones"))
     kinds = np.array(graph.kinds)
     for kind, look in _KINDS.items():
         entries += _draw_nodes(canvas, graph.points[kinds == kind], look)

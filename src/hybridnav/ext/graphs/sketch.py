@@ -62,7 +62,7 @@ class Sketch:
         """Return the least clearance of edges, as `Passage.least` does."""
         return self.passage.least(positions[edges[:, 0]], positions[edges[:, 1]])
 
-    def _with_nodes(self, positions: FloatArray) -> list[int]:
+    def add_nodes(self, positions: FloatArray) -> list[int]:
         """Return the nodes at some positions; they are added where there are none."""
         found: list[int] = []
         for at in positions:
@@ -75,7 +75,7 @@ class Sketch:
 
     def add_path(self, tail: int, head: int, inner: FloatArray) -> list[tuple[int, int]]:
         """Add nodes between two; return the edges from one to the next."""
-        return list(pairwise([tail, *self._with_nodes(inner), head]))
+        return list(pairwise([tail, *self.add_nodes(inner), head]))
 
     def repair(self) -> None:
         """Lead edges that the robot cannot follow round what is in their way."""
@@ -275,14 +275,16 @@ class Sketch:
                 beside[one][other] = beside[other][one] = length
         return added
 
-    def add_points(self, points: FloatArray, near: float) -> None:
+    def add_points(self, points: FloatArray, near: float, within: BoolArray | None = None) -> None:
         """Add nodes at points, each joined to the nearest edge where that is in sight.
 
         `points`: float64 (k, 2); `near`: distance in cells from its ends, and from a point, within
-        which an edge gets no node for the point: it is joined to the end, or led through the point.
+        which an edge gets no node for the point: it is joined to the end, or led through the point;
+        `within`: bool (rows, cols), the cells in which edges are joined, also to nodes that have
+        some; None for all.
         """
-        for node in self._with_nodes(points):
-            if (self.edges == node).any():
+        for node in self.add_nodes(points):
+            if within is None and (self.edges == node).any():
                 continue
             at = self.positions[node]
             tails = self.positions[self.edges[:, 0]]
@@ -291,7 +293,11 @@ class Sketch:
             along = np.clip(((at - tails) * steps).sum(axis=1) / lengths, 0, 1)
             feet = tails + along[:, None] * steps
             away = np.hypot(*(feet - at).T)
-            for edge in np.argsort(away, kind="stable")[:_TRIED].tolist():
+            order = np.argsort(away, kind="stable")
+            if within is not None:
+                order = order[within[tuple(feet[order].astype(np.int64).T)]]
+                order = order[(self.edges[order] != node).all(axis=1)]
+            for edge in order[:_TRIED].tolist():
                 joined = self._stub(node, edge, feet[edge], near)
                 if joined:
                     self.set_edges([*np.delete(self.edges, edge, axis=0).tolist(), *joined])
@@ -312,7 +318,7 @@ class Sketch:
             if self._is_free(foot)[0]:
                 spots = np.repeat(foot, 3, axis=0)
                 if joins(spots, np.concatenate([ends, at[None]])).all():
-                    (new,) = self._with_nodes(foot)
+                    (new,) = self.add_nodes(foot)
                     return [(tail, new), (new, head), (new, node)]
         for end in np.argsort(gaps, kind="stable").tolist():
             if joins(at[None], ends[[end]])[0]:
@@ -368,7 +374,7 @@ class Sketch:
         for aim in aims:
             spots = np.repeat(aim[None], len(ends), axis=0)
             if space.joins(spots, self.positions[ends]).all():
-                (node,) = self._with_nodes(aim[None])
+                (node,) = self.add_nodes(aim[None])
                 self.set_edges([*rest, *((node, end) for end in ends)])
                 return
         lengths = np.diff(self.positions[self.edges[which]], axis=1)[:, 0]
@@ -383,7 +389,7 @@ class Sketch:
                 self.set_edges(edges)
                 return
         # Both are needed, and no straight edges lead there: paths do.
-        (node,) = self._with_nodes(aims[-1:])
+        (node,) = self.add_nodes(aims[-1:])
         spots = np.repeat(self.positions[node][None], len(ends), axis=0)
         paths = space.paths(spots, self.positions[ends])
         for end, line in zip(ends, np.split(paths.positions, paths.path_start[1:-1]), strict=True):

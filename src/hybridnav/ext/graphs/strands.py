@@ -101,8 +101,7 @@ def lines_of(
         if not tries:
             at = tuple(rooms.cells.T)
             is_bare = ~np.isin(rooms.label_of[at], rooms.label_of[lines])
-            is_bare |= away[at] > _ROOM * layout.apart
-            is_bare &= clearance[at] >= layout.least
+            is_bare |= (away[at] > _ROOM * layout.apart) & (clearance[at] >= layout.least)
             new = rooms.cells[is_bare] @ np.array([free.shape[1], 1])
         if not len(new):
             new = _uncovered(away, clearance, layout)

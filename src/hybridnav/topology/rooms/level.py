@@ -228,6 +228,11 @@ class Rooms:
         return self._listing.is_listed[: len(self.names)]
 
     @cached_property
+    def listed_cells(self) -> BoolArray:
+        """bool (rows, cols), free cells as measured, of rooms and other spaces that are listed."""
+        return np.append(self._listing.is_listed, np.False_)[self._listing.space_of]
+
+    @cached_property
     def listed_labels(self) -> RoomLabels:
         """The rooms in lists and pictures; cells of the others are in no room."""
         of = self.labels.label_of
