@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import pickle
+import re
 import subprocess
 import sys
 import zlib
@@ -103,6 +104,12 @@ def test_a_bound_above_the_cost_is_no_proof(preset):
     else:
         with pytest.raises(PlanError, match="a proof has the bound"):
             result.proof()
+        # Two numbers of which one is above the other by a hair read so.
+        vars(result)["lower_bound"] = result.cost * (1 + 1e-8)
+        with pytest.raises(PlanError) as error:
+            result.proof()
+        bound, cost = map(float, re.findall(r"([0-9.]+) m[,:]", str(error.value)))
+        assert bound > cost
 
 
 def forged(proof, grid, rng):

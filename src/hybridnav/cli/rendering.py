@@ -226,7 +226,8 @@ def _measured(figures: dict[str, Any]) -> list[str]:
 
 
 def rounded_bound(bound: float, gap: float) -> tuple[str, str]:
-    """Return a bound and how far from the optimum a path is at most, rounded to the safe side."""
+    """Return a bound and how far from the optimum a path is at most, rounded to the safe side; the
+    bound of an optimal path is its length, and rounded like that."""
     if gap <= _OPTIMAL:
         return f"{bound:.2f}", "optimal"
     low = math.floor(bound * 100) / 100

@@ -425,7 +425,7 @@ def _answer(route: GraphRoute | str, plan: BuildingPlan) -> tuple[Answer, str]:
     if route.fault:
         return "contradicted", route.fault
     if route.cost < plan.lower_bound * _ROUNDED:
-        return "contradicted", f"it costs {route.cost:.3f} m, below {plan.lower_bound:.3f} m"
+        return "contradicted", f"it costs {route.cost:.9g} m, below {plan.lower_bound:.9g} m"
     return "solved", ""
 
 

@@ -318,8 +318,10 @@ export class Routes {
     const isOptimal = route.gap !== null && route.gap < 1e-9;
     const rows = [["length", `${metres(route.length_m)} ${route.metric === "weighted" ? "" : t(route.metric)}`], ...this.#ridesOf(route)];
     if (isDearer) rows.push(["cost", metres(route.cost)]);
-    rows.push(["bound", t("bound-is", metres(route.lower_bound), t(isDearer ? "cheaper" : "shorter"))]);
-    rows.push(["gap", isOptimal ? t("optimal") : `${written(100 * route.gap, 2)} %`]);
+    const isKept = isOptimal || route.lower_bound === null; // an optimal bound is the length
+    const bound = isKept ? route.lower_bound : Math.floor(100 * route.lower_bound) / 100;
+    rows.push(["bound", t("bound-is", metres(bound), t(isDearer ? "cheaper" : "shorter"))]);
+    rows.push(["gap", isOptimal ? t("optimal") : `${written(Math.ceil(1e4 * route.gap) / 100, 2)} %`]);
     if (this.open?.solved) rows.push(["detour", t("detour-is", metres(amountOf(route) - amountOf(this.open)), metres(amountOf(this.open)))]);
     if (this.grid?.solved) rows.push(["grid", t("grid-is", metres(amountOf(this.grid)))]);
     return [...rows, ["time", t("time-is", timeOf(route.seconds))]];
