@@ -70,7 +70,7 @@ def test_links_and_doors_are_closed(cli: Any, file: Path) -> None:
         (("--from", "attic", "--goal", "2:1,1"), "no room or point of the building is called"),
         ((*QUERY, "--compare"), "--compare is for one map, and this is a building: leave it out"),
         ((*QUERY, "--blocked", "door:1"), "no floor is called 'door'"),
-        ((*QUERY, "--blocked", "areas"), "--blocked must be link:NAME, or FLOOR:"),
+        ((*QUERY, "--blocked", "areas"), "--blocked must be link:NAME, link:NAME@FLOOR, or FLOOR:"),
         ((*QUERY, "--blocked", "link:hoist"), "no link is called 'hoist'"),
         ((*QUERY, "--max-stretch", "3"), "--max-stretch is for alternatives"),
         ((*QUERY, "--language", "fr"), "language must be one of"),
@@ -323,7 +323,7 @@ def test_a_profile_is_planned_and_what_it_forbids_is_told(cli: Any, office: Path
     assert visitor.out.splitlines()[1:4] == [
         "profile    visitor: no private rooms on the way",
         "reason     profile visitor forbids every route: the way is by private rooms (hall)",
-        "status     no path",
+        "preset     shortest",
     ]
     plan = cli("plan", office, *ends, "--profile", "bed", "--json").answer
     assert (plan["status"], plan["profile"]) == ("no path", "bed")
@@ -357,12 +357,21 @@ def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
     plan = cli("plan", office, "--from", "office 5", "--to", "2.04", "--json").answer
     assert plan["blocked"] == [lift, "1:door:17"]
     assert [ride["link"] for ride in plan["rides"]] == ["east stairs"]
+    on = "--close", f"{lift}@2", "--open", lift
+    assert cli("closed", office, *on).out.splitlines()[2].startswith(f"{lift}@2")
+    query = "plan", office, "--from", "office 5", "--to", "2.04"
+    assert "north lift" not in cli(*query).out.partition("rides")[2]
+    refused = cli(*query, "--blocked", "link:east stairs@1")
+    assert refused.code == 1
+    assert "floor 1 is closed" in refused.out or "floor 2 is closed" in refused.out
+    cli("closed", office, "--close", lift, "--open", f"{lift}@2")
     assert cli("closed", office, "--open", "link:lift").refuses(2, "is not closed", lift)
     opened = cli("closed", office, "--open", lift, "--json").answer
     assert [item["what"] for item in opened["closed"]] == ["1:door:17"]
     assert cli("closed", office, "--open", "all").out == "closed     0\n"
     for what, *words in (
         ("link:north lft", "did you mean north lift?"),
+        ("link:north lift@3", "did you mean north lift@"),
         ("door:7", "door:7 needs its floor, as 1:door:7"),
         ("3:door:7", "no floor is called '3'"),
         ("2:room:2.4", "no room is called '2.4'"),

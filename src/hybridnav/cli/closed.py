@@ -26,7 +26,8 @@ CloseOption = Annotated[
     typer.Option(
         "--close",
         metavar="WHAT",
-        help="Close door:N or room:NAME; in a building link:NAME, FLOOR:door:N or FLOOR:room:NAME. "
+        help="Close door:N or room:NAME; in a building link:NAME, link:NAME@FLOOR, "
+        "FLOOR:door:N or FLOOR:room:NAME. "
         "May be repeated.",
     ),
 ]

@@ -56,7 +56,8 @@ class OutOfOrder:
     """
 
     what: str
-    """`link:NAME`, `door:N`, `room:NAME`; with `FLOOR:` before the last two in a building."""
+    """`link:NAME`, `door:N`, `room:NAME`; with `FLOOR:` before the last two in a building.
+    `link:NAME@FLOOR` for a link that is closed on one floor."""
     since: str = ""
     """When it was closed, UTC."""
     why: str = ""
@@ -84,7 +85,7 @@ class OutOfOrder:
 
     @property
     def link(self) -> str | None:
-        """The name of the link, None if it is none."""
+        """The name of the link, with `@FLOOR` if it is closed there alone; None for no link."""
         return self._parts["link"]
 
     @property

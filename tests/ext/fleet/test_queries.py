@@ -351,6 +351,32 @@ def test_statuses_say_which_endpoint_is_at_fault() -> None:
         assert math.isnan(plan.gap)
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_a_link_closed_on_a_floor_passes_it(seed: int) -> None:
+    """Against a building with a link for each pair of its open ends."""
+    scene = random_building(seed)
+    building, links, closed = scene.building, [], set()
+    for link in building.links:
+        shut = {end.floor for end in link.ends if scene.rng.random() < 0.3}
+        closed |= {f"{link.name}@{floor}" for floor in shut}
+        stops = [(at, end) for at, end in enumerate(link.ends) if end.floor not in shut]
+        for (i, one), (j, other) in itertools.combinations(stops, 2):
+            name, ride_s = f"{link.name} {i} {j}", link.ride_s * (j - i)
+            links.append(replace(link, name=name, ends=(one, other), ride_s=ride_s))
+    pairs = hn.ext.fleet.Building(building.floors, links, speed_m_s=building.speed_m_s)
+    for _ in range(5):
+        ends = scene.named(scene.somewhere()), scene.named(scene.somewhere())
+        plan, expected = building.plan(*ends, closed_links=closed), pairs.plan(*ends)
+        assert plan.status is expected.status
+        for ride in plan.rides:
+            assert (
+                not {f"{ride.link.name}@{at}" for at in (ride.from_floor, ride.to_floor)} & closed
+            )
+        if plan.solved:
+            assert plan.cost == pytest.approx(expected.cost)
+            assert plan.lower_bound == pytest.approx(expected.lower_bound)
+
+
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
@@ -359,6 +385,8 @@ def test_statuses_say_which_endpoint_is_at_fault() -> None:
         ({"goal": ("2", (math.nan, 1.0))}, "goal must be two finite coordinates"),
         ({"closed_links": "west lift"}, "put it into a list"),
         ({"closed_links": ["west lft"]}, "no link is called 'west lft': did you mean west lift?"),
+        ({"closed_links": ["B@3"]}, "no link is called 'B@3': did you mean B@2 or B@1"),
+        ({"closed_links": [["B"]]}, "no link is called ['B']"),
         ({"blocked": {"4": {"doors": [1]}}}, "no floor is called '4'"),
         ({"blocked": {"1": {"doors": [99]}}}, "no door has the number 99"),
     ],

@@ -31,6 +31,11 @@ def building(upper=None, *, links=("lift", "stairs")):
             r"Link (lift|stairs) is closed, and there is no other way\.",
         ),
         (
+            ("2", LAB),
+            {"closed_links": ["lift@2", "stairs"], "blocked": {"1": {"doors": [6]}}},
+            r"Link (lift on floor 2|stairs) is closed, and there is no other way\.",
+        ),
+        (
             ("2", "lab"),
             {"closed_links": ["lift"], "stairs": False, "blocked": {"2": {"doors": [6, 3]}}},
             r"If link lift and floor 2, door 6 open, there is a route; .* one of them .* none\.",

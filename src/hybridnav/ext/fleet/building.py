@@ -13,7 +13,7 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
-from hybridnav.ext.fleet.links import Link, LinkNetwork
+from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
@@ -42,7 +42,8 @@ class _Asked(NamedTuple):
     """The conditions of a query; see `Building.plan`."""
 
     blocked: Mapping[str, Closable]
-    closed_links: Collection[str]
+    closed_links: Collection[Any]
+    """As given, `ClosedLink` once they are checked."""
     stairs: bool
     at: At
 
@@ -117,7 +118,7 @@ class Building:
             FloorTable(floor, np.array([at for _, at in ends[floor.name]]).reshape(-1, 2))
             for floor in floors
         ]
-        self._networks: dict[tuple[frozenset[str], bool], LinkNetwork] = {}
+        self._networks: dict[tuple[frozenset[ClosedLink], bool], LinkNetwork] = {}
 
     def __repr__(self) -> str:
         floors, links = len(self.floors), len(self.links)
@@ -174,7 +175,7 @@ class Building:
         blocked
             Closures for this query by the name of the floor, each as in `HybridPlanner.plan`.
         closed_links
-            Names of links that are out of order.
+            Names of links that are out of order, with `@FLOOR` for one floor: `"north lift@2"`.
         stairs
             Whether the robot takes stairs.
         at
@@ -298,18 +299,18 @@ class Building:
                 self._tables[number] = table.renewed()
         return list(self._tables)
 
-    def _network(self, closed_links: Collection[str], stairs: bool) -> LinkNetwork:  # noqa: FBT001
+    def _network(self, closed: Collection[ClosedLink], stairs: bool) -> LinkNetwork:  # noqa: FBT001
         """Return the links that may be used."""
-        key = frozenset(closed_links), bool(stairs)
+        key = frozenset(closed), bool(stairs)
         found = self._networks.get(key)
         if found is None:
             radius_m = self.robot_radius_m
             links = [
                 link
                 for link in self.links
-                if link.name not in key[0] and link.admits(radius_m, stairs=key[1])
+                if ClosedLink(link.name) not in key[0] and link.admits(radius_m, stairs=key[1])
             ]
-            found = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s)
+            found = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s, key[0])
             self._networks = {**dict(list(self._networks.items())[-15:]), key: found}
         return found
 
@@ -330,7 +331,7 @@ class Building:
         def plans(one: Profile, most: tuple[int, float]) -> BuildingAlternatives:
             under = self._under(one)
             known = {link.name for link in under.links}
-            links = [name for name in asked.closed_links if name in known]
+            links = [closed for closed in asked.closed_links if closed.link in known]
             own = asked._replace(closed_links=links, stairs=asked.stairs and one.stairs)
             return under._plans(start, goal, own, most)  # noqa: SLF001 - a building like this one
 
@@ -399,11 +400,12 @@ class Building:
                 f"closed_links must be names of links, got the text {asked.closed_links!r:.80}: "
                 "put it into a list"
             )
-        blocked, links = dict(asked.blocked), [self.link(name).name for name in asked.closed_links]
+        blocked = dict(asked.blocked)
+        links = [ClosedLink.of(text, self.links) for text in asked.closed_links]
         for item in () if self.journal is None else self.journal.items():
             try:
                 if item.link is not None:
-                    links.append(self.link(item.link).name)
+                    links.append(ClosedLink.of(item.link, self.links))
                     continue
                 floor = self.floor(item.floor or "")
                 floor.planner.closed(item.blocked)
@@ -452,10 +454,10 @@ class Building:
         if self._privacy is None:
             return closed
         ends = [(end.floor, end.waypoint) for end in endpoints]
-        links = [
-            [(self._index_of[end.floor], end.position_m) for end in link.ends]
-            for link in network.links
-        ]
+        links: list[list[tuple[int, ArrayLike]]] = [[] for _ in network.links]
+        for end in network.ends:
+            position_m = self._tables[end.floor].positions_m[end.at]
+            links[end.link].append((end.floor, position_m))
         more = self._privacy.blocked(ends, closed, links)
         for index, table in enumerate(self._tables):
             cells_of, shut = table.floor.planner.closed, closed.get(index)

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
-from hybridnav.ext.fleet.links import Link, LinkEnd
+from hybridnav.ext.fleet.links import ClosedLink, Link, LinkEnd
 from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
@@ -129,7 +129,7 @@ def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Lin
     """
     names = tuple(floor.name for floor in floors)
     if item.link is not None:
-        place_of_name(item.link, tuple(link.name for link in links), "link")
+        ClosedLink.of(item.link, links)
     elif item.floor is None:
         raise InvalidValueError(f"{item.what} needs its floor, as {names[0]}:{item.what}")
     else:

@@ -17,6 +17,7 @@ from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import MapOptions, check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
+from hybridnav.ext.fleet.links import ClosedLink
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
@@ -220,11 +221,12 @@ def _closures(
         kind, colon, rest = text.partition(":")
         if not colon or not rest.strip():
             raise common.UsageError(
-                "--blocked must be link:NAME, or FLOOR: and a thing there, as 2:door:7, "
-                f"got {text!r:.80}"
+                "--blocked must be link:NAME, link:NAME@FLOOR, or FLOOR: and a thing there, as "
+                f"2:door:7, got {text!r:.80}"
             )
         if kind == "link":
-            links.append(building.link(rest).name)
+            ClosedLink.of(rest, building.links)
+            links.append(rest)
         else:
             texts.setdefault(building.floor(kind).name, []).append(rest)
     closed_on = {}

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.names import place_of_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from hybridnav._base.typing import FloatArray, LongArray
 
@@ -218,6 +219,27 @@ class Ride:
         }
 
 
+class ClosedLink(NamedTuple):
+    """A link that is out of order, on one floor or on all."""
+
+    link: str
+    """Name of the link."""
+    floor: str | None = None
+    """Floor on which nobody enters or leaves it, None for all."""
+
+    @classmethod
+    def of(cls, text: str, links: Sequence[Link]) -> ClosedLink:
+        """Return what a text names: `north lift`, or `north lift@2`.
+
+        Raises `InvalidValueError` when no link has this name, or stops there.
+        """
+        known = {link.name: cls(link.name) for link in links}
+        if isinstance(text, str) and "@" in text:
+            stops = [cls(link.name, end.floor) for link in links for end in link.ends]
+            known = {f"{one.link}@{one.floor}": one for one in stops} | known
+        return list(known.values())[place_of_name(text, tuple(known), "link")]
+
+
 # The ends of links, the rides between them, and the cheapest ways over them.
 
 Part = tuple[int, int]
@@ -253,7 +275,7 @@ class LinkNetwork:
 
     `links`: the links that may be used; `floor_of`: index of each floor, by its name; `rows`: row
     in its floor's table of each end, by link and floor; `speed_m_s`: metres per second, by which
-    rides are charged.
+    rides are charged; `closed`: ends that are left out. A ride past one takes as long as before.
     """
 
     def __init__(
@@ -262,19 +284,24 @@ class LinkNetwork:
         floor_of: dict[str, int],
         rows: dict[tuple[str, str], int],
         speed_m_s: float,
+        closed: Collection[ClosedLink] = (),
     ) -> None:
         self.links = tuple(links)
-        self.ends = [
-            End(number, floor_of[end.floor], rows[link.name, end.floor])
+        stops = [
+            (number, end.floor)
             for number, link in enumerate(links)
             for end in link.ends
+            if (link.name, end.floor) not in closed
+        ]
+        self.ends = [
+            End(number, floor_of[floor], rows[links[number].name, floor]) for number, floor in stops
         ]
         self.on_floor: list[list[int]] = [[] for _ in floor_of]
         of_link: list[list[int]] = [[] for _ in links]
         for number, end in enumerate(self.ends):
             self.on_floor[end.floor].append(number)
             of_link[end.link].append(number)
-        names = [end.floor for link in links for end in link.ends]
+        names = [floor for _, floor in stops]
         self.rides: list[list[tuple[int, float]]] = [
             [
                 (other, link.charge_m(names[number], names[other], speed_m_s=speed_m_s))

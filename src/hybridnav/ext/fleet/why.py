@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.links import LinkNetwork
+    from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
     from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.ext.fleet.search import Endpoint
     from hybridnav.planner import Blocked
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _WORDS = {
     "en": {
         "link": "link {0}",
+        "stop": "link {0} on floor {1}",
         "stairs": "the way by stairs",
         "on": "floor {0}, {1}",
         "open": "{0} is closed, and there is no other way.",
@@ -38,6 +39,7 @@ _WORDS = {
     },
     "de": {
         "link": "Verbindung {0}",
+        "stop": "Verbindung {0} auf Etage {1}",
         "stairs": "der Weg über Treppen",
         "on": "Etage {0}, {1}",
         "open": "Gesperrt ist {0}, und einen anderen Weg gibt es nicht.",
@@ -55,7 +57,7 @@ _WORDS = {
 class Shut:
     """One thing that is closed in a building: a link, all stairs, or a thing on a floor."""
 
-    link: str | None = None
+    link: ClosedLink | None = None
     floor: str | None = None
     closure: Closure | None = None
     blocked: Blocked | None = None
@@ -63,14 +65,18 @@ class Shut:
     def named(self, language: str) -> str:
         """Return its name in a sentence."""
         words = _WORDS[language]
+        if self.link is not None:
+            return words["link" if self.link.floor is None else "stop"].format(*self.link)
         if self.floor is None or self.closure is None:
-            return words["stairs"] if self.link is None else words["link"].format(self.link)
+            return words["stairs"]
         return words["on"].format(self.floor, closure_words(self.closure, language))
 
 
-def shut_of(blocked: Mapping[str, Closable], links: Collection[str], *, stairs: bool) -> list[Shut]:
+def shut_of(
+    blocked: Mapping[str, Closable], links: Collection[ClosedLink], *, stairs: bool
+) -> list[Shut]:
     """Return what is closed in a query, each thing once."""
-    found = [Shut(link=name) for name in dict.fromkeys(links)]
+    found = [Shut(link=one) for one in dict.fromkeys(links)]
     found += [] if stairs else [Shut()]
     for floor, given in blocked.items():
         for closure, one in each_closure(as_blocked(given)):

@@ -123,7 +123,7 @@ export class Pictures {
     paintRoutes(scene, routes.routes, routes.chosen, floors.at);
     paintDoors(scene, listed);
     paintLinks(scene, links);
-    const ends = floors.ends.filter(({ link }) => closures.links.includes(link.name)).map((end) => end.at);
+    const ends = floors.ends.filter(({ link }) => [link.name, `${link.name}@${floors.names[floors.at]}`].some((name) => closures.links.includes(name))).map((end) => end.at);
     const crosses = [...closures.marks, ...ends];
     paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
     const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
