@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -76,6 +77,50 @@ def test_what_opens_a_route_does_and_nothing_of_it_can_stay_closed():
     named = re.fullmatch(r"If link (?:lift|stairs), (.*) and (.*) open, there .*", reason)
     assert named is not None
     assert sorted(named.groups()) == ["floor 1, door 2", "floor 2, door 6"]
+
+
+def private_corridor():
+    """The house with a corridor that visitors do not pass."""
+    grown = topology_of(HOUSE)
+    uses = {"corridor": hn.RoomUse(private=True)}
+    rooms = replace(grown.rooms.labels, uses=uses)
+    pyramid = hn.DualGraphPyramid.build(grown.grid, rooms=rooms)
+    return hn.HybridPlanner(hn.TopologicalMap(pyramid))
+
+
+@pytest.mark.parametrize(
+    ("profile", "closed", "reason"),
+    [
+        (
+            {"through_private": True, "stairs": False},
+            {"closed_links": ["lift@1"]},
+            "Link lift on floor 1 is closed, .*",
+        ),
+        (
+            {"through_private": True, "stairs": False},
+            {"closed_links": ["stairs", "lift"]},
+            "Link lift is closed, .*",
+        ),
+        (
+            {"through_private": True},
+            {"blocked": {"2": {"doors": [6, 3]}}},
+            r"Floor 2, door 6 is closed, .*",
+        ),
+        ({"through_private": False}, {}, "Floor 2, room corridor is closed, .*"),
+        (
+            {"through_private": True, "turn_m": 20.0},
+            {},
+            "Floor 2: The goal is closed by the given set of cells.",
+        ),
+    ],
+)
+def test_reasons_hold_under_a_profile(profile, closed, reason):
+    made = hn.Profile(name="somebody", **profile)
+    two = building(private_corridor())
+    plan = two.plan(("1", KITCHEN), ("2", LAB), profile=made, **closed)
+    assert not plan.solved
+    assert re.fullmatch(reason, plan.reasons["en"][0])
+    assert two.plan(("1", KITCHEN), ("2", LAB)).solved
 
 
 def test_walls_and_floors_that_no_link_joins_are_named():

@@ -17,7 +17,7 @@ from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner.blocked import Closable, as_blocked
+from hybridnav.planner.blocked import Blocked, Closable, as_blocked
 from hybridnav.planner.private_rooms import Privacy
 from hybridnav.planner.profile import PROFILES, profile_of
 from hybridnav.search.found import ClosedCells
@@ -329,16 +329,13 @@ class Building:
         chosen = profile_of(profile, self.profiles)
 
         def plans(one: Profile, most: tuple[int, float]) -> BuildingAlternatives:
-            under = self._under(one)
-            known = {link.name for link in under.links}
-            links = [closed for closed in asked.closed_links if closed.link in known]
-            own = asked._replace(closed_links=links, stairs=asked.stairs and one.stairs)
-            return under._plans(start, goal, own, most)  # noqa: SLF001 - a building like this one
+            return self._under(one)._plans(start, goal, asked, most)  # noqa: SLF001 - a like one
 
         def wider(one: Profile) -> tuple[BuildingPlan, Sequence[Floor]]:
             return plans(one, (1, 1.0))[0], self._under(one).floors
 
-        found = plans(chosen, limits)
+        under = self._under(chosen)
+        found = under._with_reasons(plans(chosen, limits), start, goal, asked)  # noqa: SLF001
         note = "" if found[0].solved else checks.reason_under(chosen, wider)
         of: dict[str, Any] = {"profile": chosen.name, "note": note}
         return replace(found, found=tuple(replace(plan, **of) for plan in found))
@@ -363,8 +360,17 @@ class Building:
             checks.endpoint_of("start", start, self.floors),
             checks.endpoint_of("goal", goal, self.floors),
         )
-        opening = why.to_open(shut, is_solved), asked.blocked
         network = self._network((), stairs=True)
+
+        def shut_on(blocked: Mapping[str, Closable]) -> dict[str, Blocked]:
+            """Return what is closed on floors, with what the profile closes."""
+            on = {name: as_blocked(given) for name, given in blocked.items()}
+            for index, own in self._closures(blocked, endpoints, network)[1].items():
+                name = self.floors[index].name
+                on[name] = on.get(name, Blocked()) | own
+            return on
+
+        opening = why.to_open(shut, is_solved), shut_on(asked.blocked), shut_on({})
         given = why.reasons(found[0], endpoints, self.floors, network, opening)
         return replace(found, found=tuple(replace(plan, reasons=given) for plan in found))
 
@@ -445,6 +451,24 @@ class Building:
         network: LinkNetwork,
     ) -> dict[int, ClosedCells]:
         """Return the closed cells of floors, by index, where they are others than always."""
+        closed, more = self._closures(blocked, endpoints, network)
+        own = self._privacy
+        if own is None:
+            return closed
+        for index, table in enumerate(self._tables):
+            cells_of, shut = table.floor.planner.closed, closed.get(index)
+            found = own.joined(cells_of, more.get(index), shut)
+            if found is not table.closed:
+                closed[index] = found or ClosedCells(np.empty(0, dtype=np.int64))
+        return closed
+
+    def _closures(
+        self,
+        blocked: Mapping[str, Closable],
+        endpoints: tuple[Endpoint, Endpoint],
+        network: LinkNetwork,
+    ) -> tuple[dict[int, ClosedCells], dict[int, Blocked]]:
+        """Return what a query closes on floors, by index, and what the profile closes there."""
         closed = {}
         for name, closure in blocked.items():
             index = self._floor_index(name)
@@ -452,16 +476,10 @@ class Building:
             if cells is not None:
                 closed[index] = cells
         if self._privacy is None:
-            return closed
+            return closed, {}
         ends = [(end.floor, end.waypoint) for end in endpoints]
         links: list[list[tuple[int, ArrayLike]]] = [[] for _ in network.links]
         for end in network.ends:
             position_m = self._tables[end.floor].positions_m[end.at]
             links[end.link].append((end.floor, position_m))
-        more = self._privacy.blocked(ends, closed, links)
-        for index, table in enumerate(self._tables):
-            cells_of, shut = table.floor.planner.closed, closed.get(index)
-            found = self._privacy.joined(cells_of, more.get(index), shut)
-            if found is not table.closed:
-                closed[index] = found or ClosedCells(np.empty(0, dtype=np.int64))
-        return closed
+        return closed, self._privacy.blocked(ends, closed, links)

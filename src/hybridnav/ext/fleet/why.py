@@ -124,14 +124,14 @@ def reasons(
     endpoints: tuple[Endpoint, Endpoint],
     floors: Sequence[Floor],
     network: LinkNetwork,
-    opening: tuple[list[Shut], Mapping[str, Closable]],
+    opening: tuple[list[Shut], Mapping[str, Blocked], Mapping[str, Blocked]],
 ) -> dict[str, tuple[str, ...]]:
     """Return why a plan has no route, in each language.
 
     `network`: the links that may be used with nothing closed; `opening`: what would have to open,
-    and what is closed on each floor.
+    what is closed on each floor, and what of it a profile closes for all queries.
     """
-    found, blocked = opening
+    found, blocked, always = opening
     at = [_point_of(end, floors) for end in endpoints]
     is_end = plan.status.name.startswith(("START_", "GOAL_"))
     if is_end and not (found and isinstance(endpoints[_is_goal(plan)].waypoint, str)):
@@ -145,9 +145,19 @@ def reasons(
     if plan.status is not PlanStatus.NO_PATH:
         return _each(lambda _: [])
     for number, floor in enumerate(floors[end.floor] for end in endpoints):
-        enclosed = _enclosed(number, endpoints, floors, network)
+        enclosed = _enclosed(number, endpoints, floors, network, always)
         if enclosed is not None:
-            return {to: tuple(_on(floor, enclosed.words(to), to)) for to in _WORDS}
+            # Under a profile ends of links may lie in private rooms.
+            by = [one for end in enclosed.blocked_ends for one in end.closures][:1]
+            shut = [Shut(floor=floor.name, closure=one) for one in by]
+            return {
+                to: tuple(
+                    [_opening([one.named(to) for one in shut], to)]
+                    if shut
+                    else _on(floor, enclosed.words(to), to)
+                )
+                for to in _WORDS
+            }
     names = [floors[end.floor].name for end in endpoints]
     reached = {names[0]}
     for _ in floors:
@@ -160,7 +170,11 @@ def reasons(
 
 
 def _enclosed(
-    number: int, endpoints: tuple[Endpoint, Endpoint], floors: Sequence[Floor], network: LinkNetwork
+    number: int,
+    endpoints: tuple[Endpoint, Endpoint],
+    floors: Sequence[Floor],
+    network: LinkNetwork,
+    blocked: Mapping[str, Blocked],
 ) -> Explanation | None:
     """Return why no end of a link, nor the goal on the same floor, can be reached from the start,
     number 0, or from the goal; None where one can, or there is none."""
@@ -170,7 +184,8 @@ def _enclosed(
         stop.position_m for link in network.links if (stop := link.end_on(floor.name))
     ]
     ways += [other] if endpoints[0].floor == endpoints[1].floor else []
-    found = [floor.planner.explain(here, way) for way in ways]
+    explain = floor.planner.explain
+    found = [explain(here, way, blocked=blocked.get(floor.name)) for way in ways]
     return found[-1] if found and not any(one.has_path for one in found) else None
 
 
