@@ -422,6 +422,14 @@ def test_nothing_outside_the_folder_is_read_or_written(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+def test_a_building_is_refused_with_what_answers_over_floors():
+    file = Path(__file__).parents[3] / "maps" / "building" / "building.yaml"
+    words = [sys.executable, "-m", "hybridnav", "serve", str(file)]
+    done = subprocess.run(words, input="", capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"routes over floors with hybridnav plan {file} --json" in done.stderr
+
+
 def test_the_example_asks_a_map(tmp_path):
     path = write_floor(PaintedFloor(5), tmp_path)
     file = Path(__file__).parents[3] / "examples" / "ask_a_map.py"

@@ -8,10 +8,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybridnav._base.files import printable
 from hybridnav._version import __version__
 from hybridnav.cli import options
+from hybridnav.cli.common import UsageError
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet.command import is_building_file
 from hybridnav.ext.page.command import EditsOption, MapPage
 
 if TYPE_CHECKING:
@@ -32,6 +35,12 @@ def serve(
     changed unless --allow-edits is given. The page of `hybridnav view` gives the same calls as
     JSON over HTTP. Ends with its input.
     """
+    if is_building_file(map_file):
+        file = printable(map_file)
+        raise UsageError(
+            f"{file} is a building, serve answers on one map: give the map of a floor, or ask for "
+            f"routes over floors with hybridnav plan {file} --json"
+        )
     check_protocol()
     page = MapPage.read(map_file, rooms_file, options.parsed_costs(None), reading)
     # Loads numba, which help and wrong usage can do without.
