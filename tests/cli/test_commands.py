@@ -4,6 +4,7 @@ import io
 import json
 import math
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from PIL import Image
 
 import hybridnav as hn
+from hybridnav.cli import common
 from hybridnav.cli.rendering import summary
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -423,6 +425,18 @@ def test_progress_is_for_terminals_only(cli, draw, monkeypatch):
     assert (done.code, done.out[:14]) == (0, "map        [m]")
     assert "reading " in terminal.getvalue()
     assert "[m].yaml" in terminal.getvalue()
+
+
+@pytest.mark.parametrize(("patience_s", "has_bar"), [(0.05, True), (60.0, False)])
+def test_a_long_stage_has_a_bar_with_its_time(monkeypatch, patience_s, has_bar):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(common, "_PATIENCE_S", patience_s)
+    monkeypatch.setattr(sys, "stderr", terminal := _Terminal())
+    with common.stage("planning [m]", {}, "plan"):
+        time.sleep(0.5)
+    shown = terminal.getvalue()
+    assert "planning [m]" in shown
+    assert ("\u2501" in shown, "0:00:00" in shown) == (has_bar, has_bar)
 
 
 # --- show ---------------------------------------------------------------------------------------

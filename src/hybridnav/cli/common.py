@@ -7,6 +7,7 @@ import os
 import sys
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
+from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
@@ -17,7 +18,6 @@ from hybridnav.errors import HybridNavError, MapError, PresetError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from hybridnav._base.progress import Progress
@@ -42,6 +42,8 @@ def exit_code(error: HybridNavError) -> int:
 
 _SMOOTH = ("none", "line-of-sight", "arcs")
 _PICTURES = (".pdf", ".png", ".svg")
+_PATIENCE_S = 10.0
+"""Seconds of a stage, as of compiling, after which a bar shows that it goes on."""
 
 
 def complain(message: str) -> None:
@@ -65,7 +67,7 @@ def answer(text: str) -> None:
 
 @contextmanager
 def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
-    """Time a stage, with a spinner on stderr if that is a terminal."""
+    """Time a stage, with a spinner, then a bar on stderr if that is a terminal."""
     began = clock()
     with _spinner(text) if sys.stderr.isatty() else nullcontext():
         yield
@@ -97,11 +99,29 @@ def progress_bar(text: str) -> Iterator[Progress]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _spinner(text: str) -> AbstractContextManager[object]:
+@contextmanager
+def _spinner(text: str) -> Iterator[None]:
+    """Draw a spinner on stderr, and after some seconds a bar with the time that went by."""
     from rich.console import Console  # noqa: PLC0415 - on demand
-    from rich.text import Text  # noqa: PLC0415
+    from rich.progress import (  # noqa: PLC0415
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
 
-    return Console(stderr=True).status(Text(text))
+    parts = SpinnerColumn(), TextColumn("{task.description}", markup=False)
+    with Progress(*parts, console=Console(stderr=True), transient=True) as shown:
+        shown.add_task(text, total=None)
+        bar = (*parts, BarColumn(), TimeElapsedColumn())
+        later = Timer(_PATIENCE_S, setattr, (shown, "columns", bar))
+        later.daemon = True
+        later.start()
+        try:
+            yield
+        finally:
+            later.cancel()
 
 
 def check_picture(path: Path | None) -> None:
