@@ -46,7 +46,6 @@ def write_report(data: Data, folder: Path, root: Path, path: Path) -> None:
         warnings=[warning for report in reports for warning in report.warnings],
         meanings=list(dict(pair for report in reports for pair in report.meanings).items())
         + [(c, MEANINGS[c]) for c in ("maps", "nodes", "edges")],
-        metric_of={},
     )
     replace_file(path, render_report(whole).encode())
 

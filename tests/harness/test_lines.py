@@ -20,11 +20,11 @@ from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.methods import preset_spec
-from hybridnav.harness.output import write_outputs
+from hybridnav.harness.output import report_of, write_outputs
 from hybridnav.harness.records import query_key, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from hybridnav.harness.tables import compare_runs
-from hybridnav.harness.yardstick import Yardstick, contradiction
+from hybridnav.harness.yardstick import OPTIMA, Yardstick, contradiction
 from hybridnav.maps.files import load_map
 from hybridnav.planner import load_preset
 from tests.cli.test_commands import FIGURE
@@ -245,7 +245,7 @@ def test_records_whose_any_angle_lengths_are_not_proved_are_refused(folder, tmp_
             load_study(tmp_path)
 
 
-def test_each_metric_has_rows_and_charts_of_its_own(folder, rows):
+def test_each_optimum_has_charts_of_the_methods_in_its_tables(folder, study, rows):
     metrics = [row["metric"] for row in rows.values()]
     assert metrics == sorted(metrics, reverse=True)
     assert rows["paper"]["metric"] == rows["grid-astar"]["metric"] == "octile"
@@ -255,9 +255,18 @@ def test_each_metric_has_rows_and_charts_of_its_own(folder, rows):
         assert rows[name]["octile loss mean %"] == ""
     report = (folder / "report.html").read_text()
     assert "all maps" not in report
-    for title in ("Speed against loss, rooms", "Loss, rooms"):
-        assert f"{title}, octile paths" in report
-        assert f"{title}, any-angle paths" in report
+    for title in ("Speed against loss", "Loss"):
+        for optimum in OPTIMA:
+            assert report.count(f"<strong>{title} over {OPTIMA[optimum]}, rooms.") == (
+                optimum != "weighted"
+            )
+    # No method alone where the tables compare it with others.
+    losses = report_of(study, "", [], {"rooms": list(rows.values())}).maps[0].losses
+    by_cells = {name for name, row in rows.items() if row["metric"] == "octile"}
+    assert losses.keys() == {OPTIMA["any-angle"], OPTIMA["octile"]}
+    assert losses[OPTIMA["octile"]].keys() == by_cells
+    assert losses[OPTIMA["any-angle"]].keys() == rows.keys()
+    assert np.isfinite(losses[OPTIMA["any-angle"]]["grid-astar"]).all()
 
 
 def test_a_path_by_the_grid_is_not_its_method_s(study, rows):
@@ -302,11 +311,11 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
     smooth = load_preset("octile", overrides=["planner.smooth=line-of-sight"])
     evaluate(replace(settings, presets=("octile",)), tmp_path / "cells")
     evaluate(replace(settings, presets=(smooth,)), tmp_path / "lines")
-    # What is no loss by definition is no line in a chart of another metric.
+    # What is no loss by definition is no chart of its own.
     write_outputs(tmp_path / "lines")
     report = (tmp_path / "lines" / "report.html").read_text()
-    assert "Loss, rooms, any-angle paths" in report
-    assert "octile paths" not in report
+    assert "<strong>Loss over the any-angle optimum, rooms." in report
+    assert "<strong>Loss over the octile optimum" not in report
     (row,) = compare_runs(tmp_path / "cells", tmp_path / "lines")
     assert row["method"] == "octile+line-of-sight against octile"
     cells, lines = (

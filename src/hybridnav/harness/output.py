@@ -24,7 +24,7 @@ from hybridnav.harness.report import (
 from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from hybridnav._base.typing import FloatArray, PathLike
     from hybridnav.harness.report import CaseKey
@@ -139,8 +139,7 @@ def report_of(
         ("queries without an answer", f"{study.failures:,}"),
         *([("checked any-angle", checked)] if (checked := study.any_angle_checked) else []),
     ]
-    labels = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
-    several = labels if together else {}
+    several = _drawn(study, study.outcomes) if together else {}
     used = dict.fromkeys(
         column
         for table in [methods, *together, *(t for m in maps for t in m.tables)]
@@ -161,11 +160,8 @@ def report_of(
         meanings=[
             (column, columns.MEANINGS[column]) for column in used if column in columns.MEANINGS
         ],
-        overall_losses={label: _losses(study.of_method(label), study) for label in several},
-        overall_times_ms={label: _median_ms(study.of_method(label), study) for label in several},
-        metric_of={
-            outcome.label: outcome.metric for outcome in study.outcomes if study.metric == "both"
-        },
+        overall_losses=several,
+        overall_times_ms=_times_ms(study, study.outcomes) if together else {},
     )
 
 
@@ -264,7 +260,6 @@ def _section(
 ) -> MapSection:
     """Return the section of a map; the anchors of its pictures are added to `drawn`."""
     outcomes = study.of_map(name)
-    charted = [outcome for outcome in _drawn(study, outcomes) if outcome.is_asked]
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
     found = _tables(study, rows)
@@ -286,31 +281,35 @@ def _section(
             ("SHA-256", str(first["map_sha"])[:16]),
         ],
         tables=found,
-        losses={outcome.label: _losses([outcome], study) for outcome in charted},
-        times_ms={outcome.label: _median_ms([outcome], study) for outcome in charted},
+        losses=_drawn(study, outcomes),
+        times_ms=_times_ms(study, outcomes),
         worst=[case for _, case in cases],
     )
 
 
-def _median_ms(outcomes: Sequence[Outcome], study: Study) -> float:
-    """Return the median time of a method over the pairs that all methods solved."""
-    parts = [outcome.seconds[outcome.among(study.common)] for outcome in outcomes]
-    return 1e3 * nanquantile(np.concatenate(parts), 0.5) if parts else math.nan
+def _times_ms(study: Study, outcomes: Iterable[Outcome]) -> dict[str, float]:
+    """Return the median time of each method over the pairs that all methods solved."""
+    parts: dict[str, list[FloatArray]] = {}
+    for outcome in outcomes:
+        of_method = parts.setdefault(outcome.label, [])
+        of_method.append(outcome.seconds[outcome.among(study.common)])
+    return {label: 1e3 * nanquantile(np.concatenate(times), 0.5) for label, times in parts.items()}
 
 
-def _losses(outcomes: Sequence[Outcome], study: Study) -> FloatArray:
-    """Return the losses of a method over the pairs that all methods solved."""
-    parts = [np.where(o.among(study.common), o.losses, math.nan) for o in outcomes]
-    return np.concatenate(parts) if parts else np.empty(0)
-
-
-def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
-    """Return the methods for charts, each with those that its losses are compared with; none that
-    has no paths."""
-    outcomes = [outcome for outcome in outcomes if not outcome.has_plans_alone]
-    if study.metric == "octile":
-        return [outcome for outcome in outcomes if not outcome.is_any_angle]
-    others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
-    if study.metric == "both" and all(outcome.metric == "any-angle" for outcome in others):
-        return others or outcomes
-    return outcomes
+def _drawn(study: Study, outcomes: Iterable[Outcome]) -> dict[str, dict[str, FloatArray]]:
+    """Return the losses over each optimum by its name, per method, over the pairs that all methods
+    solved: those of the tables. A method without paths has none, and the reference alone, whose
+    octile losses are 0, no chart beside another one."""
+    asked = [outcome for outcome in outcomes if outcome.is_asked and not outcome.has_plans_alone]
+    drawn: dict[str, dict[str, FloatArray]] = {}
+    for optimum in YARDSTICKS[study.metric]:
+        parts: dict[str, list[FloatArray]] = {}
+        for outcome in asked:
+            if optimum != "octile" or not outcome.is_any_angle:
+                losses = outcome.losses_over(optimum)[outcome.among(study.common)]
+                parts.setdefault(outcome.label, []).append(losses)
+        known = {label: np.concatenate(losses) for label, losses in parts.items()}
+        is_known = any(np.isfinite(losses).any() for losses in known.values())
+        if is_known and not (drawn and known.keys() == {REFERENCE}):
+            drawn[OPTIMA[optimum]] = known
+    return drawn

@@ -56,6 +56,10 @@ _OF_LOSSES = (
 _OF_SPEED = "Down and to the left is better; the loss axis is logarithmic above 0.01\u00a0%."
 
 
+Losses = dict[str, dict[str, "FloatArray"]]
+"""By the name of what they are over, and the method: the loss of each solved pair; 0.01 is 1 %."""
+
+
 @dataclass(frozen=True, slots=True)
 class Chart:
     """A chart with its caption."""
@@ -71,67 +75,44 @@ class Chart:
 class Charts:
     """The charts of a report, in which each method looks the same.
 
-    `names`: methods of the report, in its order; they may repeat; `metric_of`: the metric of the
-    paths of a method, octile where it has none.
+    `names`: methods of the report, in its order; they may repeat.
     """
 
-    def __init__(self, names: Iterable[str], metric_of: Mapping[str, str]) -> None:
+    def __init__(self, names: Iterable[str]) -> None:
         self._styles = method_styles(names)
-        self._metric_of = metric_of
 
-    def overall(
-        self, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
-    ) -> list[Chart]:
-        """Return the charts of all maps together, one for each metric."""
-        title = "Speed against loss, all maps"
-        groups = self._groups([*losses, *times_ms])
-        return [self._speed(losses, times_ms, names, f"{title}{of}") for of, names in groups]
+    def overall(self, losses: Losses, times_ms: Mapping[str, float]) -> list[Chart]:
+        """Return the charts of all maps together, one for each optimum."""
+        return [
+            self._speed(known, times_ms, f"Speed against loss over {optimum}, all maps")
+            for optimum, known in losses.items()
+        ]
 
-    def of_map(
-        self, name: str, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
-    ) -> list[Chart]:
-        """Return the charts of one map, two for each metric."""
+    def of_map(self, name: str, losses: Losses, times_ms: Mapping[str, float]) -> list[Chart]:
+        """Return the charts of one map, two for each optimum."""
         charts = []
-        for of, names in self._groups([*losses, *times_ms]):
-            charts.append(self._losses(losses, names, f"Loss, {name}{of}"))
-            title = f"Speed against loss, {name}{of}"
-            charts.append(self._speed(losses, times_ms, names, title))
+        for optimum, known in losses.items():
+            charts.append(self._losses(known, f"Loss over {optimum}, {name}"))
+            title = f"Speed against loss over {optimum}, {name}"
+            charts.append(self._speed(known, times_ms, title))
         return charts
 
-    def _groups(self, names: list[str]) -> list[tuple[str, list[str]]]:
-        """Return the methods of each metric, and what titles add for it: nothing for octile alone.
-
-        Without methods there is one group, which is empty.
-        """
-        groups: dict[str, list[str]] = {}
-        for name in dict.fromkeys(names):
-            groups.setdefault(self._metric_of.get(name, "octile"), []).append(name)
-        if groups.keys() <= {"octile"}:
-            return [("", groups.get("octile", []))]
-        return [(f", {metric} paths", of_metric) for metric, of_metric in groups.items()]
-
-    def _losses(self, losses: Mapping[str, FloatArray], names: list[str], title: str) -> Chart:
-        asked = [name for name in names if name in losses]
-        drawn = {name: losses[name] for name in asked if np.isfinite(losses[name]).any()}
-        missing = [name for name in asked if name not in drawn]
+    def _losses(self, losses: Mapping[str, FloatArray], title: str) -> Chart:
+        drawn = {name: known for name, known in losses.items() if np.isfinite(known).any()}
+        missing = [name for name in losses if name not in drawn]
         if not drawn:
             return Chart(title, "", "No pair has a known loss.", missing)
         return Chart(title, _svg_uri(plot_losses(drawn, styles=self._styles)), _OF_LOSSES, missing)
 
     def _speed(
-        self,
-        losses: Mapping[str, FloatArray],
-        times_ms: Mapping[str, float],
-        names: list[str],
-        title: str,
+        self, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float], title: str
     ) -> Chart:
         drawn = {
-            name: losses[name]
-            for name in names
-            if np.isfinite(losses.get(name, np.empty(0))).any()
-            and 0 < times_ms.get(name, math.nan) < math.inf
+            name: known
+            for name, known in losses.items()
+            if np.isfinite(known).any() and 0 < times_ms.get(name, math.nan) < math.inf
         }
-        missing = [name for name in names if name not in drawn]
+        missing = [name for name in losses if name not in drawn]
         if not drawn:
             return Chart(title, "", "No method has both a time and a loss.", missing)
         chart = plot_speed(drawn, times_ms, styles=self._styles)
@@ -192,8 +173,7 @@ class MapSection:
     name: str
     facts: list[tuple[str, str]] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
-    losses: dict[str, FloatArray] = field(default_factory=dict)
-    """Per method, the loss of each solved pair; 0.01 is 1 %."""
+    losses: Losses = field(default_factory=dict)
     times_ms: dict[str, float] = field(default_factory=dict)
     """Per method, the median time of a query in milliseconds."""
     worst: list[WorstCase] = field(default_factory=list)
@@ -224,11 +204,8 @@ class ReportData:
     """What consistency is."""
     meanings: list[tuple[str, str]] = field(default_factory=list)
     """What each column of the tables holds."""
-    overall_losses: dict[str, FloatArray] = field(default_factory=dict)
+    overall_losses: Losses = field(default_factory=dict)
     overall_times_ms: dict[str, float] = field(default_factory=dict)
-    metric_of: dict[str, str] = field(default_factory=dict)
-    """Per method, the metric of its losses, octile if it is missing here: each metric has charts of
-    its own."""
 
 
 def render_report(report: ReportData) -> str:
@@ -242,10 +219,8 @@ def render_report(report: ReportData) -> str:
     """
     from hybridnav.harness.report import Charts  # noqa: PLC0415 - loads matplotlib
 
-    names = [*report.overall_losses, *report.overall_times_ms]
-    for section in report.maps:
-        names += [*section.losses, *section.times_ms]
-    charts = Charts(names, report.metric_of)
+    every = [report.overall_losses, *(section.losses for section in report.maps)]
+    charts = Charts(name for losses in every for known in losses.values() for name in known)
     return _template().render(report=report, charts=charts)
 
 
