@@ -62,7 +62,7 @@ finally:
 """
 WARM = """
 from hybridnav.cli import warm
-for job in (*(warm.SEARCH + method for method in warm.SEARCHES), *warm.PRESETS):
+for job in (*(warm.SEARCH + method for method in warm.SEARCHES), *warm.PRESETS, warm.ROOMS):
     warm.compile_job(job)
 """
 """What `python -m hybridnav.cli.warm` compiles, in one process."""

@@ -158,24 +158,27 @@ def test_set_up_compiles_whole_plans_not_their_searches_alone(
     for name, jobs in done.items():
         monkeypatch.setattr(warm, name, jobs.append)
     monkeypatch.setattr(warm, "start", warm.compile_job)
+    monkeypatch.setattr(warm, "compile_rooms", lambda: done["compile_plan"].append("rooms"))
     warm.main([])
-    assert done["compile_plan"] == ["pyramid", *warm.PRESETS]
+    assert done["compile_plan"] == ["pyramid", *warm.PRESETS, warm.ROOMS]
     assert done["compile_search"] == ["shortest", "octile", "grid-astar"]
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("preset", warm.PRESETS)
-def test_a_plan_on_the_small_map_compiles_what_one_in_a_building_needs(
-    tmp_path: Path, preset: str
-) -> None:
-    search = [warm.SEARCH + preset] if preset in warm.SEARCHES else []  # compiled before, by set-up
+@pytest.mark.parametrize("preset", [*warm.PRESETS, warm.ROOMS])
+def test_the_small_map_compiles_what_one_of_a_building_needs(tmp_path: Path, preset: str) -> None:
+    # What set-up compiles before.
+    search = [warm.SEARCH + preset] if preset in warm.SEARCHES else []
+    words = [*PLAN, "--preset", preset]
+    if preset == warm.ROOMS:
+        search, words = ["pyramid"], ["rooms", PLAN[1], "--find"]
     code = (
         "import logging\n"
         "from hybridnav.cli.warm import compile_job\n"
         "from hybridnav.cli.app import run\n"
         f"for job in {[*search, preset]!r}: compile_job(job)\n"
         "logging.basicConfig(level=logging.INFO)\n"
-        f"assert run({[*PLAN, '--preset', preset]!r}) == 0\n"
+        f"assert run({words!r}) == 0\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code],

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -162,6 +163,8 @@ def rehearse(file: Path, presets: Iterable[Preset]) -> None:
 
 PRESETS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
+ROOMS = "rooms"
+"""The job of what finds rooms."""
 _ENDPOINTS = ((2, 2), (60, 60))
 _CHANGED = (1.0, 1.0, 2.0, 2.0)
 
@@ -221,6 +224,14 @@ def compile_plan(preset: str) -> None:
             planner.update(costs=hn.CostLayer(np.full(grid.shape, 9.0)), changed=_CHANGED)
 
 
+def compile_rooms() -> None:
+    """Compile what finds rooms, on cells small enough that it cuts along walls and merges."""
+    grid = replace(small_grid(), frame=hn.Frame(resolution_m=0.25))
+    rooms = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))).rooms
+    assert rooms is not None  # noqa: S101 - they are given
+    _ = rooms.listed_doors, rooms.point_of(rooms.names[0])
+
+
 def _end_with_parent() -> None:
     sys.stdin.buffer.read()
     os._exit(1)
@@ -233,7 +244,8 @@ def compile_all() -> None:
     from rich.progress import Progress  # noqa: PLC0415
 
     # What all plans share first: processes that compile the same do it twice.
-    waves = ([SEARCH + "shortest", "pyramid", SEARCH + "octile", SEARCH + "grid-astar"], PRESETS)
+    first = [SEARCH + "shortest", "pyramid", SEARCH + "octile", SEARCH + "grid-astar"]
+    waves = first, (*PRESETS, ROOMS)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("compiling kernels", total=sum(map(len, waves)))
         for wave in waves:
@@ -250,8 +262,10 @@ def compile_all() -> None:
 
 
 def compile_job(job: str) -> None:
-    """Compile what a search, a preset or the pyramid needs."""
-    if job.startswith(SEARCH):
+    """Compile what a search, a preset, the pyramid or rooms need."""
+    if job == ROOMS:
+        compile_rooms()
+    elif job.startswith(SEARCH):
         compile_search(job.removeprefix(SEARCH))
     else:
         compile_plan(job)
