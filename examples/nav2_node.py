@@ -15,8 +15,8 @@ from hybridnav.ext.graphs import route_messages
 
 USUAL = {"model": "floor.hnm", "preset": "shortest", "nodes": 300, "base": "base_link"}
 FAILURES = {TransformException: "TF_ERROR", nx.NetworkXException: "NO_VALID_ROUTE"}
-WORDS = {"SOLVED": "NONE", "OUTSIDE": "OUTSIDE_MAP", "UNEXPLORED": "OCCUPIED"}  # status to code
-WORDS |= {"BLOCKED": "OCCUPIED", "PATH": "VALID_PATH", "APPROXIMATE": "NO_VALID_PATH"}
+WORDS = {"SOLVED": "NONE", "OUTSIDE": "OUTSIDE_MAP", "UNEXPLORED": "OCCUPIED", "PATH": "VALID_PATH"}
+WORDS |= {"BLOCKED": "OCCUPIED", "APPROXIMATE": "NO_VALID_PATH", "NEAR_GOAL": "NO_VALID_PATH"}
 
 
 class PlanningNode(Node):
@@ -50,7 +50,7 @@ class PlanningNode(Node):
 
     def path(self, goal, now):
         plan = self.planner.plan(*self.ends(goal))
-        code = "_".join(WORDS.get(word, word) for word in plan.status.name.split("_"))
+        code = WORDS.get(s := plan.status.name) or "_".join(WORDS.get(w, w) for w in s.split("_"))
         return code, {"path": plan.path.to_message(stamp_ns=now)} if plan.solved else {}
 
     def route(self, goal, now):

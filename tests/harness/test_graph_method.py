@@ -149,7 +149,9 @@ def test_edges_through_walls_are_counter_examples_unless_they_are_left_out(tmp_p
         ]
         assert bool(walls) != only
         if only:
-            assert not any(one["faults"] for one in pairs)
+            # No path on a graph is no proof of none.
+            faults = [text for one in pairs for text in one["faults"]]
+            assert all("solvability" in text for text in faults)
     assert {one["status"] for one in pairs} >= {"solved", "no path"}
     study = load_study(run)
     assert any("solvability" in str(fault) for _, _, fault in study.faults)

@@ -22,7 +22,7 @@ from hybridnav.pyramid.record import SURVIVES
 from hybridnav.route.route import Corridor
 from hybridnav.search.grid_search import move_tables
 from hybridnav.search.kernels import descent as _kernels
-from hybridnav.search.kernels.descent import Fields, Ground, Marks
+from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
 from hybridnav.search.kernels.grid_search import BUCKETS
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Descended(NamedTuple):
     expanded: int
     """Cells expanded."""
     expanded_fields: int
-    """Fields expanded, at all levels."""
+    """LevelFields expanded, at all levels."""
     corridor_cells: int
     """Cells of the last fields."""
 
@@ -92,7 +92,7 @@ def pack(
     *,
     enterable: BoolArray,
     units: IntArray | None = None,
-) -> Fields:
+) -> LevelFields:
     """Return the fields of some levels for kernels.
 
     At the top an arc costs its `max_distance_m`, which the source paper has, below it the octile
@@ -137,7 +137,7 @@ def pack(
     dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32, np.bool_]
     arrays: list[Any] = [c.astype(dtype) for c, dtype in zip(columns, dtypes, strict=True)]
     arrays[0] = np.append(arrays[0], n_arcs)
-    return Fields._make([np.array(starts), *arrays, survivors, lowest.areas])
+    return LevelFields._make([np.array(starts), *arrays, survivors, lowest.areas])
 
 
 def _ancestors(record: Record, cells: LongArray, level: int) -> LongArray:
@@ -168,7 +168,7 @@ def _neighbours(
 class _Work:
     """What one descent writes, and its number."""
 
-    def __init__(self, fields: Fields, n_cells: int) -> None:
+    def __init__(self, fields: LevelFields, n_cells: int) -> None:
         n_fields, n_last = len(fields.open), len(fields.survivor)
         self.number = 0
         self.marks = Marks(
@@ -247,7 +247,7 @@ class Descent:
         self._rings, self._horizon = rings, float(settings.horizon_cells)
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         tables = move_tables(corner_cutting=corner_cutting)
-        self._ground = Ground(moves.ravel(), enterable.shape[1], self.field_of.ravel(), *tables)
+        self._ground = MapCells(moves.ravel(), enterable.shape[1], self.field_of.ravel(), *tables)
         self._works = Pool(partial(_Work, self.fields, enterable.size))
 
     @property

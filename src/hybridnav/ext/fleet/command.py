@@ -87,18 +87,18 @@ def plan_over_floors(
     typed = [ends[0], *(via or ()), ends[1]]
     seconds: dict[str, float] = {}
     building = load_floors(map_file, reading, seconds)
-    stops = [_endpoint(text, building) for text in typed]
+    waypoints = [_endpoint(text, building) for text in typed]
     how["closed_links"], how["blocked"] = _closures(building, blocked or ())
     shut = [item.what for item in building.journal.items()] if building.journal else []
     others: BuildingAlternatives | None = None
     with common.stage("planning", {}, "plan"):
         if alternatives == 1:
-            plans: Sequence[hn.ext.fleet.BuildingPlan] = _legs(building, stops, how)
+            plans: Sequence[hn.ext.fleet.BuildingPlan] = _legs(building, waypoints, how)
         else:
             how["max_stretch"] = 2.0 if max_stretch is None else max_stretch
-            plans = others = building.alternatives(stops[0], stops[1], alternatives, **how)
+            plans = others = building.alternatives(waypoints[0], waypoints[1], alternatives, **how)
     legs = plans if others is None else plans[:1]
-    figures = _tour_figures(legs, stops, at, language) if via else legs[0].to_dict()
+    figures = _tour_figures(legs, waypoints, at, language) if via else legs[0].to_dict()
     figures |= {
         "building": str(map_file),
         "preset": _preset_of(building, plans[0]),
@@ -134,15 +134,15 @@ def plan_over_floors(
 
 
 def _legs(
-    building: hn.ext.fleet.Building, stops: Sequence[Any], how: dict[str, Any]
+    building: hn.ext.fleet.Building, waypoints: Sequence[Any], how: dict[str, Any]
 ) -> list[hn.ext.fleet.BuildingPlan]:
     """Plan from each stop to the next, up to a leg without a route.
 
     A leg begins where the one before it ended, also in a named room.
     """
     legs: list[hn.ext.fleet.BuildingPlan] = []
-    start = stops[0]
-    for goal in stops[1:]:
+    start = waypoints[0]
+    for goal in waypoints[1:]:
         legs.append(building.plan(start, goal, **how))
         if not legs[-1].solved:
             break
@@ -153,7 +153,7 @@ def _legs(
 
 
 def _tour_figures(
-    legs: Sequence[hn.ext.fleet.BuildingPlan], stops: Sequence[Any], at: str, language: str
+    legs: Sequence[hn.ext.fleet.BuildingPlan], waypoints: Sequence[Any], at: str, language: str
 ) -> dict[str, Any]:
     """Return the figures of a tour, with those of its legs.
 
@@ -165,7 +165,7 @@ def _tour_figures(
     figures = each[-1] | {name: sum(leg[name] for leg in each) if solved else None for name in sums}
     for name in ("floors", "rides", "results", "instructions"):
         figures[name] = [item for leg in each for item in leg[name]]
-    is_fixed = at == "point" or not any(_is_name(stop) for stop in stops[1:-1])
+    is_fixed = at == "point" or not any(_is_name(stop) for stop in waypoints[1:-1])
     bound = sum(leg.lower_bound for leg in legs) if solved and is_fixed else None
     gap = None if bound is None else figures["cost"] / bound - 1 if bound else 0.0
     seconds: dict[str, float] = {}

@@ -18,7 +18,7 @@ _UNLIMITED = 1 << 62
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
 
 
-class Fields(NamedTuple):
+class LevelFields(NamedTuple):
     """The fields of the levels that a descent visits, the places first, the smallest ones last."""
 
     starts: np.ndarray
@@ -67,7 +67,7 @@ class Marks(NamedTuple):
     """int32 (room,), its open list."""
 
 
-class Ground(NamedTuple):
+class MapCells(NamedTuple):
     """The cells of the map, as A* takes them."""
 
     moves: np.ndarray
@@ -102,7 +102,7 @@ def _search(fields, marks, number, ends, goal_at, is_limited):
     Returns
     -------
     int
-        Fields expanded; `NO_WAY` or `FULL` without a route.
+        LevelFields expanded; `NO_WAY` or `FULL` without a route.
     """
     start, goal = ends
     heap, size, expanded = marks.heap, 1, 0

@@ -144,7 +144,7 @@ class Features:
                 findings.add("fails-later", held, nodes=nodes)
         facts = feature.get("properties")
         facts, is_edge = facts if isinstance(facts, dict) else {}, len(ids) > 1
-        for words in rules.stops(feature, facts, is_edge=is_edge):
+        for words in rules.refusals(feature, facts, is_edge=is_edge):
             findings.add("stops-loader", f"{text}: {words:.200}", nodes=nodes)
         for words in rules.fails_later(facts, is_edge=is_edge):
             findings.add("fails-later", f"{text}: {words:.200}", nodes=nodes)

@@ -66,7 +66,7 @@ def _is_json(value: Any) -> bool:
         return False
 
 
-def stops(feature: dict[str, Any], facts: dict[str, Any], *, is_edge: bool) -> Iterator[str]:
+def refusals(feature: dict[str, Any], facts: dict[str, Any], *, is_edge: bool) -> Iterator[str]:
     """Yield why Nav2's loader stops at a feature and its properties, ids aside."""
     if not is_drawn(feature):
         yield "no geometry"

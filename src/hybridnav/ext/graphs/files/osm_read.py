@@ -256,7 +256,9 @@ class _Links:
         for way in self._data.ways:
             kind = osm.link_kind(way.tags, is_line=not way.is_closed)
             if kind is not None and len(osm.levels_of(way.tags)) > 1:
-                links.append(self._link(way.tags.get("name", ""), kind, self._stops(way), way.tags))
+                links.append(
+                    self._link(way.tags.get("name", ""), kind, self._served_levels(way), way.tags)
+                )
                 if kind != "lift":
                     self._note(links[-1], kind, f"way {way.id}")
             if kind == "lift":
@@ -266,22 +268,22 @@ class _Links:
                 self._note_astray(way)
         return links
 
-    def _note_astray(self, way: osm.OsmWay) -> None:
+    def _note_astray(self, line: osm.OsmWay) -> None:
         """Note steps without a level, which are read as a way of level 0, beside other levels."""
         beside = {0.0}
-        for node in way.refs:
+        for node in line.refs:
             beside |= self._levels_at.get(node, set())
             beside.update(osm.levels_of(self._data.tags.get(node, {})))
         if len(beside) > 1:
             levels = ", ".join(f"{level:g}" for level in sorted(beside - {0.0}))
-            self.findings.add("link-unread", f"stairs, way {way.id}: no level, beside {levels}")
+            self.findings.add("link-unread", f"stairs, way {line.id}: no level, beside {levels}")
 
-    def _stops(self, way: osm.OsmWay) -> list[tuple[float, Point]]:
+    def _served_levels(self, line: osm.OsmWay) -> list[tuple[float, Point]]:
         """Return where a link stops: at nodes that state one level, or that a foot way of the level
         passes; else an area in its middle, and a line of two levels at its other end, or by its
         incline."""
-        levels = osm.levels_of(way.tags)
-        known = [(node, at) for node in way.refs if (at := self._points.get(node)) is not None]
+        levels = osm.levels_of(line.tags)
+        known = [(node, at) for node in line.refs if (at := self._points.get(node)) is not None]
         stops: dict[float, Point] = {}
         for node, at in known:
             own = osm.levels_of(self._data.tags.get(node, {}))
@@ -289,13 +291,13 @@ class _Links:
             for level in own if len(own) == 1 else passed:
                 stops.setdefault(level, at)
         lost = [level for level in levels if level not in stops]
-        if way.is_closed:
-            shape = _shape(way, self._points) if lost else None
+        if line.is_closed:
+            shape = _shape(line, self._points) if lost else None
             middle = None if shape is None else shape.representative_point()
             stops |= {} if middle is None else dict.fromkeys(lost, (middle.x, middle.y))
         elif lost and len(levels) == 2 and len(known) > 1:  # noqa: PLR2004
             ends = [at for _, at in (known[0], known[-1])]
-            incline = way.tags.get("incline", "")
+            incline = line.tags.get("incline", "")
             if len(lost) == 1:
                 stops[lost[0]] = max(ends, key=lambda at: math.dist(at, *stops.values()))
             elif incline:
