@@ -133,7 +133,12 @@ def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
     path = hn.Path(np.zeros((2, 2), dtype=np.int64), points, 0.5)
     endpoints = (1.0, 1.0), (1.5, 3.25, 0.5)
     result = hn.PlanResult(
-        hn.PlanStatus.APPROXIMATE, "any-angle", path, start=endpoints[0], goal=endpoints[1]
+        hn.PlanStatus.APPROXIMATE,
+        "any-angle",
+        path,
+        start=endpoints[0],
+        goal=endpoints[1],
+        settings={"preset": "ompl"},
     )
     grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), hn.Frame(1.0))
     text = summary(grid, endpoints, result.to_dict())
@@ -285,7 +290,8 @@ def test_the_preset_commands(cli, rooms, tmp_path):
     lines = cli("preset", "list").out.splitlines()
     assert [line.split()[0] for line in lines] == hn.preset_names()
     assert any(
-        " ".join(line.split()) == "paper max-distance arcs, corridor, grid A*" for line in lines
+        " ".join(line.split()) == "paper max-distance arcs, down the levels, grid A*"
+        for line in lines
     )
     assert cli("preset", "check", "paper").out == "paper: valid\n"
     # What is shown is a preset file itself.
@@ -388,8 +394,10 @@ def test_a_map_that_does_not_fit_into_memory(cli, rooms, monkeypatch):
 
 @pytest.mark.filterwarnings("default::hybridnav.errors.MapWarning")
 def test_a_warning_is_one_line_beside_the_result(cli, draw):
-    path = draw("??...", **SHADED)
-    done = cli("plan", path, "--start", "0.5,0.5", "--goal", "4.5,0.5", "--json")
+    path = draw("??...#", **SHADED)
+    done = cli(
+        "plan", path, "--start", "0.5,0.5", "--goal", "4.5,0.5", "--json", "--robot-radius", 0
+    )
     assert (done.code, done.answer["length_m"]) == (0, 4)
     assert done.err.startswith("hybridnav: warning: map ")
     assert "grey 205" in done.err

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.harness import workers
 from hybridnav.harness.analysis import load_study
@@ -44,11 +45,13 @@ def rooms(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def settings(rooms):
-    """A run of a second or two."""
+def settings(rooms, tmp_path_factory):
+    """A run of a second or two; on so small a map a descent would lose nothing."""
+    preset = tmp_path_factory.mktemp("preset") / "paper.yaml"
+    preset.write_text(hn.load_preset("paper", overrides=["planner.levels=places"]).to_yaml())
     return RunSettings(
         maps=(str(rooms),),
-        presets=("paper",),
+        presets=(str(preset),),
         baselines=(name_of(faulty.Slow), "simple-graph"),
         pairs=N_PAIRS,
         merge_distance_m=4.0,

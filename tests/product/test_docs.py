@@ -35,11 +35,11 @@ def _documented() -> list[str]:
 
 def _public_names() -> list[str]:
     """Names of the package itself, and of its packages those that it does not export."""
-    modules = {"errors", "ext"}
+    modules = {"errors", "ext", "harness", "viz"}
     names = [name for name in hn.__all__ if name not in modules]
     wing = [f"ext.{name}" for name in importlib.import_module("hybridnav.ext").__all__]
     packages = [module.name for module in pkgutil.iter_modules(hn.__path__) if module.ispkg]
-    for place in (*sorted(set(packages) - modules), *wing):
+    for place in (*sorted(set(packages) - {"errors", "ext"}), *wing):
         package = importlib.import_module(f"hybridnav.{place}")
         listed = getattr(package, "__all__", [])
         names += [f"{place}.{name}" for name in listed if name not in hn.__all__]

@@ -180,12 +180,12 @@ def test_ctrl_c_during_the_work():
 
 
 def test_names_that_the_terminal_cannot_write(tmp_path):
-    (tmp_path / "m.pgm").write_bytes(b"P5\n1 1\n255\n\xff")
+    (tmp_path / "m.pgm").write_bytes(b"P5\n2 1\n255\n\xff\0")
     path = tmp_path / "büro.yaml"
     path.write_text(f"image: m.pgm\n{KEYS}", encoding="utf-8")
     done = _python(*SHOW, path, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("map        b\\xfcro, 1 x 1 cells")
+    assert done.stdout.startswith("map        b\\xfcro, 2 x 1 cells")
 
 
 # --- hostile maps -------------------------------------------------------------------------------
