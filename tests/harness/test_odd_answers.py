@@ -79,7 +79,8 @@ def test_a_process_that_ends_says_how(tmp_path, monkeypatch):
     methods = load_methods(tmp_path / "m.yaml")
     file = str(write_map(tmp_path, ["...", "..."]))
     evaluate(RunSettings(maps=(file,), presets=(), methods=methods, pairs=1), tmp_path / "run")
-    said = {one["method"]: one.get("error") for one in read_records(tmp_path / "run")}
+    pairs = [one for one in read_records(tmp_path / "run") if one["type"] == "pair"]
+    said = {one["method"]: one.get("error") for one in pairs}
     assert said["exit"] == "its process ended with exit code 3"
     assert said["leave"] == "its process ended with exit code 5"
     assert said["kill"] == "its process was ended by signal 9 (SIGKILL)"

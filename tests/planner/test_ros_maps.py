@@ -86,7 +86,9 @@ def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(
     site = KnownMap.of(data / name)
     grid = site.topology.grid
     assert np.array_equal(grid.classes == CellClass.FREE, site.enterable)
-    hybrid = hn.HybridPlanner(site.topology, preset="paper")
+    by_places = hn.load_preset("paper", overrides=["planner.levels=places"])
+    hybrid = hn.HybridPlanner(site.topology, preset=by_places)
+    down = hn.HybridPlanner(site.topology, preset="paper")
     whole = hn.HybridPlanner(site.topology, preset="grid-astar")
     rng = np.random.default_rng(list(name.encode()))
     pairs = site.pairs(rng)
@@ -100,6 +102,11 @@ def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(
         assert result.status is (hn.PlanStatus.SOLVED if connected else hn.PlanStatus.NO_PATH)
         if connected:
             judge(result, site, pair)
+        by_levels = down.plan(start, goal)
+        assert by_levels.status is result.status
+        if by_levels.path is not None:
+            assert by_levels.path.cells[[0, -1]].tolist() == pair.tolist()
+            assert_legal(by_levels.path.cells, site.enterable)
         if number in on_the_whole_grid:
             compare(result, whole.plan(start, goal), site, pair)
 

@@ -99,6 +99,7 @@ OTHERS = [
     "topology.rooms.choices.free_point",
     "topology.rooms.choices.leading_doors",
     "topology.rooms.choices.room_near",
+    "search.descent.Descent",
 ]
 """Names with examples that are not in the reference."""
 

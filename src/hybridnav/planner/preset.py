@@ -68,7 +68,7 @@ class Preset(Section):
     Examples
     --------
     >>> print(hn.load_preset("paper").to_yaml().splitlines()[0])
-    description: max-distance arcs, corridor, grid A*
+    description: max-distance arcs, down the levels, grid A*
     """
 
     name: str = "custom"

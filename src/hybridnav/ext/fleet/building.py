@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
 from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
@@ -398,7 +398,7 @@ class Building:
         if not isinstance(asked.blocked, Mapping):
             raise InvalidValueError(
                 "blocked of a building must be a mapping from names of floors to what is closed "
-                f"there, as {{{self.floors[0].name!r}: {{'doors': [4]}}}}, "
+                f"there, as {{{brief(self.floors[0].name)}: {{'doors': [4]}}}}, "
                 f"got {asked.blocked!r:.80}"
             )
         if isinstance(asked.closed_links, str):

@@ -17,7 +17,6 @@ from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import MapOptions, check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
-from hybridnav.ext.fleet.links import ClosedLink
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planner.guide import check_language
 
@@ -215,6 +214,9 @@ def _closures(
     building: hn.ext.fleet.Building, blocked: Sequence[str]
 ) -> tuple[list[str], dict[str, hn.Blocked]]:
     """Return the closed links, and what is closed on each floor."""
+    # Loads numpy, which help can do without.
+    from hybridnav.ext.fleet.links import ClosedLink  # noqa: PLC0415
+
     links: list[str] = []
     texts: dict[str, list[str]] = {}
     for text in blocked:
