@@ -107,6 +107,25 @@ def test_the_route_of_places_is_the_cheapest_by_max_distance(scene: Any, seed: i
     assert total == pytest.approx(least[ends[1]], rel=1e-6)
 
 
+def test_a_descent_that_runs_out_of_room_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With room for a few entries each search stops, and starts again with twice as much."""
+    rng = np.random.default_rng(5)
+    walls = (rng.random((50, 50)) < 0.25).astype(np.float32)
+    grid = hn.OccupancyGrid(walls, robot_radius_m=0)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=3.0)
+    graph, free = move_graph(grid.enterable()), np.argwhere(grid.enterable())
+    monkeypatch.setattr("hybridnav.search.descent._ROOM", 1)
+    for _ in range(20):  # each with work arrays of its own
+        descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=8))
+        start, goal = (tuple(cell) for cell in rng.choice(free, 2).tolist())
+        found = descent.find(start, goal)
+        optimum = distances(graph, grid.shape, start)[goal]
+        assert (found.cells is None) == math.isinf(optimum)
+        if found.cells is not None:
+            assert_legal(found.cells, grid.enterable())
+            assert recounted(found.cells) <= 2 * optimum
+
+
 def test_small_places_are_planned_from_regions_above_them() -> None:
     grid = hn.OccupancyGrid(np.zeros((60, 60), dtype=np.float32), robot_radius_m=0)
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=0.1)

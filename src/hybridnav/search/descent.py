@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 _ROOM = 1024
+_WINDOWS = 1 << 20
+"""More windows than a descent has."""
 NEARLY = 0.85
 """Part of `step` that is enough: no level has exactly so many fields."""
 MANY_PLACES = 1000
@@ -284,6 +286,7 @@ class Descent:
             if status != _kernels.FULL:
                 break
             work.make_room()
+            work.number += _WINDOWS  # what the stopped descent stamped counts no more
         work.number = max(work.number + 1, last)
         corridor = None
         if status >= 0 and horizon <= 0:
