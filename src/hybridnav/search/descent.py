@@ -65,7 +65,7 @@ class Descended(NamedTuple):
     expanded: int
     """Cells expanded."""
     expanded_fields: int
-    """LevelFields expanded, at all levels."""
+    """Fields expanded, at all levels."""
     corridor_cells: int
     """Cells of the last fields."""
 
@@ -204,7 +204,7 @@ class Descent:
     Parameters
     ----------
     pyramid
-        The pyramid; only its places and levels below are visited.
+        The pyramid; if it has many small places, regions are built above them.
     enterable
         bool (rows, cols), the cells that paths may use.
     settings
@@ -238,7 +238,7 @@ class Descent:
         if n_places > MANY_PLACES and sizes[0].vertices < settings.field_cells * n_places:
             pyramid = pyramid.with_regions(REGION_CELLS * settings.field_cells)
         self.levels = levels_of(pyramid, settings)
-        """The levels that it visits, from the places down."""
+        """The levels that it visits, from the top down."""
         self.is_of_places = self.levels[0] == pyramid.place_level
         """Whether its top is the level of the places."""
         self.fields = pack(pyramid, self.levels, enterable=enterable, units=units)

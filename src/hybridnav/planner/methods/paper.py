@@ -83,7 +83,7 @@ class MaxDistance(Method):
         found = (
             self._down(search, query, began)
             if isinstance(search, Descent)
-            else (self._along(search, query, began))
+            else self._along(search, query, began)
         )
         if found is None:
             return self._over_whole_map(query, {"coarse": clock() - began})
@@ -125,7 +125,7 @@ class MaxDistance(Method):
         return replace(found, route=route)
 
     def _optimum_m(self, query: Query, cells: LongArray) -> float:
-        """Return the length of a shortest path of cells, metres, by A* that a path bounds."""
+        """Return the length of a shortest path of cells, metres, by A* on the whole map."""
         search = self._refiner.search.search
         closed = None if query.closed is None else query.closed.flat
         best = search(*query.cells, blocked=closed)

@@ -86,9 +86,9 @@ class MapCells(NamedTuple):
 def _search(fields, marks, number, ends, goal_at, is_limited):
     """Find the cheapest route between two fields of a level (A*).
 
-    The estimate is the octile distance of the middles times the least cost of a cell, 1. It is
-    consistent, because no arc costs less than the distance between its middles. That of the goal
-    is 0, and its neighbours' is measured to the goal itself.
+    The estimate is the straight line at the top, where arcs cost their max-distance, and the octile
+    distance below it. Both are consistent: no arc costs less between its middles. It is 0 at the
+    goal's field, and measured to the goal's cell elsewhere.
 
     Parameters
     ----------
