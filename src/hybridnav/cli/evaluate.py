@@ -12,7 +12,7 @@ from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, answer, complain, progress_bar
-from hybridnav.cli.reading import read_settings
+from hybridnav.cli.reading import is_building_file, read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def evaluate(
 def _check_maps(files: list[Path]) -> None:
     """Refuse buildings, whose routes over floors are no pairs of cells of one map."""
     for file in files:
-        if extension("formats", "building").is_building_file(file):
+        if is_building_file(file):
             raise UsageError(
                 f"{printable(file)} is a building, and methods are measured on maps: give the "
                 "maps of its floors, or compare the routes of a graph over all of them by "
@@ -235,7 +235,10 @@ def _why_nothing(study: Study) -> str:
 
 
 def _graph(file: Path, floor: str | None) -> str | hn.ext.graphs.WaypointGraph:
-    return str(file) if floor is None else hn.ext.graphs.load_graph(file, floor=floor)
+    if floor is None:
+        return str(file)
+    graph: hn.ext.graphs.WaypointGraph = extension("methods", "graph").load_graph(file, floor=floor)
+    return graph
 
 
 def _yardstick(metric: str) -> Yardstick:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 import typer
 
 import hybridnav as hn
-from hybridnav._base.extension import extension
+from hybridnav._base.extension import extension, extensions
 from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, check_writable, complain, stage
@@ -98,7 +98,7 @@ def with_map(
                 ctx = given.pop("ctx")
                 # Here one floor and several part: what people are told of a route, a graph or a
                 # model goes by rooms and doors on one map, by floors and links over several.
-                is_building = extension("formats", "building").is_building_file(given["map_file"])
+                is_building = is_building_file(given["map_file"])
                 runs = over_floors() if is_building else command
                 known = {*inspect.signature(runs).parameters, *reads} if is_building else alone
                 _check_options(ctx, known, is_building=is_building)
@@ -129,6 +129,12 @@ def with_map(
         return run
 
     return decorate
+
+
+def is_building_file(path: Path) -> bool:
+    """Return whether a file describes a building, and what reads buildings is installed."""
+    reads = "building" in extensions("formats")
+    return reads and bool(extension("formats", "building").is_building_file(path))
 
 
 def _check_options(ctx: typer.Context, names: Collection[str], *, is_building: bool) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
+from hybridnav._base.extension import extension
 from hybridnav._base.files import replace_file
 from hybridnav.cli.common import UsageError, complain, islands_figures, stage
 from hybridnav.cli.reading import (
@@ -110,7 +111,7 @@ class Request:
         if self.poses is not None:
             hn.export_path(outcome, self.poses)
         if self.bag is not None:
-            hn.ext.live.save_bag(self.bag, [outcome], grid=grid)
+            extension("formats", "bag").save_bag(self.bag, [outcome], grid=grid)
         if self.proof is not None:
             result = outcome if isinstance(outcome, hn.PlanResult) else outcome.results[0]
             text = json.dumps(result.proof(), separators=(",", ":"), allow_nan=False)

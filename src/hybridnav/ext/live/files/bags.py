@@ -17,6 +17,7 @@ from hybridnav._base.messages import number_of, stamp_ns_of, value_of
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.errors import InvalidValueError, MapError, MapWarning
 from hybridnav.ext.live.files import bag_files
+from hybridnav.ext.live.files.bag_files import check_rosbags
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
 from hybridnav.maps import OccupancyGrid
@@ -329,7 +330,7 @@ def save_bag(  # noqa: PLR0913 - the last five have defaults
     messages = list(_messages(plans, grid, frame, stamp_ns))
     if not messages:
         raise InvalidValueError(f"{where}: nothing to write, expected a plan with a path, or a map")
-    bag_files.check_rosbags(where)
+    check_rosbags(where)
     try:
         if target.exists():
             raise MapError(f"{where}: the name is taken, expected a new one: bags are not replaced")
