@@ -10,10 +10,10 @@ from rclpy.time import Time
 from tf2_ros import Buffer, TransformException, TransformListener
 
 import hybridnav as hn
-from hybridnav._base.messages import fill_message, pose_of, transform_of
-from hybridnav.ext.graphs import route_messages
+from hybridnav.ext.graphs import load_graph, route_messages
+from hybridnav.messages import fill_message, pose_of, transform_of
 
-USUAL = {"model": "floor.hnm", "preset": "shortest", "nodes": 300, "base": "base_link"}
+USUAL = {"model": "floor.hnm", "graph": "graph.geojson", "preset": "shortest", "base": "base_link"}
 FAILURES = {TransformException: "TF_ERROR", nx.NetworkXException: "NO_VALID_ROUTE"}
 WORDS = {"SOLVED": "NONE", "OUTSIDE": "OUTSIDE_MAP", "UNEXPLORED": "OCCUPIED", "PATH": "VALID_PATH"}
 WORDS |= {"BLOCKED": "OCCUPIED", "APPROXIMATE": "NO_VALID_PATH", "NEAR_GOAL": "NO_VALID_PATH"}
@@ -26,7 +26,7 @@ class PlanningNode(Node):
         super().__init__("hybridnav")
         given = {name: self.declare_parameter(name, USUAL[name]).value for name in USUAL}
         self.planner = hn.load(given["model"]).planner(given["preset"])
-        self.graph = hn.ext.graphs.build_route_graph(self.planner.topology, nodes=given["nodes"])
+        self.graph = load_graph(given["graph"])  # ids are those that the file states
         self.network, self.base, self.transforms = self.graph.to_networkx(), given["base"], Buffer()
         self.listener = TransformListener(self.transforms, self)
         of = {ComputePathToPose: "compute_path_to_pose", ComputeRoute: "compute_route"}
@@ -55,13 +55,13 @@ class PlanningNode(Node):
 
     def route(self, goal, now):
         at = map(self.node_at, self.ends(goal)) if goal.use_poses else (goal.start_id, goal.goal_id)
-        nodes = nx.shortest_path(self.network, *at, weight="length_m")
-        return "NONE", route_messages(self.graph, nodes, stamp_ns=now)
+        ids = nx.shortest_path(self.network, *at, weight="length_m")
+        return "NONE", route_messages(self.graph, map(self.graph.names.index, ids), stamp_ns=now)
 
     def node_at(self, pose):  # of the eight nearest nodes the one with the shortest path, or -1
         near = np.argsort(np.hypot(*(self.graph.points - pose[:2]).T))[:8].tolist()
         away = [self.planner.plan(pose, (*self.graph.points[n], *pose[2:])).cost for n in near]
-        return near[np.argmin(away)] if np.isfinite(min(away)) else -1
+        return self.graph.names[near[np.argmin(away)]] if np.isfinite(min(away)) else -1
 
     def ends(self, goal):
         given = [goal.start, goal.goal] if goal.use_start else [goal.goal]

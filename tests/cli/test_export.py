@@ -203,7 +203,7 @@ def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
     given = ("export", FIGURE, "-o", tmp_path / "g.geojson", "--force", *SMALL)
     assert "ids  " not in cli(*given).out
-    monkeypatch.setattr("hybridnav._base.messages.MOST_ID", 20)
+    monkeypatch.setattr("hybridnav.messages.MOST_ID", 20)
     (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("ids  ")]
     features = json.loads((tmp_path / "g.geojson").read_text())["features"]
     most = max(each["properties"]["id"] for each in features)

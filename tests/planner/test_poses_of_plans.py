@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import hybridnav as hn
-from hybridnav._base.messages import pose_of
+from hybridnav.messages import pose_of
 from hybridnav.planner import load_preset
 from tests.plans import TWO_ROOMS, grid_of, map_of, points_in, scene_map
 from tests.strategies import Scene, examples, scenes

@@ -197,6 +197,11 @@ def test_lengths_know_no_arcs() -> None:
         hn.load_preset("robot", overrides=["planner.turning_radius_m=0"])
 
 
+def written(cli: Any, file: Path, *query: str) -> str:
+    assert cli(*query, "--poses", str(file)).code == 0
+    return file.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("ending", ["csv", "json"])
 def test_the_command_line_writes_poses(cli: Any, tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"poses.{ending}"
@@ -211,11 +216,24 @@ def test_the_command_line_writes_poses(cli: Any, tmp_path: Path, ending: str) ->
     else:
         answer = json.loads(file.read_text(encoding="utf-8"))
         names, rows = answer["names"], answer["poses"]
-    assert names == ["x", "y", "yaw", "direction"]
+    assert names == ["x", "y", "yaw", "direction", "speed_m_s", "time_s"]
     poses = np.array(rows, dtype=float)
+    speed, time = poses[:, 4], poses[:, 5]
+    assert (speed[0], speed[-1], time[0]) == (0, 0, 0)
+    assert time[-1] == pytest.approx(figures["duration_s"], abs=1e-3)
+    # Between two poses the mean of two speeds of a ramp, and not less, is driven on average.
+    driven = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    assert (driven <= np.maximum(speed[1:], speed[:-1]) * np.diff(time) + 0.01).all()
+    assert driven.sum() == pytest.approx(figures["length_m"], rel=0.01)
     assert poses[0, :2].tolist() == [1.5, 2.0]
     assert poses[-1, :2].tolist() == [27.0, 14.5]
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.05 + 1e-5
+    (line,) = json.loads(written(cli, tmp_path / "line.geojson", *query))["features"]
+    assert [len(line["properties"][name]) for name in names[4:]] == [len(rows)] * 2
+    tour = json.loads(written(cli, tmp_path / "tour.json", *query, "--via", "27.5,14.5"))["poses"]
+    times = [row[5] for row in tour]
+    assert times == sorted(times)
+    assert times[-1] > time[-1]
     refused = cli(*query, "--poses", str(tmp_path / "poses.txt"))
     assert refused.code == 2
     assert "--poses must end in .csv, .json" in refused.err

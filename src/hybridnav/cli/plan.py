@@ -98,8 +98,8 @@ PosesOption = Annotated[
     typer.Option(
         "--poses",
         metavar="FILE",
-        help="Write poses every 5 cm: x, y in metres, yaw in radians; .csv or .json. Or the line: "
-        ".geojson.",
+        help="Write poses every 5 cm: x, y in metres, yaw in radians, with limits speed and time; "
+        ".csv or .json. Or the line: .geojson.",
     ),
 ]
 BagOption = Annotated[

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.messages import (
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps.cells import MAX_CELLS, CellClass
+from hybridnav.maps.frame import Frame
+from hybridnav.messages import (
     count_of,
     header_message,
     number_of,
@@ -14,9 +17,6 @@ from hybridnav._base.messages import (
     pose_of,
     value_of,
 )
-from hybridnav.errors import InvalidValueError
-from hybridnav.maps.cells import MAX_CELLS, CellClass
-from hybridnav.maps.frame import Frame
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -205,7 +205,7 @@ class OccupancyGrid:
     def to_message(self, frame_id: str = "map", *, stamp_ns: int = 0) -> dict[str, Any]:
         """Return the map as a `nav_msgs/OccupancyGrid` of ROS 2, in plain dictionaries and lists.
 
-        `hybridnav._base.messages.fill_message` puts it into a message. Measured cells are returned:
+        `hybridnav.messages.fill_message` puts it into a message. Measured cells are returned:
         the robot's radius and dropped islands are no part of it. Percentages are rounded, but never
         across a threshold.
 

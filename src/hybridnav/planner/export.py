@@ -26,12 +26,12 @@ from hybridnav.topology.rooms import Rooms
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from hybridnav._base.typing import PathLike
+    from hybridnav._base.typing import FloatArray, PathLike, SignArray
     from hybridnav.topology.rooms import Door
 
 _DECIMALS = 6
 _TABLE, _FEATURES, _PLAIN = ".csv", (".geojson",), ".json"
-_POSE = ("x", "y", "yaw", "direction")
+_POSE, _DRIVEN = ("x", "y", "yaw", "direction"), ("speed_m_s", "time_s")
 _ROOM = ("room", "x", "y", "area_m2", "fits", "doors")
 _PLACE = ("place", "x", "y", "class", "area_m2", "room")
 _PATH_ENDINGS = (_TABLE, _PLAIN, *_FEATURES)
@@ -46,10 +46,12 @@ def export_path(
     CSV has a line of names and a line for each pose: x, y in metres, yaw in radians, and the
     direction. The direction is that in which the robot leaves it, 1 for ahead, -1 for backwards. No
     pose occurs twice in a row; a turn on the spot, and nothing else, is two poses at one point.
-    JSON is one object, with a list of the same four numbers for each pose. GeoJSON has a
-    `LineString` for each plan, through the points of the path, or through the poses where the path
-    is curved. Its properties are `headings_rad`, `length_m`, `cost`, `metric`, `start`, `goal` and
-    `preset`. Without a path there are no poses and no lines.
+    With limits, which the preset `robot` has, follow `speed_m_s` and `time_s`, the seconds since
+    the first pose of all. JSON is one object, with the `names` and a list of the same numbers for
+    each pose. GeoJSON has a `LineString` for each plan, through the points of the path, or through
+    the poses where the path is curved or has limits. Its properties are `headings_rad`, with limits
+    `speed_m_s` and `time_s` too, `length_m`, `cost`, `metric`, `start`, `goal` and `preset`.
+    Without a path there are no poses and no lines.
 
     Parameters
     ----------
@@ -85,14 +87,20 @@ def export_path(
         checked_type("outcome", result, PlanResult)
     file = _checked(path, _PATH_ENDINGS, frame)
     planned = [result for result in results if result.path is not None]
+    tracks, began_s = [], 0.0
+    for result in planned:
+        tracks.append(_poses(result, spacing_m, began_s))
+        began_s += result.duration_s or 0.0
     if file.suffix.lower() in _FEATURES:
-        _write(file, _collection([_line(result, spacing_m) for result in planned], frame))
+        lines = [_line(result, track) for result, track in zip(planned, tracks, strict=True)]
+        _write(file, _collection(lines, frame))
         return
-    rows = _distinct([row for result in planned for row in _poses(result, spacing_m)])
+    rows = _distinct(list(itertools.chain.from_iterable(tracks)))
+    names = _POSE if results[0].limits is None else _POSE + _DRIVEN
     if file.suffix.lower() == _PLAIN:
-        _write(file, json.dumps({"names": _POSE, "poses": rows}, allow_nan=False) + "\n")
+        _write(file, json.dumps({"names": names, "poses": rows}, allow_nan=False) + "\n")
     else:
-        _write(file, _table(_POSE, rows))
+        _write(file, _table(names, rows))
 
 
 def export_rooms(
@@ -214,13 +222,22 @@ def export_places(topology: TopologicalMap, path: PathLike, *, frame: str = "map
     _write(file, _collection(features + _arcs(topology), frame))
 
 
-def _poses(result: PlanResult, spacing_m: float) -> list[list[float]]:
-    assert result.path is not None  # noqa: S101 - those without are left out
-    poses = result.path.poses(spacing_m).tolist()
-    directions = result.path.directions(spacing_m).tolist()
+def _poses(result: PlanResult, spacing_m: float, began_s: float) -> list[list[float]]:
+    """Return a row for each pose: `_POSE`, and `_DRIVEN` with limits, from a time on."""
+    path, limits = result.path, result.limits
+    assert path is not None  # noqa: S101 - those without are left out
+    if limits is None:
+        return _rows(path.poses(spacing_m), path.directions(spacing_m))
+    found = path.profile(limits, spacing_m)
+    driven = np.column_stack([found.speed_m_s, began_s + found.time_s])
+    return _rows(found.poses, found.directions, driven)
+
+
+def _rows(poses: FloatArray, directions: SignArray, *others: FloatArray) -> list[list[float]]:
+    values = (np.round(np.column_stack([poses, *others]), _DECIMALS) + 0.0).tolist()
     return [
-        [*(_rounded(value) for value in pose), direction]
-        for pose, direction in zip(poses, directions, strict=True)
+        [*row[:3], direction, *row[3:]]
+        for row, direction in zip(values, directions.tolist(), strict=True)
     ]
 
 
@@ -230,12 +247,14 @@ def _distinct(rows: list[list[float]]) -> list[list[float]]:
     return [row for row, after in pairs if row[:3] != after[:3]] + rows[-1:]
 
 
-def _line(result: PlanResult, spacing_m: float) -> dict[str, Any]:
+def _line(result: PlanResult, track: list[list[float]]) -> dict[str, Any]:
     path = result.path
     assert path is not None  # noqa: S101 - those without are left out
-    if path.is_curved:
-        poses = path.poses(spacing_m)
-        points, headings = poses[:, :2], poses[:, 2]
+    driven: dict[str, Any] = {}
+    if path.is_curved or result.limits is not None:
+        columns = np.array(track * 2 if len(track) == 1 else track)
+        points, headings = columns[:, :2], columns[:, 2]
+        driven = dict(zip(_DRIVEN, columns[:, 4:].T.tolist(), strict=False))
     else:
         points, headings = path.points, path.headings_at_points
     if len(points) == 1:  # a line has two positions or more
@@ -250,6 +269,7 @@ def _line(result: PlanResult, spacing_m: float) -> dict[str, Any]:
         "goal": result.goal,
         "preset": result.settings.get("preset"),
         "headings_rad": np.round(headings, _DECIMALS).tolist(),
+        **driven,
     }
     known = {name: value for name, value in properties.items() if value is not None}
     line = {"type": "LineString", "coordinates": np.round(points, _DECIMALS).tolist()}

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, filled, frozen, on_demand
-from hybridnav._base.messages import path_message
 from hybridnav._base.poses import Motion
 from hybridnav.errors import InvalidValueError
+from hybridnav.messages import path_message
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -187,7 +187,7 @@ class Path:
         self, frame_id: str = "map", *, spacing_m: float = 0.05, stamp_ns: int = 0
     ) -> dict[str, Any]:
         """Return the `poses` as a `nav_msgs/Path` of ROS 2, in plain dictionaries and lists, which
-        `hybridnav._base.messages.fill_message` puts into a message.
+        `hybridnav.messages.fill_message` puts into a message.
 
         Parameters
         ----------

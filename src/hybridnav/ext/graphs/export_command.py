@@ -334,7 +334,7 @@ def _summary(out: Path, graph: RouteGraph, judged: GraphReport | None) -> list[s
 
 def _ids_line(graph: RouteGraph) -> list[str]:
     """Return a line if Nav2's messages cannot hold all ids of a graph."""
-    from hybridnav._base.messages import MOST_ID  # noqa: PLC0415 - on demand
+    from hybridnav.messages import MOST_ID  # noqa: PLC0415 - on demand
 
     most = max(int(ids.max(initial=0)) for ids in graph.ids)
     if most <= MOST_ID:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hybridnav._base.messages import MOST_ID, header_message, path_message
 from hybridnav._base.poses import Motion
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.attach import placed_points
 from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
 from hybridnav.maps.checks import checked_type
+from hybridnav.messages import MOST_ID, header_message, path_message
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def route_messages(
-    graph: RouteGraph,
+    graph: Graph,
     nodes: Sequence[int],
     *,
     frame_id: str = "map",
@@ -36,7 +36,7 @@ def route_messages(
     Parameters
     ----------
     graph
-        The graph.
+        The graph of a map, or of a file.
     nodes
         The nodes of the route in order, as indices into `graph.points`. Messages have the ids of
         `graph.ids`, as the file of `export_nav2`.
@@ -56,8 +56,8 @@ def route_messages(
     Raises
     ------
     InvalidValueError
-        When there is no node, no edge joins two nodes that follow each other, an id is above
-        65,535, or another value is out of range.
+        When there is no node, or no edge joins two nodes that follow each other. When an id is no
+        whole number from 0 to 65,535, or another value is out of range.
 
     Examples
     --------
@@ -69,18 +69,21 @@ def route_messages(
     >>> [edge["edgeid"] - graph.n_nodes for edge in route["edges"]]
     [0]
     """
-    checked_type("graph", graph, RouteGraph)
+    if not isinstance(graph, WaypointGraph):
+        checked_type("graph", graph, RouteGraph)
     passed = [_checked_node(node, graph.n_nodes) for node in nodes]
     if not passed:
         raise InvalidValueError("a route needs at least one node, got none")
     edges = [_edge_of(graph, *pair) for pair in pairwise(passed)]
-    node_ids, edge_ids = graph.ids[0][passed].tolist(), graph.ids[1][edges].tolist()
-    most = max([*node_ids, *edge_ids])
-    if most > MOST_ID:
-        raise InvalidValueError(
-            f"the route has the id {most}, and messages of Nav2 hold at most {MOST_ID}: build the "
-            "graph with fewer nodes"
-        )
+    node_ids, edge_ids = (
+        [ids[at] for at in rows] for ids, rows in zip(ids_of(graph), (passed, edges), strict=True)
+    )
+    for number in [*node_ids, *edge_ids]:
+        if not isinstance(number, int) or not 0 <= number <= MOST_ID:
+            raise InvalidValueError(
+                f"the route has the id {brief(number)}, and messages of Nav2 hold whole numbers "
+                f"from 0 to {MOST_ID}: build the graph with fewer nodes"
+            )
     points = graph.points[passed]
     places = [{"x": x, "y": y, "z": 0.0} for x, y in points.tolist()]
     poses = Motion(points, None, curved=False).spread(spacing_m).poses
@@ -111,7 +114,7 @@ def _checked_node(node: Any, n_nodes: int) -> int:
     return index
 
 
-def _edge_of(graph: RouteGraph, tail: int, head: int) -> int:
+def _edge_of(graph: Graph, tail: int, head: int) -> int:
     found = np.flatnonzero((graph.edges == (tail, head)).all(axis=1))
     if not len(found):
         raise InvalidValueError(f"no edge leads from node {tail} to node {head}")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hybridnav._base.files import printable
-from hybridnav._base.messages import number_of
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.costs import CostLayer
@@ -22,6 +21,7 @@ from hybridnav.maps.costs.factors import checked_speeds, mask_on_map
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.maps.messages import read_cells
 from hybridnav.maps.occupancy import extent
+from hybridnav.messages import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

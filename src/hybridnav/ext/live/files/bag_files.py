@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import printable
-from hybridnav._base.messages import number_of, quaternion_of, stamp_ns_of, value_of
 from hybridnav._base.trig import acos, sin
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, brief
+from hybridnav.messages import number_of, quaternion_of, stamp_ns_of, value_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator

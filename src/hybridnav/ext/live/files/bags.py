@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import printable
-from hybridnav._base.messages import number_of, stamp_ns_of, value_of
 from hybridnav._base.trig import atan2, cos, sin
 from hybridnav.errors import InvalidValueError, MapError, MapWarning
 from hybridnav.ext.live.files import bag_files
@@ -22,6 +21,7 @@ from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_between, checked_radius, checked_thresholds, checked_type
+from hybridnav.messages import number_of, stamp_ns_of, value_of
 from hybridnav.planner import PlanResult, Tour
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav._base.messages import pose_message, quaternion_of, tilt_of, yaw_of
+from hybridnav.messages import pose_message, quaternion_of, tilt_of, yaw_of
 from tests.layers import grid_of
 from tests.strategies import examples
 

@@ -122,7 +122,7 @@ def pose_of(message: Any, path: str, what: str) -> tuple[float, float, float]:
 
     Examples
     --------
-    >>> from hybridnav._base.messages import pose_message, pose_of
+    >>> from hybridnav.messages import pose_message, pose_of
     >>> goal = {"header": {"frame_id": "map"}, "pose": pose_message((1.0, 2.0, 0.5))}
     >>> pose_of(goal, "pose", "goal")
     (1.0, 2.0, 0.5)
@@ -145,7 +145,7 @@ def transform_of(message: Any, path: str, what: str) -> tuple[float, float, floa
 
     Examples
     --------
-    >>> from hybridnav._base.messages import pose_message, transform_of
+    >>> from hybridnav.messages import pose_message, transform_of
     >>> pose = pose_message((1.0, 2.0, 0.5))
     >>> found = {"translation": pose["position"], "rotation": pose["orientation"]}
     >>> transform_of({"transform": found}, "transform", "robot")
@@ -177,7 +177,7 @@ def pose_message(pose: tuple[float, float, float]) -> dict[str, Any]:
 
     Examples
     --------
-    >>> from hybridnav._base.messages import pose_message
+    >>> from hybridnav.messages import pose_message
     >>> pose_message((1.0, 2.0, 0.0))["orientation"]
     {'x': 0.0, 'y': 0.0, 'z': 0.0, 'w': 1.0}
     """
@@ -205,7 +205,7 @@ def header_message(frame_id: str, stamp_ns: int) -> dict[str, Any]:
 
     Examples
     --------
-    >>> from hybridnav._base.messages import header_message
+    >>> from hybridnav.messages import header_message
     >>> header_message("map", 1_500_000_000)
     {'stamp': {'sec': 1, 'nanosec': 500000000}, 'frame_id': 'map'}
     """
@@ -284,7 +284,7 @@ def fill_message(message: _T, values: Mapping[str, Any]) -> _T:
     Examples
     --------
     >>> from types import SimpleNamespace
-    >>> from hybridnav._base.messages import fill_message
+    >>> from hybridnav.messages import fill_message
     >>> header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="")
     >>> fill_message(header, {"stamp": {"sec": 3}, "frame_id": "map"})
     namespace(stamp=namespace(sec=3, nanosec=0), frame_id='map')
