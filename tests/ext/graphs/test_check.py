@@ -348,9 +348,48 @@ def test_a_room_outside_is_no_free_ground():
     topology = topology_of(WITH_MARGIN)
     graph = hn.ext.graphs.build_route_graph(topology, spacing_m=2.0)
     assert "hall" in graph.rooms
-    assert not hn.ext.graphs.check_graph(
+    (island,) = hn.ext.graphs.check_graph(
         topology, hn.ext.graphs.WaypointGraph.from_networkx(graph.to_networkx())
     ).findings
+    assert (island.kind, island.severity, island.count) == ("island", "warning", 1)
+
+
+SHUT = ("############", *("#aaaa##bbbb#",) * 4, "############")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "edges", "counts"),
+    [
+        ("abc", "ab", {"island": 1}),  # a node from which nothing is reached
+        ("abcd", "ab cd", {"island": 1}),
+        ("abcd", "ab", {"island": 1, "alone": 2}),  # of two single nodes beside each other one
+        ("abc", "ab bc", {"edge-through-wall": 2}),
+        ("ab", "ab", {"missing-named-room": 1, "missing-part": 1}),
+    ],
+)
+def test_a_component_from_which_nothing_else_is_reached(nodes, edges, counts):
+    topology = topology_of(SHUT)
+    place = dict(zip("abcd", [(2.5, 1.5), (2.5, 3.5), (2.5, 8.5), (2.5, 10.5)], strict=True))
+    plain: nx.Graph[Any] = nx.Graph()
+    for node in nodes:
+        x, y = topology.grid.frame.points_of_grid(np.array(place[node])).tolist()
+        plain.add_node(node, x=x, y=y)
+    plain.add_edges_from(edges.split())
+    found = hn.ext.graphs.check_graph(topology, hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    assert {each.kind: each.count for each in found.findings} == counts
+
+
+def test_a_component_that_nothing_leads_out_of(features, checked):
+    """Three nodes in a ring that one edge leads into."""
+    ring = [
+        new_node(features, point_at(row, col))
+        for row, col in ((6.5, 19.5), (6.5, 20.5), (5.5, 20.5))
+    ]
+    for one, other in zip(ring, ring[1:] + ring[:1], strict=True):
+        join(features, one, other, both=False)
+    mate = near(features, "corridor", 6.25, 18.75)
+    join(features, mate, ring[0], both=False)
+    assert checked(features)[0] == {"one-way": 3}
 
 
 def test_errors_come_first():

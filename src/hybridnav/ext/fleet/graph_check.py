@@ -17,7 +17,13 @@ from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Posit
 from hybridnav.ext.graphs.check import GraphCheck, check_graph
 from hybridnav.ext.graphs.gather import Finding, Findings, shown
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, Excess, excess_of
-from hybridnav.ext.graphs.waypoint_graph import add_one_way, components_of, cut_off, one_way_nodes
+from hybridnav.ext.graphs.waypoint_graph import (
+    add_one_way,
+    components_of,
+    cut_off,
+    islands,
+    one_way_nodes,
+)
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.planner.settings import ShortestSettings
 from hybridnav.topology.rooms.find import outside_of
@@ -63,9 +69,9 @@ class BuildingGraphCheck:
 def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     """Find the faults of the graph of a building.
 
-    Each floor is checked as by `check_graph`, but a node is `one-way` only if routes over other
-    floors cannot reach and leave it either. `graphs.BUILDING_KINDS` lists the kinds of findings
-    beside them. The graph need not have links that the robot does not fit in.
+    Each floor is checked as by `check_graph`, but a node is `one-way`, and a component an `island`,
+    only if routes over other floors lead there neither. `graphs.BUILDING_KINDS` lists the kinds of
+    findings beside them. The graph need not have links that the robot does not fit in.
 
     Parameters
     ----------
@@ -116,7 +122,7 @@ def _checked_floors(network: BuildingNetwork) -> dict[str, GraphCheck]:
         graph = floor.graph.graph
         check = check_graph(network.building.floor(floor.name).planner.topology, graph)
         findings = Findings()
-        findings.add_all(found for found in check.findings if found.kind != "one-way")
+        findings.add_all(found for found in check.findings if found.kind not in _WHOLE)
         here = one_way - floor.base
         add_one_way(findings, graph, here[(here >= 0) & (here < graph.n_nodes)])
         checks[floor.name] = replace(check, findings=findings.collected())
@@ -147,15 +153,16 @@ def _add_links(findings: Findings, matched: MatchedGraph, network: BuildingNetwo
 
 
 def _add_pieces(findings: Findings, network: BuildingNetwork) -> None:
-    """Add pieces of the graph that no edge or ride connects, in one part of the building."""
+    """Add pieces of the graph that no edge or ride connects, in one part of the building or not."""
     part_of = _parts(network)
     piece_of = components_of(network.n_nodes, network.edges(), "weak")
-    for index, count, most in cut_off(part_of, piece_of):
-        floor, node = network.node(index)
-        graph = floor.graph.graph
-        where = f"{count} nodes with node {shown(graph.names[node])} of floor {floor.name}"
-        x, y = graph.points[node].tolist()
-        findings.add("pieces", f"{where}, apart from {most}", (x, y))
+    for kind, find in (("pieces", cut_off), ("island", islands)):
+        for index, count, most in find(part_of, piece_of):
+            floor, node = network.node(index)
+            graph = floor.graph.graph
+            where = f"{count} nodes with node {shown(graph.names[node])} of floor {floor.name}"
+            x, y = graph.points[node].tolist()
+            findings.add(kind, f"{where}, apart from {most}", (x, y))
 
 
 def _parts(network: BuildingNetwork) -> LongArray:
@@ -187,6 +194,8 @@ def _parts(network: BuildingNetwork) -> LongArray:
 
 Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
 _MOST_EXAMPLES = 100
+_WHOLE = frozenset({"one-way", "island"})
+"""Kinds that hold of the graph of all floors, not of each."""
 _ROUNDED = 1.0 - 1e-9
 """Factor on the optimum below which no route costs, sums being rounded."""
 

@@ -130,10 +130,11 @@ def check_graph(
     component = np.full(graph.n_nodes, -1, dtype=np.int64)
     component[placed.is_free] = space.component_of[tuple(placed.cells[placed.is_free].T)]
     rooms = topology.pyramid.rooms
-    _add_nodes(findings, graph, placed, (grid, space.outside(rooms)), component)
+    is_beyond = (component >= 0) & space.outside(rooms)[component]
+    _add_nodes(findings, graph, placed, grid, component)
     _add_edges(findings, graph, placed, space, is_clear)
     is_kept = space.kept(None if rooms is None else topology.rooms)
-    add_components(findings, graph, component)
+    add_components(findings, graph, component, is_beyond)
     _add_parts(findings, space, is_kept, component)
     met = add_rooms_and_doors(findings, topology, placed, is_clear, space, is_kept)
     return GraphCheck(
@@ -153,12 +154,10 @@ def _add_nodes(
     findings: Findings,
     graph: WaypointGraph,
     placed: PlacedGraph,
-    on: tuple[OccupancyGrid, BoolArray],
+    grid: OccupancyGrid,
     component: LongArray,
 ) -> None:
-    """Add nodes where no robot should go; `on` is the map, and which parts of its free space lie
-    outside the building."""
-    grid, outside = on
+    """Add nodes where no robot fits, at one point, or without edges."""
     points = graph.points.tolist()
 
     def add(kind: str, nodes: LongArray) -> None:
@@ -170,7 +169,6 @@ def _add_nodes(
     unexplored = grid.classes[tuple(placed.cells[within].T)] == CellClass.UNEXPLORED
     add("node-in-wall", within[~unexplored])
     add("node-unexplored", within[unexplored])
-    add("node-beyond", np.flatnonzero((component >= 0) & outside[component]))
     first = unique_rows(placed.positions).first
     add("same-point", np.delete(np.arange(graph.n_nodes), first))
     has_edge = np.zeros(graph.n_nodes, dtype=np.bool_)

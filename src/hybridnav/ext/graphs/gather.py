@@ -55,6 +55,7 @@ KINDS = {
     "same-point": "nodes at the point of another node",
     "alone": "nodes without edges, beside others",
     "components": "components of the graph that no edge connects, though free space does",
+    "island": "components of the graph that neither edges nor free space join with the largest",
     "one-way": "nodes that cannot be both reached and left",
     "missing-door": "doors that the robot fits through and no edge passes",
     "missing-room": "rooms that the robot fits in and no node lies in",
@@ -79,7 +80,15 @@ BUILDING_KINDS = {
 _WARNINGS = frozenset(
     {
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
-        *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
+        *(
+            "loop",
+            "repeated-edge",
+            "same-point",
+            "alone",
+            "island",
+            "floor-missing",
+            "floor-unknown",
+        ),
         *("link-missing", "link-kind", "link-unread", "stop-missing", "fails-later"),
         *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure", "missing-named-room"),
     }

@@ -293,16 +293,27 @@ class RouteGraph:
 # Components that no edge connects, and nodes without a route there and back.
 
 
-def add_components(findings: Findings, graph: WaypointGraph, component: LongArray) -> None:
-    """Add components that free space connects, and nodes that cannot be both reached and left.
+def add_components(
+    findings: Findings, graph: WaypointGraph, component: LongArray, is_beyond: BoolArray
+) -> None:
+    """Add nodes outside the building, components apart, and nodes that cannot be both reached and
+    left.
 
-    `component`: int64 (n,), the connected part of free space in which each node lies, -1 for none.
+    `component`: int64 (n,), the connected part of free space in which each node lies, -1 for none;
+    `is_beyond`: bool (n,), nodes outside the building.
     """
     weak = components_of(graph.n_nodes, graph.edges, "weak")
     points = graph.points.tolist()
-    for node, count, most in cut_off(component, weak):
-        where = f"{count} nodes with node {shown(graph.names[node])}"
-        findings.add("components", f"{where}, apart from {most}", tuple(points[node]))
+    for node in np.flatnonzero(is_beyond).tolist():
+        findings.add("node-beyond", f"node {shown(graph.names[node])}", tuple(points[node]))
+    inside = np.where(is_beyond, -1, component)
+    for kind, found in (
+        ("components", cut_off(component, weak)),
+        ("island", islands(inside, weak)),
+    ):
+        for node, count, most in found:
+            where = f"{count} nodes with node {shown(graph.names[node])}, apart from {most}"
+            findings.add(kind, where, tuple(points[node]))
     add_one_way(findings, graph, one_way_nodes(graph.n_nodes, graph.edges))
 
 
@@ -346,6 +357,20 @@ def cut_off(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int
         _, first, count = np.unique(component[nodes], return_index=True, return_counts=True)
         for one in np.delete(np.arange(len(count)), count.argmax() if len(count) else []):
             yield int(nodes[first[one]]), int(count[one]), int(count.max())
+
+
+def islands(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int, int]]:
+    """Yield the components of a graph that neither edges nor free space join with the largest one;
+    parameters and values as for `cut_off`."""
+    lesser: set[int] = set()
+    for part in np.unique(part_of[part_of >= 0]).tolist():
+        count = np.bincount(component[part_of == part])
+        lesser |= set(np.flatnonzero(count).tolist()) - {int(count.argmax())}
+    inside = np.bincount(component, weights=part_of >= 0, minlength=1)
+    lesser.add(int(inside.argmax()))
+    size = np.bincount(component, minlength=1)
+    for one in np.setdiff1d(np.flatnonzero(inside), [*lesser]).tolist():
+        yield int((component == one).argmax()), int(size[one]), int(size[inside.argmax()])
 
 
 def components_of(n_nodes: int, edges: LongArray, kind: Literal["weak", "strong"]) -> LongArray:
