@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 import hybridnav as hn
 from hybridnav.ext.graphs import build_lane_graph, build_route_graph, export_bundle
@@ -390,3 +391,31 @@ def test_what_is_no_mask_of_a_bundle_is_refused(tmp_path):
     with pytest.raises(hn.errors.InvalidValueError, match="rooms"):
         bundle_of(bare, tmp_path / "robot")
     assert not (tmp_path / "robot").exists()
+
+
+MAPS = (
+    ("fetch_maps/9_16_15_keepout.yaml", 10),
+    ("aws_small_house/map.yaml", 1),
+    ("bwi_mapper/intel.yaml", 3),
+    ("giraff_homes/UMA_236.yaml", 0),
+)
+
+
+@pytest.mark.parametrize(("name", "hidden"), MAPS)
+def test_rooms_are_the_same_in_lists_masks_goals_and_checks(cli, tmp_path, data, name, hidden):
+    """Those of lists have a number and cells in the mask; where the robot fits, a goal, and
+    `check` looks for a node."""
+    given, bundle = (data / name, "--robot-radius", 0.25), tmp_path / "robot"
+    rooms = cli("rooms", *given, "--json").answer["rooms"]
+    listed = {one["name"]: one["fits"] for one in rooms if one["is_listed"]}
+    assert len(rooms) - len(listed) == hidden
+    assert cli("export", *given, "--bundle", bundle).code == 0
+    numbers = yaml.safe_load((bundle / "room_names.yaml").read_text())["rooms"]
+    assert set(numbers.values()) == set(listed)
+    with Image.open(bundle / "rooms_mask.pgm") as mask:
+        assert set(np.unique(np.asarray(mask)).tolist()) - {0} == set(numbers)
+    goals = yaml.safe_load((bundle / "poses.yaml").read_text())
+    fitting = {room for room, fits in listed.items() if fits}
+    assert {goal for goal in goals if not goal.startswith("door ")} == fitting
+    found = cli("check", *given, bundle / "graph.geojson", "--json", "--fail-on", "never").answer
+    assert found["rooms"]["all"] == len(fitting)
