@@ -422,16 +422,29 @@ def test_nothing_outside_the_folder_is_read_or_written(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_a_building_is_refused_with_what_answers_over_floors():
-    file = Path(__file__).parents[3] / "maps" / "building" / "building.yaml"
-    words = [sys.executable, "-m", "hybridnav", "serve", str(file)]
-    done = subprocess.run(words, input="", capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert f"routes over floors with hybridnav plan {file} --json" in done.stderr
+def test_what_is_out_of_order_is_closed_for_programs_too(tmp_path):
+    floor = PaintedFloor(2)
+    plain = session_of(floor, tmp_path)
+    point, _, room = floor.inner_point()
+    goal = floor.names[(room + 1) % len(floor.names)]
+    ends = {"start": point, "goal": goal}
+    assert MapAnswers(plain).call("route", ends)["status"] == "solved"
+    journal = hn.Journal(tmp_path / "floor.yaml")
+    journal.close(f"room:{goal}")
+    topology, preset = plain.planning.topology, hn.load_preset("shortest")
+    model = hn.load(tmp_path / "floor.yaml", robot_radius_m=0.2)
+    answers = MapAnswers(Session(model, topology, model.fitted(preset), journal=journal))
+    for name in ("route", "can_reach", "explain"):
+        assert f"closed by room {goal}" in answers.call(name, ends)["text"]
+    assert not answers.call("nearest", {"of": goal, "start": point})["ok"]
+    assert journal.open(f"room:{goal}")
+    assert answers.call("route", ends)["status"] == "solved"
 
 
-def test_the_example_asks_a_map(tmp_path):
-    path = write_floor(PaintedFloor(5), tmp_path)
+@pytest.mark.parametrize("of", ["map", "building"])
+def test_the_example_asks_a_map(of, tmp_path):
+    path = Path(__file__).parents[3] / "maps" / "building" / "building.yaml"
+    path = path if of == "building" else write_floor(PaintedFloor(5), tmp_path)
     file = Path(__file__).parents[3] / "examples" / "ask_a_map.py"
     done = subprocess.run(
         [sys.executable, str(file), str(path)],

@@ -59,7 +59,10 @@ def test_a_route_that_is_not_there_has_a_reason(goal, closed, reason):
     plan = building().plan(("1", KITCHEN), goal, **closed)
     assert not plan.solved
     assert re.fullmatch(reason, " ".join(plan.reasons["en"]))
-    assert plan.to_dict()["why"] == {"words": list(plan.reasons["en"])}
+    assert plan.to_dict()["why"] == {
+        "words": list(plan.reasons["en"]),
+        "to_open": list(plan.to_open),
+    }
     assert plan.reasons["de"]
     with pytest.raises(PlanError, match=re.escape(plan.reasons["en"][0][:-1])):
         plan.raise_for_status()

@@ -9,19 +9,14 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from pydantic import ValidationError
-
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
-from hybridnav.maps import CellClass
-from hybridnav.maps.names import did_you_mean, matching
 from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from hybridnav.ext.page.session import Session
     from hybridnav.topology import TopologicalMap
@@ -58,10 +53,10 @@ class MapAnswers:
 
     def __init__(self, session: Session, *, allow_edits: bool = False) -> None:
         self._session, self.allow_edits = session, allow_edits
+        self.tools = ask.tools(allow_edits=allow_edits)
+        self.instructions = ask.INSTRUCTIONS.format(point="[x, y]")
         self._lock = threading.RLock()
-        self._closed = Blocked()
-        self._before: list[tuple[str, str] | Blocked] = []
-        """What each change took: what was closed, or the old and the new name of a room."""
+        self._changes = Changes()
         self._planners: OrderedDict[float, HybridPlanner] = OrderedDict()
 
     def call(self, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
@@ -80,26 +75,9 @@ class MapAnswers:
             An `Answer`; with `ok` False if the question cannot be answered as it is, where `text`
             has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
         """
-        tool = next((one for one in ask.TOOLS if one.name == name), None)
-        try:
-            if tool is None:
-                names = tuple(one.name for one in ask.tools(allow_edits=self.allow_edits))
-                raise InvalidValueError(f"no function {name!r:.80}{did_you_mean(name, names)}")
-            if tool.edits and not self.allow_edits:
-                raise InvalidValueError(
-                    f"{name} changes what others see: start the server with --allow-edits"
-                )
-            asked = tool.asks.model_validate(arguments)
-            answer: Callable[[Any], dict[str, Any]] = getattr(self, f"_{name}")
-            with self._lock:
-                return {"ok": True, **answer(asked)}
-        except ValidationError as error:
-            assert tool is not None  # noqa: S101 - its model has refused
-            return _refused(ask.mistake(error, tuple(tool.asks.model_fields))[:300])
-        except places.UnclearError as error:
-            return _refused(str(error)) | {"choices": error.choices}
-        except HybridNavError as error:
-            return _refused(str(error))
+        functions = {tool: getattr(self, f"_{tool.name}") for tool in ask.TOOLS}
+        with self._lock:
+            return ask.answer_of(functions, name, arguments, allow_edits=self.allow_edits)
 
     # The map.
 
@@ -116,84 +94,33 @@ class MapAnswers:
         return places.NamedPlaces(self._rooms)
 
     def _shut(self, avoiding: list[int | str]) -> Blocked:
-        """Return what is closed in this session with what one question avoids."""
-        return self._closed | self._places.blocked(avoiding)
+        """Return what is closed, in this session and for all, with what one question avoids."""
+        return self._session.out_of_order() | places.blocked_of(
+            [*self._changes.closed, *self._places.things(avoiding)]
+        )
 
     def _describe_map(self, _: ask.DescribeMap) -> dict[str, Any]:
-        grid, rooms = self._session.grid, self._rooms
-        listed = self._places.listed()
-        kinds = [self._places.kind(one) for one in listed]
-        rows, cols = grid.shape
-        size = [round(cols * grid.resolution_m, 2), round(rows * grid.resolution_m, 2)]
-        free = round(float((grid.measured == CellClass.FREE).sum() * grid.cell_area_m2), 1)
-        counts = {kind: kinds.count(kind) for kind in ("room", "corridor", "hall")}
+        grid, facts = self._session.grid, self._places.facts()
+        kinds, (wide, high) = facts["rooms"], facts["size_m"]
         text = (
-            f"{grid.name}: {size[0]} x {size[1]} m, {free} m² free, {len(listed)} rooms "
-            f"(corridors: {counts['corridor']}, halls: {counts['hall']}), "
-            f"{len(rooms.listed_doors)} doors and openings, robot radius {grid.robot_radius_m} m."
+            f"{grid.name}: {wide} x {high} m, {facts['free_m2']} m² free, {sum(kinds.values())} "
+            f"rooms (corridors: {kinds['corridor']}, halls: {kinds['hall']}), "
+            f"{facts['doors']} doors and openings, robot radius {grid.robot_radius_m} m."
         )
-        corners = grid.frame.points_of_grid(np.array([[0, 0], [rows, cols]])).round(2).tolist()
         return {
             "text": text,
             "name": grid.name,
-            "size_m": size,
-            "corners": corners,
-            "free_m2": free,
-            "rooms": counts,
-            "doors": len(rooms.listed_doors),
+            **facts,
             "robot_radius_m": grid.robot_radius_m,
-            "closed": self._closed_now(),
+            "closed": self._changes.now,
             "edits_allowed": self.allow_edits,
         }
 
     def _list_rooms(self, asked: ask.ListRooms) -> dict[str, Any]:
-        names = self._places.listed()
-        if asked.kind is not None:
-            names = [name for name in names if self._places.kind(name) == asked.kind]
-        if asked.name.strip():
-            names = [names[at] for at in matching(asked.name, names)]
-        shown = names[asked.first : asked.first + asked.count]
-        rest = len(names) - asked.first - len(shown)
-        text = f"{len(names)} rooms" + (f", {rest} more after these" if rest > 0 else "")
-        return {
-            "text": text,
-            "total": len(names),
-            "rooms": [self._places.room(name) for name in shown],
-        }
+        return rooms_answer(self._places.asked(asked), asked)
 
     def _where_am_i(self, asked: ask.WhereAmI) -> dict[str, Any]:
-        rooms, grid = self._rooms, self._session.grid
-        x, y = asked.point
-        row, col = grid.frame.cell_of(x, y)
-        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
-            raise InvalidValueError("the point lies outside the map: describe_map has its corners")
-        name = rooms.at((x, y))
-        is_free = grid.measured[row, col] == CellClass.FREE
-        ground = CellClass(grid.measured[row, col]).name.lower()
-        near = sorted(rooms.listed_doors, key=lambda door: math.dist(door.position, (x, y)))
-        doors = [] if name is None else self._places.doors_of(name)
-        beside = [
-            {"door": door.number, "to": other, "kind": door.kind}
-            for door in doors
-            for other in door.rooms
-            if other != name
-        ]
-        place = "no room"
-        if name is not None:
-            place = f"{self._places.kind(name)} {name}".replace("room room", "room")
-        text = f"({x:g}, {y:g}) lies in {place}" + ("" if is_free else f", on {ground} ground")
-        answer: dict[str, Any] = {
-            "text": f"{text}.",
-            "room": name,
-            "ground": ground,
-            "beside": beside[: places.SHOWN],
-        }
-        if near:
-            answer["nearest_door"] = {
-                "number": near[0].number,
-                "straight_m": round(math.dist(near[0].position, (x, y)), 2),
-            }
-        return answer
+        return self._places.where((asked.point[0], asked.point[1]))
 
     # Routes.
 
@@ -324,7 +251,10 @@ class MapAnswers:
         """Plan to candidates in order of their straight distances, until no other can be nearer."""
         start, planner = self._places.place(asked.start), self._planner(None)
         here = self._rooms.point_of(start) if isinstance(start, str) else start
-        goals = self._places.candidates(asked.of, start)
+        goals, shut = self._places.candidates(asked.of, start), self._shut([])
+        if not goals:
+            known = [name for name in self._places.listed() if name != start]
+            raise places.nothing(asked.of, "nothing", known, self._places.choices)
         goals.sort(key=lambda goal: math.dist(goal[1], here))
         best: list[tuple[float, dict[str, Any]]] = []
         others_m = math.inf
@@ -333,14 +263,14 @@ class MapAnswers:
             if len(best) >= asked.count and straight_m >= best[asked.count - 1][0]:
                 others_m = straight_m  # no path to this one or a later one is shorter
                 break
-            found = planner.draft(here, point, blocked=self._closed)
+            found = planner.draft(here, point, blocked=shut)
             if math.isfinite(found.cost):
                 bound_m = places.rounded_down(found.lower_bound)
                 lengths = {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
                 best.append((found.cost, facts | lengths))
                 best.sort(key=lambda one: one[0])
         if not best:
-            raise places.UnclearError(
+            raise ask.UnclearError(
                 f"none of {len(goals)} of {asked.of!r:.80} can be reached from there"
             )
         others_m = min([others_m, *(length for length, _ in best[asked.count :])])
@@ -367,92 +297,132 @@ class MapAnswers:
             planner, tour = self._tour(journey)
             if not tour.solved:
                 return self._no_path(planner, tour, journey, "en")
-            ax = viz.plot_tour(self._topology, tour, blocked=self._closed)
+            ax = viz.plot_tour(self._topology, tour, blocked=self._shut([]))
             text = f"A route of {tour.length_m:.2f} m."
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "picture.png"
-            viz.save_figure(ax, file, dpi=100)
-            return {"text": text, "png": file.read_bytes()}
+        return {"text": text, "png": png_of(ax)}
 
     # Changes.
 
-    def _closed_now(self) -> dict[str, Any]:
-        return {"doors": list(self._closed.doors), "rooms": list(self._closed.rooms)}
-
-    def _changed(self, closed: Blocked) -> dict[str, Any]:
-        """Take over what is closed from now on."""
-        self._before.append(self._closed)
-        return self._use(closed)
-
-    def _use(self, closed: Blocked) -> dict[str, Any]:
-        self._closed = closed
-        now = self._closed_now()
-        return {"text": f"closed now: doors {now['doors']}, rooms {now['rooms']}", "closed": now}
-
-    def _named(self, asked: ask.Close) -> tuple[list[Any], list[str]]:
-        named = self._places.blocked(asked.doors, of_doors=True) | self._places.blocked(asked.rooms)
-        if not named.doors and not named.rooms:
-            raise InvalidValueError("give doors or rooms")
-        return list(named.doors), list(named.rooms)
-
     def _close(self, asked: ask.Close) -> dict[str, Any]:
-        doors, rooms = self._named(asked)
-        now = self._closed_now()
-        return self._changed(
-            Blocked(
-                doors=list(dict.fromkeys(now["doors"] + doors)),
-                rooms=list(dict.fromkeys(now["rooms"] + rooms)),
-            )
-        )
+        return self._changes.close(self._named(asked))
 
     def _open(self, asked: ask.Open) -> dict[str, Any]:
-        doors, rooms = self._named(asked)
-        now = self._closed_now()
-        if missing := [*set(doors) - set(now["doors"]), *set(rooms) - set(now["rooms"])]:
-            raise InvalidValueError(f"not closed: {missing[0]}; closed are {now}")
-        return self._changed(
-            Blocked(
-                doors=[door for door in now["doors"] if door not in doors],
-                rooms=[room for room in now["rooms"] if room not in rooms],
-            )
-        )
+        return self._changes.open(self._named(asked))
+
+    def _named(self, asked: ask.Close) -> list[places.Thing]:
+        found = self._places.things(asked.doors, of_doors=True)
+        return found + self._places.things(asked.rooms)
 
     def _undo(self, _: ask.TakeBack) -> dict[str, Any]:
-        if not self._before:
-            raise InvalidValueError("there is nothing to take back in this session")
-        before = self._before[-1]
-        if not isinstance(before, Blocked):
-            old, new = before
-            answer = self._rename(new, old)
-            self._before.pop()
-            return answer
-        self._before.pop()
-        return self._use(before)
+        return self._changes.undo()
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
         old = self._places.meant(asked.room, list(self._rooms.names))
-        answer = self._rename(old, asked.name)
-        self._before.append((old, asked.name))
+
+        def rename(old: str, new: str) -> dict[str, Any]:
+            renamed(self._session, old, new)
+            return self._changes.renamed(old, self._places.room(new))
+
+        return self._changes.change(rename, old, asked.name)
+
+
+class Changes:
+    """What a session has closed and named, and how it takes that back; each returns an answer.
+
+    `kinds`: of things that can be closed.
+    """
+
+    def __init__(self, kinds: Sequence[str] = ("doors", "rooms")) -> None:
+        self._kinds = kinds
+        self.closed: tuple[places.Thing, ...] = ()
+        self._before: list[tuple[places.Thing, ...] | Callable[[], dict[str, Any]]] = []
+        """What undoes each change: what was closed, or what gives a room its old name."""
+
+    @property
+    def now(self) -> dict[str, list[int | str]]:
+        """What is closed, by kind."""
+        return {
+            kind: [one.shown for one in self.closed if one.kind == kind] for kind in self._kinds
+        }
+
+    def _use(self, closed: Iterable[places.Thing]) -> dict[str, Any]:
+        self.closed = tuple(dict.fromkeys(closed))
+        listed = ", ".join(f"{kind} {things}" for kind, things in self.now.items())
+        return {"text": f"closed now: {listed}"[:900], "closed": self.now}
+
+    def close(self, things: Sequence[places.Thing]) -> dict[str, Any]:
+        """Close things."""
+        if not things:
+            raise InvalidValueError(f"give {' or '.join(self._kinds)}")
+        self._before.append(self.closed)
+        return self._use((*self.closed, *things))
+
+    def open(self, things: Sequence[places.Thing]) -> dict[str, Any]:
+        """Open things that are closed."""
+        if missing := [one for one in things if one not in self.closed]:
+            shown = f"not closed: {missing[0].shown}; closed are {self.now}"
+            raise InvalidValueError(shown[:300])
+        self.close(things)
+        return self._use(one for one in self.closed if one not in things)
+
+    def undo(self) -> dict[str, Any]:
+        """Take the last change back."""
+        if not self._before:
+            raise InvalidValueError("there is nothing to take back in this session")
+        before = self._before[-1]
+        answer = before() if callable(before) else self._use(before)
+        self._before.pop()
         return answer
 
-    def _rename(self, old: str, new: str) -> dict[str, Any]:
-        session = self._session
-        change = {"op": "rename", "room": old, "name": new}
-        session.edit(Edit(version=session.version, change=change))
-        try:
-            session.save(Save(version=session.version))
-        except HybridNavError:
-            session.undo(session.version)
-            raise
+    def change(
+        self, rename: Callable[[str, str], dict[str, Any]], old: str, new: str
+    ) -> dict[str, Any]:
+        """Rename a room."""
+        answer = rename(old, new)
+        self._before.append(lambda: rename(new, old))
+        return answer
 
-        def renamed(closed: Blocked) -> Blocked:
-            rooms = [new if one == old else one for one in closed.rooms]
-            return Blocked(doors=closed.doors, rooms=rooms)
+    def renamed(
+        self, old: str, room: dict[str, Any], floors: Collection[str | None] = (None,)
+    ) -> dict[str, Any]:
+        """Call a room of some floors by its new name wherever it is closed."""
 
-        self._closed = renamed(self._closed)
-        self._before = [renamed(one) if isinstance(one, Blocked) else one for one in self._before]
-        return {"text": f"room {old} is called {new} now, saved.", "room": self._places.room(new)}
+        def now(things: tuple[places.Thing, ...]) -> tuple[places.Thing, ...]:
+            was = {places.Thing("rooms", old, floor) for floor in floors}
+            return tuple(one._replace(which=room["name"]) if one in was else one for one in things)
+
+        self.closed = now(self.closed)
+        self._before = [one if callable(one) else now(one) for one in self._before]
+        return {"text": f"room {old} is called {room['name']} now, saved.", "room": room}
 
 
-def _refused(text: str) -> dict[str, Any]:
-    return {"ok": False, "text": text}
+# What one map and a building both do.
+
+
+def rooms_answer(found: Sequence[dict[str, Any]], asked: ask.ListRooms) -> dict[str, Any]:
+    """Return the part of a list of rooms that is asked for."""
+    shown = found[asked.first : asked.first + asked.count]
+    rest = len(found) - asked.first - len(shown)
+    text = f"{len(found)} rooms" + (f", {rest} more after these" if rest > 0 else "")
+    return {"text": text, "total": len(found), "rooms": shown}
+
+
+def png_of(ax: Any) -> bytes:
+    """Return the picture of the figure of some axes."""
+    from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "picture.png"
+        viz.save_figure(ax, file, dpi=100)
+        return file.read_bytes()
+
+
+def renamed(session: Session, old: str, new: str) -> None:
+    """Give a room another name, and save it, or leave all as it was."""
+    change = {"op": "rename", "room": old, "name": new}
+    session.edit(Edit(version=session.version, change=change))
+    try:
+        session.save(Save(version=session.version))
+    except HybridNavError:
+        session.undo(session.version)
+        raise

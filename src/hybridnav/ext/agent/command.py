@@ -5,25 +5,24 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._base.files import printable
 from hybridnav._version import __version__
 from hybridnav.cli import options
-from hybridnav.cli.common import UsageError
 from hybridnav.cli.reading import MapOptions, with_map
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet.command import is_building_file
-from hybridnav.ext.page.command import EditsOption, MapPage
+from hybridnav.ext.page.command import BuildingPage, EditsOption, MapPage
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from hybridnav.ext.agent.answers import MapAnswers
+    from hybridnav.ext.agent.building import BuildingAnswers
 
 
-@with_map()
+@with_map(over_floors=lambda: _serve_over_floors)
 def serve(
-    map_file: options.MapArgument[Path],
+    map_file: options.MapOrBuildingArgument,
     rooms_file: options.RoomsOption = None,
     allow_edits: EditsOption = False,
     *,
@@ -32,15 +31,9 @@ def serve(
     """Serve MAP as tools of the Model Context Protocol on standard input and output.
 
     Programs ask for rooms, routes and reasons, and get small answers with proofs. Nothing is
-    changed unless --allow-edits is given. The page of `hybridnav view` gives the same calls as
-    JSON over HTTP. Ends with its input.
+    changed unless --allow-edits is given. MAP may be a building, whose floors answer together. The
+    page of `hybridnav view` gives the same calls as JSON over HTTP. Ends with its input.
     """
-    if is_building_file(map_file):
-        file = printable(map_file)
-        raise UsageError(
-            f"{file} is a building, serve answers on one map: give the map of a floor, or ask for "
-            f"routes over floors with hybridnav plan {file} --json"
-        )
     check_protocol()
     page = MapPage.read(map_file, rooms_file, options.parsed_costs(None), reading)
     # Loads numba, which help and wrong usage can do without.
@@ -50,10 +43,20 @@ def serve(
     serve_stdio(MapAnswers(site.sessions[0], allow_edits=allow_edits))
 
 
+def _serve_over_floors(*, map_file: Path, allow_edits: bool, reading: MapOptions) -> None:
+    """Serve a building; see `serve`."""
+    check_protocol()
+    # Loads numba, which help and wrong usage can do without.
+    from hybridnav.ext.agent.building import BuildingAnswers  # noqa: PLC0415
+
+    site = BuildingPage(map_file, reading).make(lambda _: None)
+    serve_stdio(BuildingAnswers(site, allow_edits=allow_edits))
+
+
 # The Model Context Protocol, by standard input and output.
 
 
-def serve_stdio(answers: MapAnswers) -> None:
+def serve_stdio(answers: MapAnswers | BuildingAnswers) -> None:
     """Answer a client of the Model Context Protocol on standard input and output, until it ends.
 
     Parameters
@@ -86,12 +89,12 @@ def check_protocol() -> None:
         ) from None
 
 
-async def _serve(answers: MapAnswers) -> None:
+async def _serve(answers: MapAnswers | BuildingAnswers) -> None:
     from mcp import types  # noqa: PLC0415 - an extra
     from mcp.server.lowlevel import Server  # noqa: PLC0415
     from mcp.server.stdio import stdio_server  # noqa: PLC0415
 
-    from hybridnav.ext.agent.questions import INSTRUCTIONS, answered, schema_of, tools  # noqa: PLC0415
+    from hybridnav.ext.agent.questions import answered, schema_of  # noqa: PLC0415
 
     listed = [
         types.Tool(
@@ -101,7 +104,7 @@ async def _serve(answers: MapAnswers) -> None:
             outputSchema=tool.gives.model_json_schema(),
             annotations=types.ToolAnnotations(readOnlyHint=not tool.edits),
         )
-        for tool in tools(allow_edits=answers.allow_edits)
+        for tool in answers.tools
     ]
 
     async def list_tools(_: Any, __: Any) -> types.ListToolsResult:
@@ -125,7 +128,7 @@ async def _serve(answers: MapAnswers) -> None:
     server: Server[Any] = Server(
         "hybridnav",
         version=__version__,
-        instructions=INSTRUCTIONS,
+        instructions=answers.instructions,
         on_list_tools=list_tools,
         on_call_tool=call_tool,
     )

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.page.session import Session
 
 _UNPROCESSABLE, _NOT_YET = 422, 503
+_INSTRUCTIONS = INSTRUCTIONS.format(point="[x, y]")
 
 
 class HttpTools:
@@ -106,7 +107,7 @@ def description(*, allow_edits: bool = False) -> dict[str, Any]:
         }
         for tool in tools(allow_edits=allow_edits)
     }
-    info = {"title": "hybridnav", "version": __version__, "description": INSTRUCTIONS}
+    info = {"title": "hybridnav", "version": __version__, "description": _INSTRUCTIONS}
     return {"openapi": "3.1.0", "info": info, "paths": paths}
 
 

@@ -6,19 +6,21 @@ import itertools
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from hybridnav.errors import HybridNavError
+from hybridnav.errors import InvalidValueError
+from hybridnav.ext.agent.questions import UnclearError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key, nearest
 from hybridnav.planner import Blocked, Explanation, HybridPlanner
 from hybridnav.planner.profile import rebuilt
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
+    from hybridnav.ext.agent.questions import ListRooms
     from hybridnav.topology.rooms import Door, Rooms
 
 Point = tuple[float, float]
@@ -38,12 +40,32 @@ SHOWN = 10
 """Choices, doors and neighbours of an answer."""
 
 
-class UnclearError(HybridNavError):
-    """A name that means nothing, or several things."""
+class Thing(NamedTuple):
+    """A thing that is closed."""
 
-    def __init__(self, text: str, choices: Iterable[dict[str, Any]] = ()) -> None:
-        super().__init__(text)
-        self.choices = list(choices)
+    kind: str
+    """`doors`, `rooms` or `links`."""
+    which: int | str
+    """The number of a door, or a name."""
+    floor: str | None = None
+    """Its floor; None on one map, and for a link that is closed on all floors."""
+
+    @property
+    def shown(self) -> int | str:
+        """What an answer calls it."""
+        if self.kind == "links":
+            return str(self.which) if self.floor is None else f"{self.which}@{self.floor}"
+        if self.floor is None:
+            return self.which
+        return f"floor {self.floor}, {'door ' if self.kind == 'doors' else ''}{self.which}"
+
+
+def blocked_of(things: Iterable[Thing]) -> Blocked:
+    """Return doors and rooms as planners close them."""
+    by: dict[str, dict[Any, None]] = {"doors": {}, "rooms": {}}
+    for one in things:
+        by[one.kind][one.which] = None
+    return Blocked(doors=list(by["doors"]), rooms=list(by["rooms"]))
 
 
 class NamedPlaces:
@@ -57,6 +79,11 @@ class NamedPlaces:
         rooms = self.rooms
         names = [name for name, on in zip(rooms.names, rooms.is_listed, strict=True) if on]
         return sorted(names, key=natural_key)
+
+    def names(self, *, points: bool = False) -> list[str]:
+        """Return the names of all rooms, with `points` of named points too."""
+        labels = self.rooms.labels
+        return list(dict.fromkeys((*labels.names, *(labels.points if points else ()))))
 
     def kind(self, name: str) -> str:
         """Return what a room is: `room`, `corridor` or `hall`."""
@@ -78,66 +105,96 @@ class NamedPlaces:
             "doors": [door.number for door in self.doors_of(name)][:SHOWN],
         }
 
-    def meant(self, name: str, known: list[str]) -> str:
-        """Return the one name that a text means.
+    def facts(self) -> dict[str, Any]:
+        """Return what describes the map: its size, and what there is."""
+        grid, kinds = self.rooms.grid, [self.kind(one) for one in self.listed()]
+        rows, cols = grid.shape
+        size = [round(cols * grid.resolution_m, 2), round(rows * grid.resolution_m, 2)]
+        free_m2 = float((grid.measured == CellClass.FREE).sum() * grid.cell_area_m2)
+        return {
+            "size_m": size,
+            "corners": grid.frame.points_of_grid(np.array([[0, 0], [rows, cols]]))
+            .round(2)
+            .tolist(),
+            "free_m2": round(free_m2, 1),
+            "rooms": {kind: kinds.count(kind) for kind in ("room", "corridor", "hall")},
+            "doors": len(self.rooms.listed_doors),
+        }
 
-        Raises `UnclearError` when it means none, or several.
-        """
-        if name in known:
-            return name
-        wanted = folded(name).split()
-        while len(wanted) > 1 and wanted[0] in _ARTICLES:
-            wanted = wanted[1:]
-        text = " ".join(wanted)
-        found = [known[at] for at in matching(text, known)]
-        plain = _SIGNS.sub(" ", text).strip()
-        alike = [one for one in known if _SIGNS.sub(" ", folded(one)).strip() == plain]
-        found = alike or found
-        if len(found) == 1:
-            return found[0]
-        if not found:
-            raise self._nothing(name, "no room", known)
-        raise UnclearError(
-            f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
-            self._choices(found[:SHOWN]),
+    def asked(self, asked: ListRooms) -> list[dict[str, Any]]:
+        """Return the rooms of a kind, or by a part of the name."""
+        names = [one for one in self.listed() if asked.kind in {None, self.kind(one)}]
+        if asked.name.strip():
+            names = [names[at] for at in matching(asked.name, names)]
+        return [self.room(name) for name in names]
+
+    def where(self, point: Point) -> dict[str, Any]:
+        """Return the room of a point, what lies beside it, and the nearest door."""
+        rooms, grid, (x, y) = self.rooms, self.rooms.grid, point
+        row, col = grid.frame.cell_of(x, y)
+        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+            raise InvalidValueError("the point lies outside the map: describe_map has its corners")
+        name, ground = rooms.at(point), CellClass(grid.measured[row, col])
+        place = "no room"
+        if name is not None:
+            place = f"{self.kind(name)} {name}".replace("room room", "room")
+        text = f"({x:g}, {y:g}) lies in {place}"
+        if ground != CellClass.FREE:
+            text += f", on {ground.name.lower()} ground"
+        beside = [
+            {"door": door.number, "to": other, "kind": door.kind}
+            for door in ([] if name is None else self.doors_of(name))
+            for other in door.rooms
+            if other != name
+        ]
+        answer: dict[str, Any] = {
+            "text": f"{text}.",
+            "room": name,
+            "ground": ground.name.lower(),
+            "beside": beside[:SHOWN],
+        }
+        near = min(
+            rooms.listed_doors, key=lambda door: math.dist(door.position, point), default=None
         )
+        if near is not None:
+            straight_m = round(math.dist(near.position, point), 2)
+            answer["nearest_door"] = {"number": near.number, "straight_m": straight_m}
+        return answer
 
-    def _choices(self, names: Iterable[str]) -> list[dict[str, Any]]:
+    def meant(self, name: str, known: list[str]) -> str:
+        """Return the one name that a text means; see `meant`."""
+        return meant(name, known, self.choices)
+
+    def choices(self, names: Iterable[str]) -> list[dict[str, Any]]:
+        """Return what an answer shows of names to choose from."""
         listed = self.rooms.names
         return [self.room(one) if one in listed else {"name": one} for one in names]
-
-    def _nothing(self, name: str, what: str, known: Iterable[str]) -> UnclearError:
-        """Return the refusal of a name that means nothing, with the names that are like it."""
-        names = tuple(known)
-        text = f"{what} is called {name!r:.80}{did_you_mean(name, names)}"
-        return UnclearError(text, self._choices(nearest(name, names)))
 
     def place(self, place: str | list[float]) -> str | tuple[float, float]:
         """Return a place as planners take it."""
         if not isinstance(place, str):
             return place[0], place[1]
-        labels = self.rooms.labels
-        return self.meant(place, list(dict.fromkeys((*labels.names, *labels.points))))
+        return self.meant(place, self.names(points=True))
 
-    def blocked(self, things: list[int | str], *, of_doors: bool = False) -> Blocked:
+    def things(self, things: list[int | str], *, of_doors: bool = False) -> list[Thing]:
         """Return what a list names: doors by number or as "door 12", rooms by name.
 
         `of_doors`: whether "12" is a door too.
         """
-        doors, rooms = [], []
+        found = []
         for thing in things:
-            text = str(thing).strip()
-            number = _DOOR.fullmatch(text)
-            if number or isinstance(thing, int) or (of_doors and text.isdecimal()):
-                doors.append(self.rooms.listed_door(int(number[1] if number else text)).number)
+            number = door_of(thing, of_doors=of_doors)
+            if number is not None:
+                found.append(Thing("doors", self.rooms.listed_door(number).number))
             else:
-                rooms.append(self.meant(text, list(self.rooms.names)))
-        return Blocked(doors=doors, rooms=rooms)
+                found.append(Thing("rooms", self.meant(str(thing).strip(), list(self.rooms.names))))
+        return found
 
     def candidates(
         self, of: str, start: str | tuple[float, float]
     ) -> list[tuple[dict[str, Any], tuple[float, float]]]:
-        """Return rooms or doors of a kind or name, each with a point to go to."""
+        """Return rooms or doors of a kind or name, each with a point to go to; none for no such
+        thing."""
         rooms, word = self.rooms, folded(of).strip()
         kind = next((one for one, words in _KINDS.items() if word in words), None)
         if kind == "door":
@@ -150,8 +207,6 @@ class NamedPlaces:
         found = [name for name in names if self.kind(name) == kind]
         # A map without halls may have a room called "hall 3".
         found = found or [names[at] for at in matching(kind or of, names)]
-        if not found:
-            raise self._nothing(of, "nothing", names)
         return [(self.room(name), rooms.point_of(name)) for name in found]
 
     def _beside(self, door: Door) -> tuple[float, float]:
@@ -162,6 +217,53 @@ class NamedPlaces:
         points = grid.frame.points_of(cells)
         x, y = points[np.hypot(*(points - door.position).T).argmin()].tolist()
         return x, y
+
+
+def door_of(thing: int | str, *, of_doors: bool = False) -> int | None:
+    """Return the number of a door that is named, None for another thing.
+
+    `of_doors`: whether "12" is a door too.
+    """
+    text = str(thing).strip()
+    number = _DOOR.fullmatch(text)
+    is_number = isinstance(thing, int) or (of_doors and text.isascii() and text.isdecimal())
+    return int(number[1]) if number else int(text) if is_number else None
+
+
+Choices: TypeAlias = "Callable[[Iterable[str]], list[dict[str, Any]]]"
+"""Returns what an answer shows of names to choose from."""
+
+
+def meant(name: str, known: Sequence[str], choices: Choices) -> str:
+    """Return the one name that a text means.
+
+    Raises `UnclearError` when it means none, or several.
+    """
+    if name in known:
+        return name
+    wanted = folded(name).split()
+    while len(wanted) > 1 and wanted[0] in _ARTICLES:
+        wanted = wanted[1:]
+    text = " ".join(wanted)
+    found = [known[at] for at in matching(text, known)]
+    plain = _SIGNS.sub(" ", text).strip()
+    alike = [one for one in known if _SIGNS.sub(" ", folded(one)).strip() == plain]
+    found = alike or found
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise nothing(name, "no room", known, choices)
+    raise UnclearError(
+        f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
+        choices(found[:SHOWN]),
+    )
+
+
+def nothing(name: str, what: str, known: Iterable[str], choices: Choices) -> UnclearError:
+    """Return the refusal of a name that means nothing, with the names that are like it."""
+    names = tuple(known)
+    text = f"{what} is called {name!r:.80}{did_you_mean(name, names)}"
+    return UnclearError(text, choices(nearest(name, names)))
 
 
 def rounded(point: tuple[float, ...] | None) -> list[float] | None:

@@ -17,11 +17,11 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from hybridnav.errors import brief
+from hybridnav.errors import HybridNavError, InvalidValueError, brief
 from hybridnav.maps.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 
 # Language models send lists as their JSON text, one thing for a list of one, and true for a number.
@@ -37,7 +37,8 @@ def _decoded(value: object) -> Any:
     return value
 
 
-def _as_list(value: object) -> Any:
+def as_list(value: object) -> Any:
+    """Return a list of one for one thing, and the list that a text is the JSON of."""
     value = _decoded(value)
     return [value] if isinstance(value, str) or type(value) is int else value
 
@@ -48,7 +49,7 @@ def _no_truth(value: object) -> Any:
     return value
 
 
-def _said(expected: str) -> WrapValidator:
+def said(expected: str) -> WrapValidator:
     """Return a validator that decodes lists, and states in words what it expects."""
 
     def checked(value: object, check: Callable[[Any], Any]) -> Any:
@@ -60,59 +61,61 @@ def _said(expected: str) -> WrapValidator:
     return WrapValidator(checked)
 
 
-_NUMBER = BeforeValidator(_no_truth)
+NUMBER = BeforeValidator(_no_truth)
 _FAR_M = 1e6
-_Metres = Annotated[float, _NUMBER, Field(ge=-_FAR_M, le=_FAR_M, allow_inf_nan=False)]
-_Pair = Annotated[list[_Metres], Field(min_length=2, max_length=2, description="x, y in metres")]
-Point = Annotated[_Pair, _said("a point is [x, y], two numbers in metres")]
+Metres = Annotated[float, NUMBER, Field(ge=-_FAR_M, le=_FAR_M, allow_inf_nan=False)]
+_Pair = Annotated[list[Metres], Field(min_length=2, max_length=2, description="x, y in metres")]
+Point = Annotated[_Pair, said("a point is [x, y], two numbers in metres")]
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 Place = Annotated[
     Text | _Pair,
-    _said("a place is a name, or a point [x, y] of two numbers"),
+    said("a place is a name, or a point [x, y] of two numbers"),
     Field(description="a room, a named point, or x, y in metres"),
 ]
 Width = Annotated[
     float,
-    _NUMBER,
+    NUMBER,
     Field(gt=0, le=100, description="width in metres of who goes; the map's robot if null"),
 ]
-_Things = Annotated[
-    list[Annotated[int, _NUMBER, Field(ge=1, strict=True)] | Text],
-    BeforeValidator(_as_list),
+Things = Annotated[
+    list[Annotated[int, NUMBER, Field(ge=1, strict=True)] | Text],
+    BeforeValidator(as_list),
     Field(max_length=1000),
 ]
-Doors = Annotated[_Things, Field(description='doors by number or as "door 12"')]
+Doors = Annotated[Things, Field(description='doors by number or as "door 12"')]
 Avoiding = Annotated[
-    _Things, Field(max_length=100, description='rooms by name, doors as "door 12" or by number')
+    Things, Field(max_length=100, description='rooms by name, doors as "door 12" or by number')
 ]
 Language = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}$")]
 
 
-class _Strict(BaseModel):
+class Asked(BaseModel):
+    """Arguments of a call, none but these."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class DescribeMap(_Strict):
+class DescribeMap(Asked):
     """What the map is: its size, rooms, doors, the robot, and what is closed now."""
 
 
-class ListRooms(_Strict):
+class ListRooms(Asked):
     """The rooms, in natural order, with kind, area, a point in each, and doors."""
 
     kind: Literal["room", "corridor", "hall"] | None = None
     name: Annotated[str, StringConstraints(max_length=200)] = ""
     """Part of a name, in any case."""
-    first: Annotated[int, _NUMBER, Field(ge=0, le=100_000)] = 0
-    count: Annotated[int, _NUMBER, Field(ge=1, le=200)] = 10
+    first: Annotated[int, NUMBER, Field(ge=0, le=100_000)] = 0
+    count: Annotated[int, NUMBER, Field(ge=1, le=200)] = 10
 
 
-class WhereAmI(_Strict):
+class WhereAmI(Asked):
     """The room of a point, what lies next to it, and the nearest door."""
 
     point: Point
 
 
-class Journey(_Strict):
+class Journey(Asked):
     """Two places, and how one goes."""
 
     start: Place
@@ -121,17 +124,22 @@ class Journey(_Strict):
     width: Width | None = None
 
 
-class RouteBetween(Journey):
-    """The shortest path between two places, with a proof, the rooms and doors passed, and words."""
+class Route(Journey):
+    """A route, and what is wanted of it."""
 
     words: bool = True
-    words_from: Annotated[int, _NUMBER, Field(ge=0, le=10_000)] = 0
+    words_from: Annotated[int, NUMBER, Field(ge=0, le=10_000)] = 0
     """Lines to leave out, for the rest of a long description."""
     points: bool = False
     """Whether the points of the path are wanted too, at most 200."""
-    within: Annotated[float, _NUMBER, Field(ge=0, le=_FAR_M)] | None = None
-    """Metres from the goal at which a path may end, if the goal cannot be reached."""
     language: Language = "en"
+
+
+class RouteBetween(Route):
+    """The shortest path between two places, with a proof, the rooms and doors passed, and words."""
+
+    within: Annotated[float, NUMBER, Field(ge=0, le=_FAR_M)] | None = None
+    """Metres from the goal at which a path may end, if the goal cannot be reached."""
 
 
 class CanReach(Journey):
@@ -145,38 +153,38 @@ class Explain(Journey):
     language: Language = "en"
 
 
-class Nearest(_Strict):
+class Nearest(Asked):
     """The nearest rooms or doors by the way one goes, not by the crow."""
 
     of: Text
     """`rooms`, `doors`, `corridors`, `halls`, or part of a name."""
     start: Place
-    count: Annotated[int, _NUMBER, Field(ge=1, le=5)] = 1
+    count: Annotated[int, NUMBER, Field(ge=1, le=5)] = 1
 
 
-class Close(_Strict):
+class Close(Asked):
     """Close doors or rooms for this session; `undo` takes it back."""
 
     doors: Doors = []
-    rooms: Annotated[_Things, Field(description="rooms by name")] = []
+    rooms: Annotated[Things, Field(description="rooms by name")] = []
 
 
 class Open(Close):
     """Open doors or rooms that are closed in this session."""
 
 
-class TakeBack(_Strict):
+class TakeBack(Asked):
     """Take back the last `close`, `open` or `name_room` of this session."""
 
 
-class NameRoom(_Strict):
+class NameRoom(Asked):
     """Give a room a name, and save it in the rooms file of the map."""
 
     room: Text
     name: Text
 
 
-class Picture(_Strict):
+class Picture(Asked):
     """A picture (PNG) of the map with its rooms, or of a route."""
 
     start: Place | None = None
@@ -202,6 +210,7 @@ class Room(BaseModel):
     """A room in a list."""
 
     name: str
+    floor: str | None = None
     kind: Literal["room", "corridor", "hall"]
     area_m2: float
     point: list[float]
@@ -210,10 +219,11 @@ class Room(BaseModel):
 
 
 class ClosedNow(BaseModel):
-    """What is closed in this session."""
+    """What is closed in this session; in a building doors and rooms with their floor."""
 
-    doors: list[int]
+    doors: list[int | str]
     rooms: list[str]
+    links: list[str] | None = None
 
 
 class Tight(BaseModel):
@@ -243,7 +253,10 @@ class Near(BaseModel):
 
     length_m: float
     lower_bound_m: float
-    """No path to it is shorter."""
+    """No path to it is shorter, or in a building cheaper."""
+    cost_m: float | None = None
+    """In a building: the length, and what rides are charged."""
+    floor: str | None = None
     name: str | None = None
     kind: str | None = None
     area_m2: float | None = None
@@ -251,6 +264,35 @@ class Near(BaseModel):
     doors: list[int] | None = None
     number: int | None = None
     rooms: list[str | None] | None = None
+
+
+class Facts(BaseModel):
+    """What describes a floor."""
+
+    floor: str
+    size_m: list[float]
+    corners: list[list[float]]
+    free_m2: float
+    rooms: dict[str, int]
+    doors: int
+
+
+class Link(BaseModel):
+    """A lift, stairs or a ramp, and the floors where it stops."""
+
+    name: str
+    kind: str
+    floors: list[str]
+
+
+class Part(BaseModel):
+    """The way on one floor, and the ride that it ends with."""
+
+    floor: str
+    length_m: float
+    rooms: list[str]
+    doors: list[int]
+    ride: dict[str, str | float] | None = None
 
 
 class MapAnswer(Answer):
@@ -263,6 +305,9 @@ class MapAnswer(Answer):
     rooms: dict[str, int] | None = None
     doors: int | None = None
     robot_radius_m: float | None = None
+    floors: list[Facts] | None = None
+    """The floors of a building, from the lowest, in place of the figures of a map."""
+    links: list[Link] | None = None
     closed: ClosedNow | None = None
     edits_allowed: bool | None = None
 
@@ -278,6 +323,7 @@ class PlaceAnswer(Answer):
     """The answer of `where_am_i`."""
 
     room: str | None = None
+    floor: str | None = None
     ground: Literal["free", "occupied", "unexplored"] | None = None
     beside: list[Beside] | None = None
     nearest_door: NearDoor | None = None
@@ -289,6 +335,8 @@ class WhyAnswer(Answer):
     status: str | None = None
     reason: list[str] | None = None
     doors_to_open: list[int] | None = None
+    to_open: list[str] | None = None
+    """In a building: what has to open for a route, all of it, as `open` takes it."""
     widest_m: float | None = None
     tight: Tight | None = None
     has_path: bool | None = None
@@ -300,8 +348,13 @@ class RouteAnswer(WhyAnswer):
 
     length_m: float | None = None
     lower_bound_m: float | None = None
-    """No path is shorter."""
+    """No path is shorter, or in a building cheaper."""
     gap: float | None = None
+    cost_m: float | None = None
+    """In a building: the length, and what rides are charged."""
+    travel_s: float | None = None
+    parts: list[Part] | None = None
+    """In a building: the way on each floor, in order."""
     short_m: float | None = None
     """Metres from the end of the path to the goal, if it cannot be reached."""
     start: list[float] | None = None
@@ -311,7 +364,7 @@ class RouteAnswer(WhyAnswer):
     words: list[str] | None = None
     words_left: int | None = None
     """Lines after these: ask with `words_from`."""
-    points: list[list[float]] | None = None
+    points: list[list[float | str]] | None = None
 
 
 class ReachAnswer(WhyAnswer):
@@ -319,6 +372,7 @@ class ReachAnswer(WhyAnswer):
 
     can_reach: bool | None = None
     length_m: float | None = None
+    cost_m: float | None = None
 
 
 class NearestAnswer(Answer):
@@ -383,9 +437,50 @@ LIMIT_S = 30.0
 """Seconds after which a call is answered with an error."""
 INSTRUCTIONS = (
     "A map of a building for robots and people: rooms, doors, and shortest paths with a proof. "
-    "Places are names of rooms or points [x, y] in metres. Begin with describe_map and list_rooms. "
-    "An answer with ok=false says in `text` what to do, and in `choices` what a name may mean."
+    "Places are names of rooms or points {point} in metres. Begin with describe_map and "
+    "list_rooms. An answer with ok=false says in `text` what to do, and in `choices` what a name "
+    "may mean."
 )
+"""What a client reads first, with the form of a point."""
+
+
+class UnclearError(HybridNavError):
+    """A name that means nothing, or several things."""
+
+    def __init__(self, text: str, choices: Iterable[dict[str, Any]] = ()) -> None:
+        super().__init__(text)
+        self.choices = list(choices)
+
+
+def answer_of(
+    functions: Mapping[Tool, Callable[[Any], dict[str, Any]]],
+    name: str,
+    arguments: dict[str, Any],
+    *,
+    allow_edits: bool,
+) -> dict[str, Any]:
+    """Answer a call by one of some functions, or say what to ask instead."""
+    tool = next((one for one in functions if one.name == name), None)
+    try:
+        if tool is None:
+            names = tuple(one.name for one in tools(functions, allow_edits=allow_edits))
+            raise InvalidValueError(f"no function {name!r:.80}{did_you_mean(name, names)}")
+        if tool.edits and not allow_edits:
+            raise InvalidValueError(
+                f"{name} changes what others see: start the server with --allow-edits"
+            )
+        return {"ok": True, **functions[tool](tool.asks.model_validate(arguments))}
+    except ValidationError as error:
+        assert tool is not None  # noqa: S101 - its model has refused
+        return _refused(mistake(error, tuple(tool.asks.model_fields))[:300])
+    except UnclearError as error:
+        return _refused(str(error)) | {"choices": error.choices}
+    except HybridNavError as error:
+        return _refused(str(error))
+
+
+def _refused(text: str) -> dict[str, Any]:
+    return {"ok": False, "text": text}
 
 
 async def answered(
@@ -398,9 +493,9 @@ async def answered(
         return {"ok": False, "text": f"no answer within {LIMIT_S:g} s: ask again, and for less"}
 
 
-def tools(*, allow_edits: bool) -> tuple[Tool, ...]:
+def tools(known: Iterable[Tool] = TOOLS, *, allow_edits: bool) -> tuple[Tool, ...]:
     """Return the functions that a client may call."""
-    return tuple(tool for tool in TOOLS if allow_edits or not tool.edits)
+    return tuple(tool for tool in known if allow_edits or not tool.edits)
 
 
 def mistake(error: ValidationError, known: Sequence[str]) -> str:

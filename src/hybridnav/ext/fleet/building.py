@@ -246,6 +246,29 @@ class Building:
         asked = _Asked(blocked or {}, closed_links, stairs, at)
         return self._under_profile(start, goal, asked, profile, (count, max_stretch))
 
+    def least_m(
+        self,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
+        *,
+        blocked: Mapping[str, Closable] | None = None,
+        closed_links: Collection[str] = (),
+    ) -> float:
+        """Return a bound on the cost of a route without planning one, by straight lines and links.
+
+        Parameters
+        ----------
+        start, goal, blocked, closed_links
+            As in `plan`.
+
+        Returns
+        -------
+        float
+            Metres that no route costs less than; infinite where no links join the floors.
+        """
+        asked = self._in_order(_Asked(blocked or {}, closed_links, stairs=True, at="anywhere"))
+        return self._search(start, goal, asked)[0].bound()
+
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures of all planners, and the costs between the ends of links, now.
 
@@ -371,8 +394,11 @@ class Building:
             return on
 
         opening = why.to_open(shut, is_solved), shut_on(asked.blocked), shut_on({})
-        given = why.reasons(found[0], endpoints, self.floors, network, opening)
-        return replace(found, found=tuple(replace(plan, reasons=given) for plan in found))
+        of: dict[str, Any] = {
+            "reasons": why.reasons(found[0], endpoints, self.floors, network, opening),
+            "to_open": tuple(one.named("en") for one in opening[0]),
+        }
+        return replace(found, found=tuple(replace(plan, **of) for plan in found))
 
     def _under(self, profile: Profile) -> Building:
         """Return the building under a profile, made anew where a map or costs have changed."""
@@ -427,22 +453,30 @@ class Building:
     ) -> BuildingAlternatives:
         """Plan as many routes as are wanted; again where a map changes meanwhile."""
         began = time.perf_counter()
-        network = self._network(asked.closed_links, asked.stairs)
-        answers = Answers(self.floors, network, self.speed_m_s)
+        answers = Answers(
+            self.floors, self._network(asked.closed_links, asked.stairs), self.speed_m_s
+        )
         while True:
-            tables = self._current()
-            endpoints = (
-                checks.endpoint_of("start", start, self.floors),
-                checks.endpoint_of("goal", goal, self.floors),
-            )
-            closed = self._closed(asked.blocked, endpoints, network)
-            search = LinkSearch(network, tables, endpoints, closed, asked.at)
+            search, tables, endpoints, closed = self._search(start, goal, asked)
             found = answers.found(search, endpoints, limits, began)
             if not found[0].solved:
                 refused = checks.refusal_of(endpoints, self.floors, closed)
                 found = found if refused is None else (answers.refused(refused, endpoints),)
             if all(table.is_current for table in tables):
                 return BuildingAlternatives.of(found, limits, complete=search.is_complete)
+
+    def _search(
+        self, start: FloorWaypoint, goal: FloorWaypoint, asked: _Asked
+    ) -> tuple[LinkSearch, list[FloorTable], tuple[Endpoint, Endpoint], dict[int, ClosedCells]]:
+        """Return the search of a query, and what it is made of."""
+        network, tables = self._network(asked.closed_links, asked.stairs), self._current()
+        endpoints = (
+            checks.endpoint_of("start", start, self.floors),
+            checks.endpoint_of("goal", goal, self.floors),
+        )
+        closed = self._closed(asked.blocked, endpoints, network)
+        search = LinkSearch(network, tables, endpoints, closed, asked.at)
+        return search, tables, endpoints, closed
 
     def _closed(
         self,
@@ -483,3 +517,46 @@ class Building:
             position_m = self._tables[end.floor].positions_m[end.at]
             links[end.link].append((end.floor, position_m))
         return closed, self._privacy.blocked(ends, closed, links)
+
+
+def legs_of(
+    building: Building, stops: Sequence[FloorWaypoint], how: Mapping[str, Any]
+) -> list[BuildingPlan]:
+    """Plan from each stop to the next, up to a leg without a route; `how` are conditions as `plan`
+    takes them. A leg begins where the one before it ended, also in a named room."""
+    legs: list[BuildingPlan] = []
+    start = stops[0]
+    for goal in stops[1:]:
+        legs.append(building.plan(start, goal, **how))
+        if not legs[-1].solved:
+            break
+        path = legs[-1].results[-1].path
+        assert path is not None  # noqa: S101 - it is solved
+        x, y = path.points[-1][:2].tolist()
+        start = legs[-1].goal[0], (x, y)
+    return legs
+
+
+def tightest(
+    building: Building,
+    legs: Sequence[BuildingPlan],
+    blocked: Mapping[str, Blocked],
+    language: str,
+    *,
+    radius_m: float | None = None,
+) -> list[str]:
+    """Return, for each floor of a route, the widest robot that could go, and the tightest place.
+
+    `blocked`: what the query closes on floors; `radius_m`: of who goes, None for the robot.
+    """
+    journal, lines = building.journal, []
+    for leg in legs:
+        for name, result in zip(leg.floors, leg.results, strict=True):
+            assert result.path is not None  # noqa: S101 - it is solved
+            ends = result.path.points[0][:2], result.path.points[-1][:2]
+            shut = blocked.get(name, Blocked())
+            shut |= Blocked() if journal is None else journal.closures(name)
+            planner = building.floor(name).planner
+            found = planner.explain(*ends, blocked=shut, radius_m=radius_m)
+            lines += [why.on_floor(name, line, language) for line in found.words(language)]
+    return list(dict.fromkeys(lines))  # a tour passes a place again

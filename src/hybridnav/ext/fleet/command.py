@@ -73,6 +73,9 @@ def plan_over_floors(
     reading: MapOptions,
 ) -> None:
     """Plan a route over floors, print the answer, and draw it; see `hybridnav plan`."""
+    # They load numpy, which help can do without.
+    from hybridnav.ext.fleet.building import legs_of, tightest  # noqa: PLC0415
+
     common.check_picture(plot)
     how: dict[str, Any] = {"stairs": not no_stairs, "at": checked_at(at), "profile": profile}
     check_language(language)
@@ -92,7 +95,7 @@ def plan_over_floors(
     others: BuildingAlternatives | None = None
     with common.stage("planning", {}, "plan"):
         if alternatives == 1:
-            plans: Sequence[hn.ext.fleet.BuildingPlan] = _legs(building, waypoints, how)
+            plans: Sequence[hn.ext.fleet.BuildingPlan] = legs_of(building, waypoints, how)
         else:
             how["max_stretch"] = 2.0 if max_stretch is None else max_stretch
             plans = others = building.alternatives(waypoints[0], waypoints[1], alternatives, **how)
@@ -106,9 +109,9 @@ def plan_over_floors(
         "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
     }
     if not legs[-1].solved:
-        figures["why"] = {"words": list(legs[-1].reasons.get(language, ()))}
+        figures["why"] |= {"words": list(legs[-1].reasons.get(language, ()))}
     elif why:
-        figures["why"] = {"words": _tightest(building, legs, how["blocked"], language)}
+        figures["why"] = {"words": tightest(building, legs, how["blocked"], language)}
     if profile is not None:
         asks = next(one.described for one in building.profiles if one.name == profile)
         figures["asks"] = asks
@@ -130,25 +133,6 @@ def plan_over_floors(
         save_figure(plot_building(building, plans)[0], plot)
     if not legs[-1].solved:
         raise typer.Exit(common.EXIT_NOT_SOLVED)
-
-
-def _legs(
-    building: hn.ext.fleet.Building, waypoints: Sequence[Any], how: dict[str, Any]
-) -> list[hn.ext.fleet.BuildingPlan]:
-    """Plan from each stop to the next, up to a leg without a route.
-
-    A leg begins where the one before it ended, also in a named room.
-    """
-    legs: list[hn.ext.fleet.BuildingPlan] = []
-    start = waypoints[0]
-    for goal in waypoints[1:]:
-        legs.append(building.plan(start, goal, **how))
-        if not legs[-1].solved:
-            break
-        path = legs[-1].results[-1].path
-        assert path is not None  # noqa: S101 - it is solved
-        start = legs[-1].goal[0], tuple(map(float, path.points[-1][:2]))
-    return legs
 
 
 def _tour_figures(
@@ -177,24 +161,6 @@ def _tour_figures(
 
 def _is_name(stop: Any) -> bool:
     return isinstance(stop, str) or isinstance(stop[1], str)
-
-
-def _tightest(
-    building: hn.ext.fleet.Building,
-    legs: Sequence[hn.ext.fleet.BuildingPlan],
-    blocked: dict[str, hn.Blocked],
-    language: str,
-) -> list[str]:
-    """Return, for each floor of a route, the widest robot that could go, and the tightest place."""
-    word = {"en": "floor", "de": "Etage"}[language].capitalize()
-    lines = []
-    for leg in legs:
-        for name, result in zip(leg.floors, leg.results, strict=True):
-            assert result.path is not None  # noqa: S101 - it is solved
-            ends = result.path.points[0][:2], result.path.points[-1][:2]
-            found = building.floor(name).planner.explain(*ends, blocked=blocked.get(name))
-            lines += [f"{word} {name}: {line}" for line in found.words(language)]
-    return list(dict.fromkeys(lines))  # a tour passes a place again
 
 
 def _preset_of(building: hn.ext.fleet.Building, plan: hn.ext.fleet.BuildingPlan) -> str:

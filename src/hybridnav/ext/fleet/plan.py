@@ -70,6 +70,10 @@ class BuildingPlan:
     reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict, repr=False)
     """Why there is no route, in sentences, by the code of the language; none with a route."""
 
+    to_open: tuple[str, ...] = ()
+    """What would have to open for a route, all of it, as `link lift` and `floor 2, door 4`; none
+    with a route, and where opening does not help."""
+
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
         """Instructions for a person; none without a route, and if no floor has rooms."""
@@ -178,7 +182,9 @@ class BuildingPlan:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "instructions": [instruction.to_dict() for instruction in self.instructions],
             "words": self.words(),
-            "why": None if known else {"words": list(self.reasons.get("en", ()))},
+            "why": None
+            if known
+            else {"words": list(self.reasons.get("en", ())), "to_open": list(self.to_open)},
             **({} if self.profile is None else {"profile": self.profile, "note": self.note}),
         }
 

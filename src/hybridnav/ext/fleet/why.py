@@ -169,6 +169,11 @@ def reasons(
     return _each(lambda to: [_WORDS[to]["between"]])
 
 
+def on_floor(floor: str, line: str, language: str) -> str:
+    """Return a line about one floor, with its name."""
+    return _WORDS[language]["end"].format(floor, line)
+
+
 def _enclosed(
     number: int,
     endpoints: tuple[Endpoint, Endpoint],
@@ -207,7 +212,7 @@ def _point_of(end: Endpoint, floors: Sequence[Floor]) -> tuple[float, ...]:
 
 def _on(floor: Floor, lines: Sequence[str], language: str) -> list[str]:
     """Return lines about one floor, the first one with its name."""
-    return [_WORDS[language]["end"].format(floor.name, lines[0]), *lines[1:]]
+    return [on_floor(floor.name, lines[0], language), *lines[1:]]
 
 
 def _opening(names: Sequence[str], language: str) -> str:

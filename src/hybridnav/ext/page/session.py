@@ -12,6 +12,7 @@ from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, roo
 from hybridnav.ext.page.requests import changed, checked_change, in_grid, in_metres, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps.names import natural_key
+from hybridnav.planner import Blocked
 from hybridnav.planner.named import check_names
 from hybridnav.topology.rooms.choices import free_point, room_near
 
@@ -77,6 +78,8 @@ class Session:
     ) -> None:
         self._model, self._settings, self._costs = model, settings, costs
         self.journal = journal
+        self.out_of_order = Blocked if journal is None else journal.closures
+        """Returns what is closed for all queries, of a floor what its building closes there."""
         self.grid = topology.grid
         self._file = file
         self._lock = threading.RLock()

@@ -6,6 +6,7 @@ import math
 import threading
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.errors import InvalidValueError
@@ -153,6 +154,19 @@ class Site:
             found += [(number, name) for name in (*fitting, *points)]
         return Named(self.name, self.names, found)
 
+    def building(self, preset: str) -> Building:
+        """Return the building with planners by a preset, of the rooms as they are now.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such preset, it cannot plan over floors, or the site is one map.
+        """
+        routes = self._routes()
+        if not isinstance(routes, _OverFloors):
+            raise InvalidValueError(f"{self.name} is one map, not a building")
+        return routes.building(preset)
+
     def _check(self, number: int, given: object) -> None:
         if not 0 <= number < len(self.sessions):
             raise InvalidValueError(
@@ -221,6 +235,8 @@ class _OverFloors:
             topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
         file = (files or {}).get(names[0])
         session = Session(model, topology, planner.preset, costs=planner.costs, file=file)
+        if self._building.journal is not None and len(names) == 1:
+            session.out_of_order = partial(self._building.journal.closures, names[0])
         session.no_file = _IN_MODEL if files is None else _NO_FILE
         ends = [(link, end) for link in links for end in link.ends if end.floor in names]
         session.caution = lambda rooms: self._caution(rooms, ends)
@@ -277,7 +293,7 @@ class _OverFloors:
 
     def check_closing(self, item: OutOfOrder) -> None:
         """Refuse to close what is not in the building, with the rooms as they are now."""
-        check_closing(item, self._with(self._first).floors, self._building.links)
+        check_closing(item, self.building(self._first).floors, self._building.links)
 
     @property
     def _number_of(self) -> dict[str, int]:
@@ -285,14 +301,10 @@ class _OverFloors:
 
     def kept(self) -> Building:
         """Return what a model of the building holds."""
-        return self._with(self._first)
+        return self.building(self._first)
 
-    def _with(self, preset: str) -> Building:
-        """Return the building with planners by a preset, of the rooms as they are now.
-
-        Raises `HybridNavError` when there is no such preset, or it cannot plan on a floor or over
-        floors.
-        """
+    def building(self, preset: str) -> Building:
+        """Return the building with planners by a preset; see `Site.building`."""
         planners = [session.planning.planner(preset) for session in self.sessions]
         with self._making:
             made = self._made.get(preset)
@@ -322,7 +334,7 @@ class _OverFloors:
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         """Return some routes by different links."""
         start, goal = self._ends(query)
-        building, how = self._with(query.preset), self._how(query)
+        building, how = self.building(query.preset), self._how(query)
         found = building.alternatives(start, goal, query.count, **how)
         routes = [self._facts(plan, query.language) | self._words(plan, query) for plan in found]
         few = len(routes) < query.count
@@ -356,7 +368,7 @@ class _OverFloors:
 
     def _outcome(self, query: PathQuery) -> BuildingPlan:
         start, goal = self._ends(query)
-        building = self._with(query.preset)
+        building = self.building(query.preset)
         if query.all_open:
             building = copy(building)
             building.journal = None
