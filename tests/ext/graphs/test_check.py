@@ -351,7 +351,7 @@ def test_a_room_outside_is_no_free_ground():
     (island,) = hn.ext.graphs.check_graph(
         topology, hn.ext.graphs.WaypointGraph.from_networkx(graph.to_networkx())
     ).findings
-    assert (island.kind, island.severity, island.count) == ("island", "warning", 1)
+    assert (island.kind, island.severity, island.count) == ("island", "note", 1)
 
 
 SHUT = ("############", *("#aaaa##bbbb#",) * 4, "############")

@@ -99,7 +99,8 @@ def test_lanes_are_free_and_cut_nothing(classes, apart_m):
     found = hn.ext.graphs.check_graph(
         here, hn.ext.graphs.WaypointGraph.from_networkx(_with_points(graph))
     )
-    assert {one.kind for one in found.findings} <= {"same-point"}
+    # Where free space has several parts, so has the graph.
+    assert {one.kind for one in found.findings} <= {"same-point", "island"}
 
 
 def _with_points(graph):

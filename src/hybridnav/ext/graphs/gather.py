@@ -85,7 +85,6 @@ _WARNINGS = frozenset(
             "repeated-edge",
             "same-point",
             "alone",
-            "island",
             "floor-missing",
             "floor-unknown",
         ),
@@ -93,7 +92,7 @@ _WARNINGS = frozenset(
         *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure", "missing-named-room"),
     }
 )
-_NOTES = frozenset({"missing-door", "missing-room", "missing-part"})
+_NOTES = frozenset({"island", "missing-door", "missing-room", "missing-part"})
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def test_the_graph_of_both_floors_is_judged_as_if_no_file_lay_between(gdc, tmp_p
     for name, floor in matched.floors.items():
         assert np.allclose(floor.graph.points, own.floor(name).graph.points, rtol=0, atol=1e-5)
     check = check_building_graph(matched)
-    assert check.findings == ()
+    assert {found.kind for found in check.findings} <= {"island"}  # as free space has them
     for checked in check.floors.values():
         assert checked.is_free.all()
         assert checked.is_clear.all()
