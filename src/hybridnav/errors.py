@@ -1,7 +1,5 @@
 """Errors and warnings; each message states the given value, the expected one, and the place."""
 
-from __future__ import annotations
-
 import reprlib
 from typing import Any
 

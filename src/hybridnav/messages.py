@@ -8,7 +8,7 @@ import operator
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from hybridnav._base.trig import asin, atan2, cos, sin
+from hybridnav._base.trig import asin, atan2, cos, hypot, sin
 from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def quaternion_of(message: Any, path: str, what: str) -> Quaternion:
     away from 1.
     """
     x, y, z, w = (number_of(message, f"{path}.{name}", what) for name in "xyzw")
-    norm = math.hypot(x, y, z, w)
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
     if not abs(norm * norm - 1) < _NOT_UNIT:
         kind = "zeros, which states no direction" if norm == 0 else f"length {norm:.6g}"
         raise InvalidValueError(
@@ -103,7 +103,7 @@ def yaw_of(quaternion: Quaternion) -> float:
 def tilt_of(quaternion: Quaternion) -> float:
     """Return the angle between the vertical and the z axis of a pose, in radians."""
     x, y, _, _ = quaternion
-    return 2 * asin(min(1.0, math.hypot(x, y)))
+    return 2 * asin(min(1.0, hypot(x, y)))
 
 
 def pose_of(message: Any, path: str, what: str) -> tuple[float, float, float]:

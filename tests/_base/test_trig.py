@@ -1,17 +1,19 @@
-"""Sines, angles, exponentials and logarithms: right, and bit for bit the same everywhere."""
+"""Sines, angles, exponentials, logarithms, lengths: right, and bit for bit the same everywhere."""
 
 import hashlib
 import itertools
 import math
+import re
 from collections.abc import Callable
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from numba import njit
 
-import hybridnav.ext.live.mapping  # noqa: F401 - its kernels make the functions known to numba
+import hybridnav._base.jit  # noqa: F401 - makes the functions known to numba
 from hybridnav._base import trig as _trig
-from hybridnav._base.trig import acos, asin, atan2, cos, exp, log, sin, tan
+from hybridnav._base.trig import acos, asin, atan2, cos, dist, exp, hypot, hypots, log, sin, tan
 
 ODD = [0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e-300, -1e300, 5e-324]
 RANGES = [
@@ -46,6 +48,28 @@ def test_directions_are_right_and_along_axes_exact() -> None:
     wanted = np.arctan2(y.astype(np.longdouble), x.astype(np.longdouble))
     off = np.abs(_trig.directions(y, x) - wanted)
     assert (off <= 2 * np.spacing(np.abs(wanted.astype(np.float64)))).all()
+
+
+def test_lengths_have_equal_bits_in_kernels_in_arrays_and_of_numbers() -> None:
+    """A multiplication fused with the sum would differ in one pair of nine."""
+
+    @njit(cache=False)
+    def of_all(x, y):
+        found = np.empty_like(x)
+        for k in range(len(x)):
+            found[k] = hypot(x[k], y[k])
+        return found
+
+    x, y = np.random.default_rng(0).normal(0, 100, size=(2, 100_000))
+    wanted = np.array([math.sqrt(a * a + b * b) for a, b in zip(x.tolist(), y.tolist())])  # noqa: B905
+    assert (of_all(x, y) == wanted).all()
+    assert (hypots(x, y) == wanted).all()
+    pairs = zip(x[:999].tolist(), y[:999].tolist(), wanted.tolist(), strict=False)
+    assert all(hypot(a, b) == dist((a, 0), (0, -b)) == c for a, b, c in pairs)
+    exact = np.sqrt(x.astype(np.longdouble) ** 2 + y.astype(np.longdouble) ** 2)
+    assert (np.abs(wanted - exact) <= 2 * np.spacing(wanted)).all()
+    assert (hypot(1e200, 1.0), *hypots([1e200, 3], [0.0, 4])) == (math.inf, math.inf, 5.0)
+    assert hypot(math.inf, 0.0) == math.inf
 
 
 def test_values_at_the_ends_of_their_ranges() -> None:
@@ -101,3 +125,27 @@ def test_kernels_do_not_fuse_products_and_sums() -> None:
     assert not _differences(
         x, x * x
     ).any()  # a fused difference is what the product's rounding lost
+
+
+@pytest.mark.parametrize(
+    ("target", "features"),
+    [("aarch64-unknown-linux-gnu", ""), ("x86_64-unknown-linux-gnu", "+avx2,+fma")],
+)
+def test_no_processor_has_code_that_fuses_a_length(target: str, features: str) -> None:
+    """LLVM fuses `fmul` and `fadd` where both have the flag `contract`, which fast math alone sets.
+
+    LLVM 22, LangRef.rst, "Fast-Math Flags"; with the flag the test finds the fused instruction.
+    """
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    found = []
+    for flags in (set[str](), {"contract"}):
+        kernel = njit("f8(f8, f8)", cache=False, fastmath=flags)(hypot)
+        (code,) = kernel.inspect_llvm().values()
+        module = llvm.parse_assembly(code)
+        module.triple = target
+        machine = llvm.Target.from_triple(target).create_target_machine(features=features)
+        found.append(set(re.findall("v?fn?m(?:add|sub)", machine.emit_assembly(module))))
+    plain, fused = found
+    assert not plain
+    assert fused

@@ -9,8 +9,6 @@ registered like a package of others, in `pyproject.toml`:
 * `hybridnav.methods`: a class of routes or of methods of the harness.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any

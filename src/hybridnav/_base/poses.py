@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._base.trig import directions, sines_and_cosines
+from hybridnav._base.trig import directions, hypots, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Motion:
 
     @property
     def _chords(self) -> FloatArray:
-        return np.hypot(*self._steps.T)
+        return hypots(*self._steps.T)
 
     @property
     def _travel(self) -> FloatArray:

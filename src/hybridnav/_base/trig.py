@@ -1,10 +1,11 @@
-"""Sines, angles, exponentials and logarithms that are equal on every processor.
+"""Sines, angles, exponentials, logarithms and lengths that are equal on every processor.
 
 The functions of numpy and of the C library have variants for groups of processors, which differ in
 the last bit, and one bit decides which cell a beam meets. These use `+ - * /` and `sqrt` alone,
 which IEEE 754 defines exactly, in a fixed order; `%`, `frexp` and `ldexp` are exact, too. They
 are within two units in the last place. Kernels call the functions of a number; those of an array
-have the same values.
+have the same values. `math.dist` has one value everywhere, too, but not that of a kernel: a bound
+of one could lie above a cost of the other.
 
 References
 ----------
@@ -19,6 +20,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
@@ -187,11 +190,30 @@ def log(x: float) -> float:
     return k * _LN2[0] - ((half - (s * (half + (odd + even)) + k * _LN2[1])) - f)
 
 
+def hypot(x: float, y: float) -> float:
+    """Return the length of a vector; infinite above 1e154, 0 below 1e-162."""
+    right, up = float(x), float(y)
+    return math.sqrt(right * right + up * up)
+
+
 IN_KERNELS = (
     *(_sine, _cosine, _off_quarter, _odd_series, _quadrant_and_rest, _arctan),
-    *(sin, cos, tan, atan2, asin, acos, exp, log),
+    *(sin, cos, tan, atan2, asin, acos, exp, log, hypot),
 )
 """What kernels can call."""
+
+
+def dist(one: Sequence[float] | FloatArray, other: Sequence[float] | FloatArray) -> float:
+    """Return the distance of two points `(x, y)`, by `hypot`."""
+    (x, y), (to_x, to_y) = one, other
+    return hypot(float(to_x) - float(x), float(to_y) - float(y))
+
+
+def hypots(x: ArrayLike, y: ArrayLike) -> FloatArray:
+    """Return the lengths of vectors `(x, y)`, of their shape: `hypot` of arrays."""
+    rights, ups = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    with np.errstate(over="ignore"):
+        return np.sqrt(rights * rights + ups * ups)
 
 
 def sines_and_cosines(angles_rad: ArrayLike) -> tuple[FloatArray, FloatArray]:

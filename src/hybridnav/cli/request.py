@@ -20,14 +20,13 @@ from hybridnav.cli.reading import (
     outside,
     refused_result,
 )
-from hybridnav.cli.rendering import draw, query_of, respond
+from hybridnav.cli.rendering import Waypoint, draw, query_of, respond
 from hybridnav.cli.warm import compiling_beside
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav.cli.options import Closing, Costs
-    from hybridnav.cli.rendering import Waypoint
     from hybridnav.planner.named import At
 
 

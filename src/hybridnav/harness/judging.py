@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridnav import check_proof
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.consistency import Consistency
@@ -383,6 +384,6 @@ class CostJudge:
         """Return the cost of a legal path of cells in metres, move by move."""
         factors = self._layer.factors[cells[:, 0], cells[:, 1]].astype(np.float64)
         steps = np.diff(cells, axis=0)
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        lengths = hypots(steps[:, 0], steps[:, 1])
         costs = lengths * (factors[:-1] + factors[1:]) / 2
         return math.fsum(costs.tolist()) * self._grid.resolution_m

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.costs import CostLayer
@@ -206,12 +207,12 @@ def _stratified(
     """Return indices (count, 2) of cells, equally many in each class of distance if there are
     enough."""
     draws = rng.integers(len(cells), size=(max(40 * count, 2000), 2))
-    apart = np.hypot(*(cells[draws[:, 0]] - cells[draws[:, 1]]).T)
+    apart = hypots(*(cells[draws[:, 0]] - cells[draws[:, 1]]).T)
     least = least_cells
     while not (apart >= max(least, 1)).any():
         if least < 1:
             draws = np.array([[0, len(cells) - 1]])
-            apart = np.hypot(*(cells[draws[:, 0]] - cells[draws[:, 1]]).T)
+            apart = hypots(*(cells[draws[:, 0]] - cells[draws[:, 1]]).T)
             break
         least /= 2
     allowed = np.flatnonzero(apart >= max(least, 1))

@@ -1,7 +1,5 @@
 """Classes of cells, and the limits and defaults of grids and paths, known without numpy."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import hypot
+
 if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
 
@@ -29,7 +31,7 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
         return np.zeros_like(occupied)
     if radius_cells < 1:
         return occupied.copy()
-    if radius_cells >= math.hypot(*occupied.shape):
+    if radius_cells >= hypot(*occupied.shape):
         return np.ones_like(occupied)
     squared = math.floor(radius_cells * radius_cells * (1 + _ROUNDING))
     if squared > FEW_ROWS**2:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.trig import hypot
 
 
 @njit(cache=True, nogil=True)
@@ -136,7 +137,7 @@ def passed_cells(free, positions):
     for k in range(len(positions) - 1):
         row, col = positions[k, 0], positions[k, 1]
         down, across = positions[k + 1, 0] - row, positions[k + 1, 1] - col
-        length = math.hypot(down, across)
+        length = hypot(down, across)
         # The next line of the lattice in each direction, and where the segment meets it.
         down_step, across_step = math.copysign(1.0, down), math.copysign(1.0, across)
         line_row = math.floor(row) + 1.0 if down > 0.0 else math.ceil(row) - 1.0
@@ -222,7 +223,7 @@ def polyline_length(points):
     """Return the length of a line through points, float64 (n, 2)."""
     length = 0.0
     for k in range(len(points) - 1):
-        length += math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
+        length += hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
     return length
 
 

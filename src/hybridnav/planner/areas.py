@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import in_runs
@@ -170,7 +171,7 @@ def _near_throughout(
 ) -> BoolArray:
     """Return whether all points of boxes are certainly as near to an area as a radius."""
     inside = shapely.covers(part, shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0]))
-    reach = radius_cells - np.hypot(*(high - low).T) / 2
+    reach: Any = radius_cells - hypots(*(high - low).T) / 2  # shapely types numbers alone
     middles = shapely.points((low + high)[:, ::-1] / 2)
     return inside | ((reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0)))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import hypot
 from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def nearest_reachable(
     from scipy import ndimage  # noqa: PLC0415 - plans to reachable goals need none of it
 
     at = np.array(grid.frame.position_of(goal[0], goal[1]))
-    reach = min(within_m / grid.resolution_m, math.hypot(*grid.shape) + float(np.abs(at).max()))
+    reach = min(within_m / grid.resolution_m, hypot(*grid.shape) + float(np.abs(at).max()))
     low = np.clip(np.floor(at - reach) - 1, 0, grid.shape).astype(np.int64)
     high = np.clip(np.ceil(at + reach) + 1, 0, grid.shape).astype(np.int64)
     if not (low < high).all():

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.moves import COL_STEP, ROW_STEP
+from hybridnav._base.trig import dist
 from hybridnav.check_proof import ONE, UNIT, cost_of, joins_of
 from hybridnav.errors import PlanError
 from hybridnav.maps.cells import CellClass
@@ -181,7 +182,7 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     ends = line[[0, -1]].tolist()
     given = problem.free, layer.factors, ends, cells.tolist(), cost / per_cell
     proof, least = moves_of_king(grid, math.floor(known * UNIT), given)
-    bound = max(least / UNIT - joins, math.dist(*line[[0, -1]])) * (1 - 2e-9)
+    bound = max(least / UNIT - joins, dist(*line[[0, -1]])) * (1 - 2e-9)
     return {
         "kind": "line",
         "cost": cost,

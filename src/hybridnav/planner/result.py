@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from hybridnav._base.copies import on_demand
+from hybridnav._base.trig import dist
 from hybridnav.errors import PlanError
 from hybridnav.planner.guide import sentences
 from hybridnav.route.route import Route
@@ -292,7 +293,7 @@ class PlanResult:
             return 0.0
         if self.path is None or self.goal is None:
             return math.inf
-        return math.dist(self.path.points[-1], self.goal[:2])
+        return dist(self.path.points[-1], self.goal[:2])
 
     def raise_for_status(self) -> Self:
         """Return the result itself if it is solved, or near the goal as asked for.

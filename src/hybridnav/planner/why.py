@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._base.trig import dist
 from hybridnav.maps import CellClass
 from hybridnav.maps.widest import Bottleneck, WidestPaths
 from hybridnav.planner import Blocked, PlanStatus
-from hybridnav.planner.blocked import as_blocked
+from hybridnav.planner.blocked import Closable, as_blocked
 from hybridnav.planner.endpoints import places_of_endpoints
 from hybridnav.planner.fewest import OpenGround, fewest_to_open
 from hybridnav.planner.why_words import BlockedEnd, Closure, TightPlace, sentences
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planning import Planning
     from hybridnav.topology import TopologicalMap
 
@@ -280,7 +280,7 @@ class Case:
         reach_m = self._clear(cell)
         best: tuple[float, Door | None] = (reach_m / self.grid.resolution_m, None)
         for door in topology.rooms.doors:
-            if math.dist(door.position, (x, y)) > door.width_m + reach_m:
+            if dist(door.position, (x, y)) > door.width_m + reach_m:
                 continue
             beside = topology.rooms.cells_beside(door.number)
             cells = np.stack(divmod(beside, self.grid.shape[1]), axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -110,7 +111,7 @@ def parts_of(classes: ByteArray, limit: int) -> Parts:
 
     `classes`: uint8 `CellClass`, shape `(rows, cols)`; `limit`: see `decimation.squared_limit`.
     """
-    farthest = _WIDEST * _throat_kernels.STRAIGHT * limit**0.5
+    farthest = _WIDEST * _throat_kernels.STRAIGHT * math.sqrt(limit)
     most = int(min(max(farthest, _throat_kernels.STRAIGHT), _FARTHEST))
     clearance = _throat_kernels.clearances(classes, most)
     small, slight = (

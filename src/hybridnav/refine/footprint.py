@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Footprint:
         inscribed_m = polygon.exterior.distance(base) if polygon.contains(base) else 0.0
         object.__setattr__(self, "corners_m", corners)
         object.__setattr__(self, "inscribed_radius_m", float(inscribed_m))
-        object.__setattr__(self, "circumscribed_radius_m", float(np.hypot(*corners.T).max()))
+        object.__setattr__(self, "circumscribed_radius_m", float(hypots(*corners.T).max()))
 
     @classmethod
     def of(cls, shape: Any) -> Footprint:

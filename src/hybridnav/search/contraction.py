@@ -1,7 +1,5 @@
 """Contraction of a graph of corners into a hierarchy, and paths in it, for kernels."""
 
-from __future__ import annotations
-
 from hybridnav.search.kernels.contract import HEAD_SHIFT, contract, have_reverses, pack, renumbered
 from hybridnav.search.kernels.labels import grow_rows
 from hybridnav.search.kernels.unpack import NO_ARC, corners_between

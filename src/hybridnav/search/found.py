@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.trig import dist
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -117,7 +118,7 @@ class Query(NamedTuple):
     @property
     def straight_m(self) -> float:
         """Distance of the points, a bound on the length of every path."""
-        return math.dist(*self.points)
+        return dist(*self.points)
 
 
 class QueryMany(NamedTuple):

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from hybridnav._base.moves import STEPS
+from hybridnav._base.trig import hypots
 from hybridnav.maps import CellClass
 from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.viz.fields import Field, WalkTree, distance_to_rim, rounded, smoothed
@@ -281,7 +282,7 @@ def _links(number: LongArray) -> Any:
         linked = (padded >= 0) & (beyond >= 0)
         tails.append(padded[linked])
         heads.append(beyond[linked])
-        lengths.append(np.full(len(tails[-1]), np.hypot(up, right)))
+        lengths.append(np.full(len(tails[-1]), hypots(up, right)))
     size = int(number.max()) + 1
     endpoints = np.concatenate(tails), np.concatenate(heads)
     return coo_array((np.concatenate(lengths), endpoints), shape=(size, size)).tocsr()

@@ -12,6 +12,7 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
+from hybridnav._base.trig import hypots
 from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class Field:
         n, copies = len(self.cells), 1 << int(lines.max()).bit_length()
         tail, head, flip = _moves(self.number, lines)
         near = 1 + _NEAR_RIM * np.clip(1 - self.distance[self.mask] / self.clearance, 0, 1)
-        cost = np.hypot(*(self.cells[tail] - self.cells[head]).T) * (near[tail] + near[head])
+        cost = hypots(*(self.cells[tail] - self.cells[head]).T) * (near[tail] + near[head])
         copy = np.arange(copies)[:, None]
         endpoints = (tail + n * copy).ravel(), (head + n * (copy ^ flip)).ravel()
         size = n * copies
@@ -171,7 +172,7 @@ def _between(values: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _evenly(line: FloatArray, spacing: float) -> FloatArray:
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    length = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])
     at = np.linspace(0, length[-1], max(round(length[-1] / spacing), 12) + 1)
     return np.stack([np.interp(at, length, part) for part in line.T], axis=1)
 
@@ -324,7 +325,7 @@ class Loops:
         field, width = self.field, self.field.clearance
         at = field.level.cells[field.vertex] + 0.5
         to = np.argwhere(self.enclosed[loop]).mean(axis=0) + field.corner + 0.5 - at
-        reach = max(float(np.hypot(*to)), 1e-9)
+        reach = max(float(hypots(*to)), 1e-9)
         tip = to * max(1 + width / reach, 3 * width / reach)
         across = np.array([-to[1], to[0]]) / reach * 2 * width
         t = np.linspace(0, 1, _PETAL_POINTS)[:, None]

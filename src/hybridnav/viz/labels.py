@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from scipy import ndimage
 
+from hybridnav._base.trig import hypots
 from hybridnav.maps import NO_ROOM
 from hybridnav.viz import style
 from hybridnav.viz.layout import text_width
@@ -156,7 +157,7 @@ def _along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
     path has points at its bends alone, and a label between two of them would hide it."""
     found = [np.empty((0, 2))]
     for line in lines:
-        where = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])[: len(line)]
+        where = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])[: len(line)]
         if len(line):
             count = 2 + int(min(where[-1] / spacing_m, _MOST_ALONG))
             at = np.linspace(0.0, where[-1], count)
@@ -330,7 +331,7 @@ def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
     """Return the points of lines, with more points between distant ones; float64 (n, 2)."""
     parts = [np.empty((0, 2))]
     for line in lines:
-        lengths_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        lengths_m = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])
         at = np.linspace(0.0, lengths_m[-1], int(lengths_m[-1] / spacing_m) + 2)
         parts.append(np.stack([np.interp(at, lengths_m, axis) for axis in line.T], axis=1))
     return np.concatenate(parts)

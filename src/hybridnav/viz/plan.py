@@ -10,13 +10,14 @@ from matplotlib import patheffects
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.planner import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
-from hybridnav.viz.layout import finish
+from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import arc_handle, draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from hybridnav.planner.blocked import Closable
     from hybridnav.route import Route
     from hybridnav.topology import TopologicalMap
-    from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes
 
 
@@ -204,7 +204,7 @@ def _draw_route(
 def _middles(topology: TopologicalMap, path: FloatArray) -> FloatArray:
     """Return the middle of each stretch of a path in one place, `(x, y)` in metres, shape (n, 2);
     the path is looked up a few times in each cell."""
-    ends_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
+    ends_m = np.append(0.0, np.cumsum(hypots(*np.diff(path, axis=0).T)))
     count = max(1, math.ceil(_LOOKS * ends_m[-1] / topology.grid.resolution_m))
     at_m = (np.arange(count) + 0.5) * (ends_m[-1] / count)
     points = np.column_stack([np.interp(at_m, ends_m, along) for along in path.T])

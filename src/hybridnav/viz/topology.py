@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
@@ -17,7 +18,7 @@ from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.fields import Field, Loops, distance_to_rim, smoothed
-from hybridnav.viz.layout import finish
+from hybridnav.viz.layout import Entry, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.pyramid import Level
-    from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes
 
 
@@ -318,12 +318,12 @@ class Arc:
     def _straight(self) -> FloatArray:
         fields = (self.one, self.other)
         start, end = (field.level.cells[field.vertex] - self.corner for field in fields)
-        count = int(_PER_CELL * np.hypot(*(end - start))) + 2
+        count = int(_PER_CELL * hypots(*(end - start))) + 2
         return np.linspace(start, end, count)
 
     def _has_room(self, line: FloatArray) -> bool:
         """Return whether a straight line keeps the clearance of a curve."""
-        along = np.hypot(*(line - line[0]).T)
+        along = hypots(*(line - line[0]).T)
         inner = np.minimum(along, along[-1] - along) > _NEAR_END * self.clearance
         room = self.distance[tuple(np.rint(line).astype(np.int64).T)]
         return bool((room > 0).all() and (room[inner] >= self.clearance).all())
@@ -336,7 +336,7 @@ class Arc:
         at = np.flatnonzero(np.diff(owner))
         middles = self.boundary.mean(axis=1) - self.corner
         off = (cells[at] + cells[at + 1])[:, None] / 2 - middles
-        own = np.hypot(*np.moveaxis(off, -1, 0)).min(axis=1) <= _SLIPPED
+        own = hypots(*np.moveaxis(off, -1, 0)).min(axis=1) <= _SLIPPED
         return bool(own.sum() % 2 == 1)
 
     def _walk(self) -> FloatArray:

@@ -9,6 +9,7 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybridnav._base.trig import dist
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
@@ -255,11 +256,11 @@ class MapAnswers:
         if not goals:
             known = [name for name in self._places.listed() if name != start]
             raise places.nothing(asked.of, "nothing", known, self._places.choices)
-        goals.sort(key=lambda goal: math.dist(goal[1], here))
+        goals.sort(key=lambda goal: dist(goal[1], here))
         best: list[tuple[float, dict[str, Any]]] = []
         others_m = math.inf
         for facts, point in goals:
-            straight_m = math.dist(point, here)
+            straight_m = dist(point, here)
             if len(best) >= asked.count and straight_m >= best[asked.count - 1][0]:
                 others_m = straight_m  # no path to this one or a later one is shorter
                 break

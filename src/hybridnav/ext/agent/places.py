@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.agent.questions import UnclearError
 from hybridnav.maps import CellClass
@@ -154,10 +155,10 @@ class NamedPlaces:
             "beside": beside[:SHOWN],
         }
         near = min(
-            rooms.listed_doors, key=lambda door: math.dist(door.position, point), default=None
+            rooms.listed_doors, key=lambda door: dist(door.position, point), default=None
         )
         if near is not None:
-            straight_m = round(math.dist(near.position, point), 2)
+            straight_m = round(dist(near.position, point), 2)
             answer["nearest_door"] = {"number": near.number, "straight_m": straight_m}
         return answer
 
@@ -215,7 +216,7 @@ class NamedPlaces:
         cells = np.stack(divmod(self.rooms.cells_beside(door.number), grid.shape[1]), axis=1)
         cells = cells[grid.classes[tuple(cells.T)] == CellClass.FREE]
         points = grid.frame.points_of(cells)
-        x, y = points[np.hypot(*(points - door.position).T).argmin()].tolist()
+        x, y = points[hypots(*(points - door.position).T).argmin()].tolist()
         return x, y
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import frozen
-from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.trig import atan2, cos, hypots, sin
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorArea, FloorGraph
 from hybridnav.ext.fleet.links import Link, LinkEnd
@@ -241,7 +241,7 @@ def _poses(own: FloatArray, wanted: FloatArray) -> Iterator[Pose]:
 
 def _away(own: FloatArray, wanted: FloatArray, pose: Pose) -> FloatArray:
     """Return the distance of each end from that of the building, float64 (n,), in metres."""
-    found: FloatArray = np.hypot(*(moved_points(own, pose) - wanted).T)
+    found: FloatArray = hypots(*(moved_points(own, pose) - wanted).T)
     return found
 
 

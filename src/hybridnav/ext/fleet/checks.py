@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.links import ClosedLink, Link, LinkEnd
@@ -332,7 +333,7 @@ def _end_under(end: LinkEnd, floor: Floor) -> LinkEnd | None:
     if rooms is not None:
         near = near & (rooms.label_of[window] == rooms.label_of[row, col])
     cells = np.argwhere(near) + np.array([top, left])
-    away = np.hypot(*(cells - [row, col]).T)
+    away = hypots(*(cells - [row, col]).T)
     if away.min(initial=np.inf) > reach:
         return None
     x, y = grid.frame.points_of(cells[away.argmin()][None])[0].tolist()

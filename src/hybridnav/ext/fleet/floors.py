@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
 from hybridnav.planner.profile import PROFILES, Profile
@@ -117,7 +118,7 @@ class FloorTable:
         n = len(positions_m)
         if known is None:
             across = positions_m[:, None] - positions_m[None]
-            straight = self._safe(np.hypot(across[..., 0], across[..., 1]))
+            straight = self._safe(hypots(across[..., 0], across[..., 1]))
             known = Known(straight, np.full((n, n), np.nan))
         self.lower: FloatArray = known.lower.copy()
         """float64 (n, n), proved lower bounds, as in `Known`."""
@@ -214,12 +215,12 @@ class FloorTable:
         """Return the distances of points from a waypoint, from the box round a named one."""
         if not isinstance(waypoint, str):
             away = positions_m - np.asarray(waypoint, dtype=np.float64)[:2]
-            return np.hypot(away[:, 0], away[:, 1])
+            return hypots(away[:, 0], away[:, 1])
         grid = self.floor.planner.grid
         at = grid.frame.positions_of(positions_m)
         low, high = self._box_of(waypoint)
         away = np.maximum(np.maximum(low - at, at - high), 0.0)
-        return np.hypot(away[:, 0], away[:, 1]) * grid.resolution_m
+        return hypots(away[:, 0], away[:, 1]) * grid.resolution_m
 
     def _box_of(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Return the least and the greatest row and column of a named waypoint, with a margin."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import frozen
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.align import Pose, moved_floor, moved_point, placed_pose
 from hybridnav.ext.fleet.building import Building
@@ -81,7 +81,7 @@ class MatchedGraph:
         """Greatest distance between the end of a link and that of the building's, in metres; 0
         where none is known."""
         away = [
-            math.dist(link.ends[end.floor], end.position_m)
+            dist(link.ends[end.floor], end.position_m)
             for link in self.links
             if link.own is not None
             for end in link.own.ends
@@ -251,9 +251,7 @@ def _nearest(drawn: Link, ends: dict[str, Point], links: list[Link]) -> Link | N
     """Return the link of the same kind that stops at the same places; None if there is none."""
     best, least = None, AT_LINK_M
     for link in links:
-        away = [
-            math.dist(end.position_m, ends[end.floor]) for end in link.ends if end.floor in ends
-        ]
+        away = [dist(end.position_m, ends[end.floor]) for end in link.ends if end.floor in ends]
         if link.kind == drawn.kind and len(away) > 1 and max(away) <= least:
             best, least = link, max(away)
     return best

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypots
 from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink
 from hybridnav.ext.fleet.link_nodes import FloorGraph, Point, node_at
 from hybridnav.ext.graphs import attach
@@ -139,7 +140,7 @@ class BuildingNetwork:
         if end is None:
             return "the building's does not stop there"
         here = self._of_name[floor]
-        away_m = math.dist(link.ends[floor], end.position_m)
+        away_m = dist(link.ends[floor], end.position_m)
         if away_m > AT_LINK_M:
             return f"{away_m:.2f} m from that of the building"
         if not here.sees(self._node(link, floor), end.position_m):
@@ -213,7 +214,7 @@ class BuildingNetwork:
         fault: str = "",
     ) -> GraphRoute:
         driven_m = sum(
-            float(np.hypot(*np.diff(line, axis=0).T).sum()) * floor.grid.resolution_m
+            float(hypots(*np.diff(line, axis=0).T).sum()) * floor.grid.resolution_m
             for floor, line in lines
         )
         return GraphRoute(
@@ -258,9 +259,7 @@ class BuildingNetwork:
         ends = () if own is None else (own.end_on(one), own.end_on(other))
         if own is None or None in ends:
             return link.drawn.charge_m(link.floors[one], link.floors[other], speed_m_s=speed)
-        away_m = sum(
-            math.dist(link.ends[end.floor], end.position_m) for end in ends if end is not None
-        )
+        away_m = sum(dist(link.ends[end.floor], end.position_m) for end in ends if end is not None)
         return own.charge_m(one, other, speed_m_s=speed) + away_m
 
     def _joined(self) -> tuple[LongArray, LongArray, FloatArray]:

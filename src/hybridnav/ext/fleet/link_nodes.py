@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link
 from hybridnav.ext.graphs.gather import free_name
@@ -208,7 +209,7 @@ def join_links(building: BuildingGraph) -> BuildingGraph:
             end = link.end_on(floor.name)
             if end is None or node_at(floor.graph, end.position_m) is not None:
                 continue
-            away = np.hypot(*(floor.graph.points - end.position_m).T)
+            away = hypots(*(floor.graph.points - end.position_m).T)
             stubs.append((link.name, end.position_m, int(np.argmin(away))))
         floors.append(replace(floor, graph=with_stubs(floor.graph, stubs)) if stubs else floor)
     same = all(one is other for one, other in zip(floors, building.floors, strict=True))
@@ -266,7 +267,7 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
 
 def node_at(graph: WaypointGraph, point: tuple[float, float]) -> int | None:
     """Return the node nearest to a point, None if it lies farther than 1 cm away."""
-    away = np.hypot(*(graph.points - point).T)
+    away = hypots(*(graph.points - point).T)
     nearest = int(np.argmin(away))
     return nearest if away[nearest] <= SAME_POINT_M else None
 

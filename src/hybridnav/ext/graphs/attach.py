@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.trig import hypots
 from hybridnav.ext.graphs.kernels import routes
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Network:
         """
         usable = np.arange(len(positions)) if usable is None else usable
         steps = positions[edges[:, 1]] - positions[edges[:, 0]]
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        lengths = hypots(steps[:, 0], steps[:, 1])
         return cls(sight, positions, adjacency(len(positions), edges, lengths), usable)
 
     @cached_property
@@ -131,7 +132,7 @@ class Attached:
         segment between ends that see each other; float64 (p,) in cells, infinite for none."""
         lengths, _, _ = shortest_routes(self.network.graph, self.from_start, self.from_goal)
         steps = self.goals - self.starts
-        straight = np.where(self.direct, np.hypot(steps[:, 0], steps[:, 1]), np.inf)
+        straight = np.where(self.direct, hypots(steps[:, 0], steps[:, 1]), np.inf)
         return np.minimum(lengths, straight)
 
     def nearest(self) -> FloatArray:
@@ -139,7 +140,7 @@ class Attached:
         none."""
         lines, _ = self.nearest_lines()
         return np.array(
-            [np.inf if line is None else np.hypot(*np.diff(line, axis=0).T).sum() for line in lines]
+            [np.inf if line is None else hypots(*np.diff(line, axis=0).T).sum() for line in lines]
         )
 
     def nearest_lines(self) -> tuple[list[FloatArray | None], LongArray]:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import sines_and_cosines
+from hybridnav._base.trig import hypots, sines_and_cosines
 from hybridnav.ext.graphs.attach import MANY_CANDIDATES, Network
-from hybridnav.ext.graphs.judge import RIM_CELLS, checked_position
+from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace, checked_position
 from hybridnav.ext.graphs.kernels import log_uniform
 from hybridnav.maps import CellClass
 from hybridnav.maps.islands import unique_rows
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.judge import FreeSpace
     from hybridnav.search.mesh import MeshPaths
     from hybridnav.topology import TopologicalMap
 
@@ -286,4 +285,4 @@ class Corners:
             fits[fits] = sight.clear(end[fits], corners[fits])
         fits[fits] = ~sight.clear(ends[0][fits], ends[1][fits])
         starts, goals, corners = ends[0][fits], ends[1][fits], corners[fits]
-        return starts, goals, np.hypot(*(starts - corners).T) + np.hypot(*(goals - corners).T)
+        return starts, goals, hypots(*(starts - corners).T) + hypots(*(goals - corners).T)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import (
     Nodes,
@@ -20,14 +21,12 @@ from hybridnav.ext.graphs.bends import (
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, RIM_CELLS, FreeSpace
 from hybridnav.ext.graphs.kernels import spanner
 from hybridnav.ext.graphs.lanes import described
-from hybridnav.ext.graphs.waypoint_graph import components_of
+from hybridnav.ext.graphs.waypoint_graph import RouteGraph, components_of
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 
 # Edges of a route graph: a spanner of sight, joined wherever free space is.
 
@@ -94,7 +93,7 @@ def sight_edges(nodes: Nodes, known: SightPairs, stretch: float, needed: LongArr
         return np.empty((0, 2), dtype=np.int64)
     pairs = known.among(needed)
     steps = positions[pairs[:, 1]] - positions[pairs[:, 0]]
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    lengths = hypots(steps[:, 0], steps[:, 1])
     order = np.argsort(lengths, kind="stable")
     pairs, lengths = pairs[order], lengths[order]
     found: LongArray = pairs[spanner(positions, pairs, lengths, stretch)]

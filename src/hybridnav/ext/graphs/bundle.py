@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import printable
-from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.trig import atan2, cos, hypot, sin
 from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.graphs.files.nav2 import nav2_bytes, nav2_features
@@ -22,7 +22,7 @@ from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.costs.factors import mask_on_map
-from hybridnav.maps.costs.files import parse_costs
+from hybridnav.maps.costs.files import CostSpec, parse_costs
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.planner.speed import SpeedMap
 from hybridnav.topology import TopologicalMap
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import AnyArray, FloatArray, PathLike
-    from hybridnav.maps.costs.files import CostSpec
     from hybridnav.topology.rooms import Door, Rooms
 
 MOST_ROOMS = 100
@@ -372,7 +371,7 @@ def _poses(
         (x, y), (u, v) = rooms.door_ends(number)
         at = graph.points[node]
         ahead = np.array([v - y, x - u])
-        ahead /= max(math.hypot(*ahead), 1e-9)
+        ahead /= max(hypot(*ahead), 1e-9)
         beyond = [rooms.at(tuple((at + sign * ahead).tolist())) for sign in (1, -1)]
         first, second = doors[number].rooms
         # It heads into the second room, unless the first one lies there.

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.ext.graphs.attach import PlacedGraph
-from hybridnav.ext.graphs.gather import MOST_EXAMPLES, Findings, shown
+from hybridnav.ext.graphs.gather import MOST_EXAMPLES, Finding, Findings, Point, shown
 from hybridnav.ext.graphs.judge import FreeSpace
 from hybridnav.ext.graphs.lanes import DoorsPassed
 from hybridnav.ext.graphs.waypoint_graph import WaypointGraph, add_components
@@ -23,7 +23,6 @@ from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.gather import Finding, Point
     from hybridnav.maps import OccupancyGrid
     from hybridnav.topology.rooms import Rooms
 

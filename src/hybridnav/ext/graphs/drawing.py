@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypots
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
-from hybridnav.ext.graphs.strands import crosses, is_beside, length_between
+from hybridnav.ext.graphs.strands import Passage, Strand, crosses, is_beside, length_between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.ext.graphs.strands import Passage, Strand
 
 _COARSE = 8
 """Cells between the points by which the length of a chain is measured: its steps are stairs."""
@@ -63,7 +63,7 @@ class ChainGraph:
 
     def _add(self, tail: int, head: int, cells: FloatArray) -> int:
         coarse = np.concatenate([cells[:-1:_COARSE], cells[-1:]])
-        length = float(np.hypot(*np.diff(coarse, axis=0).T).sum())
+        length = float(hypots(*np.diff(coarse, axis=0).T).sum())
         inner = cells[1:-1] if len(cells) > 2 else cells  # noqa: PLR2004
         self._last += 1
         narrow = float(self._passage.at(inner).min())
@@ -223,7 +223,7 @@ class ChainGraph:
             fits = self._passage.least(tails, heads) >= np.minimum(comfort, _KEPT * narrow)
             fits[-1] = True
             steps = heads - tails
-            lengths = np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)
+            lengths = np.maximum(hypots(steps[:, 0], steps[:, 1]), 1e-9)
             for k in np.flatnonzero(fits).tolist():
                 inner = slice(first + k, at + 1)
                 normal = np.array([-steps[k, 1], steps[k, 0]]) / lengths[k]
@@ -275,9 +275,9 @@ def drop_ends(sketch: Sketch, reach: float, far: float, step: int) -> None:
         others = np.array([k for k in beside if k != node], dtype=np.int64)
         steps = at[others] - at[node]
         unseen, count = near, len(near)
-        for other in others[np.hypot(steps[:, 0], steps[:, 1]) <= reach + far].tolist():
+        for other in others[hypots(steps[:, 0], steps[:, 1]) <= reach + far].tolist():
             steps = unseen - at[other]
-            is_seen = np.hypot(steps[:, 0], steps[:, 1]) <= far
+            is_seen = hypots(steps[:, 0], steps[:, 1]) <= far
             tails = np.repeat(at[[other]], int(is_seen.sum()), axis=0)
             is_seen[is_seen] = space.sight.clear(tails, unseen[is_seen])
             unseen = unseen[~is_seen]
@@ -304,12 +304,12 @@ def add_chords(sketch: Sketch, reach: float, detour: float, least_rad: float) ->
     fits = least >= min(narrowest, _ROOM * comfort)
     pairs, saves = pairs[fits], np.where(least[fits] < _ROOM * comfort, _MUCH, detour)
     steps = at[pairs[:, 1]] - at[pairs[:, 0]]
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    lengths = hypots(steps[:, 0], steps[:, 1])
     beside: list[dict[int, float]] = [{} for _ in at]
     ways = [each.items() for each in beside]
     edges = sketch.edges.tolist()
     for one, other in edges:
-        beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
+        beside[one][other] = beside[other][one] = dist(at[one], at[other])
     for k in np.lexsort((pairs[:, 1], pairs[:, 0], lengths)).tolist():
         (one, other), length = pairs[k].tolist(), float(lengths[k])
         if length <= 0 or max(len(beside[one]), len(beside[other])) >= _MOST_BESIDE:

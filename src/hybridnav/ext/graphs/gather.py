@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.files import printable
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.frame import FARTHEST_M
 
@@ -432,7 +433,7 @@ class Gathered:
         """Return whether a line is other than the segment between its nodes; one that does not run
         from the first to the second is a finding."""
         tail, head = map(self._point, endpoints)
-        off = max(math.dist(tail, line[0]), math.dist(head, line[-1]))
+        off = max(dist(tail, line[0]), dist(head, line[-1]))
         if off > _OFF_M:
             self.findings.add("line-elsewhere", f"{self._text(edge)}: {off:.2f} m off", tail, head)
         return len(line) > 2 or off > 0  # noqa: PLR2004 - its two nodes

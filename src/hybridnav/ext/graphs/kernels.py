@@ -1,14 +1,12 @@
 """Kernels of route graphs: their edges, and the middles of free space."""
 
-from __future__ import annotations
-
 import heapq
 import math
 
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.trig import exp, log
+from hybridnav._base.trig import exp, hypot, log
 from hybridnav.maps.geometry import passed_cells
 
 # Spanners, and shortest routes between many pairs.
@@ -58,8 +56,8 @@ def spanner(positions, pairs, lengths, stretch):
             while arc >= 0:
                 other = head[arc]
                 row, col = positions[other, 0], positions[other, 1]
-                step = math.hypot(positions[here, 0] - row, positions[here, 1] - col)
-                rest = math.hypot(positions[goal, 0] - row, positions[goal, 1] - col)
+                step = hypot(positions[here, 0] - row, positions[here, 1] - col)
+                rest = hypot(positions[goal, 0] - row, positions[goal, 1] - col)
                 through = cost + step
                 if through < costs[other] and through + rest <= limit:
                     if costs[other] == np.inf:
@@ -219,7 +217,7 @@ def least_widths(occupied, tails, heads, reach):
     for edge in range(len(tails)):
         row, col = tails[edge, 0], tails[edge, 1]
         down, across = heads[edge, 0] - row, heads[edge, 1] - col
-        length = math.hypot(down, across)
+        length = hypot(down, across)
         count = max(1, math.ceil(length / _STEP_CELLS))
         for k in range(count + 1):
             at_row, at_col = row + k / count * down, col + k / count * across

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from hybridnav._base.copies import frozen
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
@@ -31,7 +32,6 @@ from hybridnav.topology.rooms.cutting import wall_directions
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
     from hybridnav.topology.rooms import Rooms
@@ -325,7 +325,7 @@ def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
     to_own = np.asarray(KDTree(sketch.positions).query(known)[1], dtype=np.int64)
     steps = known[to_known] - sketch.positions
     is_same = to_own[to_known] == np.arange(len(to_known))
-    is_same &= np.hypot(steps[:, 0], steps[:, 1]) * cell_m <= _SAME_M
+    is_same &= hypots(steps[:, 0], steps[:, 1]) * cell_m <= _SAME_M
     return np.where(is_same, to_known, -1)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace
@@ -240,7 +241,7 @@ def _lane(positions: FloatArray, edges: LongArray, off: float) -> tuple[FloatArr
     """Return the first and last positions of the lane of each edge, float64 (m, 2)."""
     tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
     steps = heads - tails
-    along = steps / np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
+    along = steps / np.maximum(hypots(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
     # Rows run upwards: the right of (down, across) is (-across, down).
     right = np.stack([-along[:, 1], along[:, 0]], axis=1)
     first, second = tails + off * (right + along), heads + off * (right - along)
@@ -257,7 +258,7 @@ def _fits(
     """Return the edges whose lane is free, bool (m,)."""
     tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
     steps = heads - tails
-    fits = np.asarray(np.hypot(steps[:, 0], steps[:, 1]) >= _SHORTEST * off, dtype=np.bool_)
+    fits = np.asarray(hypots(steps[:, 0], steps[:, 1]) >= _SHORTEST * off, dtype=np.bool_)
     for end in lane:
         inside = (end > 0) & (end < space.free.shape) & (abs(end % 1 - 0.5) < 0.5 - _LEAST_CELLS)
         fits &= inside.all(axis=1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.clock import clock
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.graphs.attach import PlacedGraph
 from hybridnav.ext.graphs.files import load_graph
@@ -80,7 +81,7 @@ class GraphMethod:
         counted = int(expanded[0])
         if line is not None:
             points = self._frame.points_of_grid(line)
-            length_m = float(np.hypot(*np.diff(line, axis=0).T).sum()) * self._resolution_m
+            length_m = float(hypots(*np.diff(line, axis=0).T).sum()) * self._resolution_m
             found = AnyAngleResult(points, length_m)
             return MethodResult(
                 None,

@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav._base.trig import hypots
 from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
-from hybridnav.viz.layout import finish
+from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_shades, known_view
+from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import ground_entries
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.ext.graphs import GraphCheck, RouteGraph
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.viz.canvas import View
-    from hybridnav.viz.layout import Entry
 
 _COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
 _MARKS = "sD^vo<>phP"
@@ -138,7 +137,7 @@ def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
     # In the middle of the edge, on polylines of the segment there.
     at = np.array([each[(len(each) - 2) // 2 : (len(each) - 2) // 2 + 2] for each in lines])
     steps = at[:, 1] - at[:, 0]
-    along = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    along = steps / np.maximum(hypots(*steps.T), 1e-9)[:, None]
     look: dict[str, Any] = {"color": style.INK}
     shape: dict[str, Any] = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
     shape |= {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import operator
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hybridnav._base.poses import Motion
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.attach import placed_points
 from hybridnav.ext.graphs.judge import FreeSpace
@@ -155,9 +155,7 @@ def graph_changes(before: Graph, after: Graph) -> dict[str, dict[str, list[Any]]
     {'added': [2], 'gone': [], 'moved': []}
     """
     old, new = (_by_id(graph) for graph in (before, after))
-    moved = {
-        name: math.dist(old[0][name], new[0][name]) > _MOVED_M for name in old[0] if name in new[0]
-    }
+    moved = {name: dist(old[0][name], new[0][name]) > _MOVED_M for name in old[0] if name in new[0]}
     kept = [(name, ends, new[1][name]) for name, ends in old[1].items() if name in new[1]]
     follows = [name for name, was, now in kept if was != now or any(moved.get(n) for n in now)]
     return {

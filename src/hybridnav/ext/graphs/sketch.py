@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypot, hypots
 from hybridnav.ext.graphs.strands import aligned, crosses, crossing, length_between, turn_of
 
 if TYPE_CHECKING:
@@ -155,7 +156,7 @@ class Sketch:
         if self.kinds[node] > END:
             return set()
         at, comfort = self.positions, self.passage.comfort
-        gaps = {other: math.dist(at[node], at[other]) for other in beside[node]}
+        gaps = {other: dist(at[node], at[other]) for other in beside[node]}
         for other in sorted(gaps, key=lambda k: (gaps[k], k)):
             rest = sorted(beside[node] - {other})
             if gaps[other] > near or beside[other] & set(rest):
@@ -179,7 +180,7 @@ class Sketch:
         one, other = sorted(beside[node])
         at, comfort = self.positions, self.passage.comfort
         step = at[other] - at[one]
-        length = math.hypot(*step)
+        length = hypot(*step)
         if other in beside[one] or not 0 < length <= longest:
             return set()
         off = abs(float((at[node] - at[one]) @ np.array([-step[1], step[0]]))) / length
@@ -241,7 +242,7 @@ class Sketch:
             low = np.maximum(np.floor(positions[k] - most), 0).astype(np.int64)
             high = np.maximum(np.ceil(positions[k] + most), 0).astype(np.int64)
             spots = np.argwhere(free[low[0] : high[0], low[1] : high[1]]) + low + 0.5
-            away = np.hypot(*(spots - positions[k]).T)
+            away = hypots(*(spots - positions[k]).T)
             spots, away = spots[away < most], away[away < most]
             if len(spots):
                 room = np.minimum(passage.at(spots), passage.comfort)
@@ -263,10 +264,10 @@ class Sketch:
         ways = [each.items() for each in beside]
         known = edges.tolist()
         for one, other in known:
-            beside[one][other] = beside[other][one] = math.dist(at[one], at[other])
+            beside[one][other] = beside[other][one] = dist(at[one], at[other])
         added: list[list[int]] = []
         for one, other in new.tolist():
-            length = math.dist(at[one], at[other])
+            length = dist(at[one], at[other])
             if length_between(ways.__getitem__, one, other, 2 * length) < math.inf:
                 continue
             ends = np.array([*known, *added], dtype=np.int64).reshape(-1, 2)
@@ -292,7 +293,7 @@ class Sketch:
             lengths = np.maximum((steps**2).sum(axis=1), 1e-9)
             along = np.clip(((at - tails) * steps).sum(axis=1) / lengths, 0, 1)
             feet = tails + along[:, None] * steps
-            away = np.hypot(*(feet - at).T)
+            away = hypots(*(feet - at).T)
             order = np.argsort(away, kind="stable")
             if within is not None:
                 order = order[within[tuple(feet[order].astype(np.int64).T)]]
@@ -310,9 +311,9 @@ class Sketch:
         tail, head = self.edges[edge].tolist()
         at, ends = self.positions[node], self.positions[[tail, head]]
         joins = self.passage.space.joins
-        if math.dist(at, foot) <= near and joins(np.stack([at, at]), ends).all():
+        if dist(at, foot) <= near and joins(np.stack([at, at]), ends).all():
             return [(tail, node), (node, head)]
-        gaps = np.hypot(*(ends - foot).T)
+        gaps = hypots(*(ends - foot).T)
         if gaps.min() > near:
             foot = settled(foot[None])
             if self._is_free(foot)[0]:
@@ -330,7 +331,7 @@ class Sketch:
         edges: list[Sequence[int]] = []
         for tail, head in self.edges.tolist():
             start, end = self.positions[[tail, head]]
-            parts = max(1, math.ceil(math.dist(start, end) / longest - 0.2))
+            parts = max(1, math.ceil(dist(start, end) / longest - 0.2))
             along = np.arange(1, parts)[:, None] / parts
             inner = settled(start + (end - start) * along)
             line = np.concatenate([start[None], inner, end[None]])
@@ -378,7 +379,7 @@ class Sketch:
                 self.set_edges([*rest, *((node, end) for end in ends)])
                 return
         lengths = np.diff(self.positions[self.edges[which]], axis=1)[:, 0]
-        for k in np.argsort(-np.hypot(*lengths.T), kind="stable").tolist():
+        for k in np.argsort(-hypots(*lengths.T), kind="stable").tolist():
             edges = np.delete(self.edges, which[k], axis=0).tolist()
             beside: list[dict[int, float]] = [{} for _ in self.positions]
             ways = [each.items() for each in beside]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from hybridnav._base.trig import cos, sin
+from hybridnav._base.trig import cos, hypots, sin
 from hybridnav.ext.graphs.kernels import least_along, spread, thinned
 from hybridnav.maps.clearance import clearance_cells
 
@@ -282,7 +282,7 @@ def length_between(
 def is_beside(at: FloatArray, node: int, head: int, others: list[int], least_rad: float) -> bool:
     """Return whether an edge makes a smaller angle with another one of its node."""
     steps = at[[head, *others]] - at[node]
-    steps /= np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
+    steps /= np.maximum(hypots(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
     return bool((steps[1:] @ steps[0] > cos(least_rad)).any())
 
 

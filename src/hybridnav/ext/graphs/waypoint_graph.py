@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
-from hybridnav.ext.graphs.gather import Gathered, edge_text, point_of, shown
+from hybridnav._base.trig import hypots
+from hybridnav.ext.graphs.gather import Finding, Findings, Gathered, edge_text, point_of, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.graphs.gather import Finding, Findings
     from hybridnav.maps import OccupancyGrid
 
 Name = int | str
@@ -139,10 +139,8 @@ class WaypointGraph:
     @property
     def lengths_m(self) -> FloatArray:
         """float64 (m,), distance between the two nodes of each edge in metres."""
-        import numpy as np  # noqa: PLC0415 - lengths alone need it
-
         steps = self.points[self.edges[:, 1]] - self.points[self.edges[:, 0]]
-        found: FloatArray = np.hypot(steps[:, 0], steps[:, 1])
+        found: FloatArray = hypots(steps[:, 0], steps[:, 1])
         return found
 
     @property
@@ -272,7 +270,7 @@ class RouteGraph:
     def lengths_m(self) -> FloatArray:
         """float64 (m,), length of each edge in metres."""
         steps = self.positions[self.edges[:, 1]] - self.positions[self.edges[:, 0]]
-        return frozen(np.hypot(steps[:, 0], steps[:, 1]) * self.grid.resolution_m)
+        return frozen(hypots(steps[:, 0], steps[:, 1]) * self.grid.resolution_m)
 
     def to_networkx(self) -> nx.DiGraph[int]:
         """Return the graph, with `point`, `kind`, `room` and `door` of nodes, `length_m` of

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.planner import PlanResult
@@ -330,7 +331,7 @@ def _with_corner(
     rings: list[FloatArray], corner: Sequence[float], to: Sequence[float]
 ) -> list[FloatArray]:
     """Return rings with the corner that was meant elsewhere."""
-    distances = [np.hypot(*(ring - corner).T) for ring in rings]
+    distances = [hypots(*(ring - corner).T) for ring in rings]
     ring = min(range(len(rings)), key=lambda at: float(distances[at].min()))
     if distances[ring].min() > _NEAR:
         raise InvalidValueError("the outline has no such corner: it has changed meanwhile")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from hybridnav._base.trig import dist
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, in_grid, in_metres, rings_of
@@ -243,7 +243,7 @@ class Session:
         return {
             "name": name,
             "point": in_grid(at, self.grid),
-            "away_m": round(math.dist(at, wanted), 2),
+            "away_m": round(dist(at, wanted), 2),
         }
 
     def edit(self, edit: Edit) -> dict[str, Any]:

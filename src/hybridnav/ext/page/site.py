@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, BuildingPlan, Floor
 from hybridnav.ext.fleet.checks import check_closing
@@ -263,7 +263,7 @@ class _OverFloors:
         door = next((door for door in rooms.doors if door.number == end.door), None)
         if placed is None or door is None:
             return False
-        return math.dist(placed.position_m, door.position) <= max(door.width_m, _NEAR_M)
+        return dist(placed.position_m, door.position) <= max(door.width_m, _NEAR_M)
 
     @property
     def presets(self) -> list[str]:

@@ -4,8 +4,6 @@ Marks instead of clearing: `mark` holds 2 * generation for a cell that is open i
 generation, 2 * generation + 1 for one that is closed, less for one not yet seen.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

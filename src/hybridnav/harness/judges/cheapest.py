@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import cos, sin, sines_and_cosines
+from hybridnav._base.trig import cos, hypot, hypots, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges.kernels import cheapest_cost
 from hybridnav.maps import CellClass
@@ -168,7 +168,7 @@ class Chords:
             [layer.factors[rows[:, 0], cols[:, 1]] for rows in (low, high) for cols in (low, high)]
         )
         steps = np.diff(self.points, axis=0)[bent]
-        lengths_m = np.hypot(steps[:, 0], steps[:, 1])
+        lengths_m = hypots(steps[:, 0], steps[:, 1])
         return float((lengths_m * (near.max(axis=0) - near.min(axis=0))).sum())
 
 
@@ -217,7 +217,7 @@ def chords_of(grid: OccupancyGrid, points: ArrayLike, headings_rad: ArrayLike) -
     parts, off_m, lengths_m, faults = [xy[:1]], [np.empty(0)], [0.0], []
     for at in range(len(xy) - 1):
         step = xy[at + 1] - xy[at]
-        chord_m = math.hypot(*step.tolist())
+        chord_m = hypot(*step.tolist())
         if chord_m == 0:  # on the spot
             continue
         turn = (headings[at + 1] - headings[at] + math.pi) % math.tau - math.pi

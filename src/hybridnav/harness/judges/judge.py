@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from hybridnav._base.trig import hypot, hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import kernels
 from hybridnav.maps import CellClass, Frame
@@ -249,7 +250,7 @@ def _cut_corners(
 
 def _length_in_cells(steps: FloatArray) -> float:
     # Count equal steps instead of adding them: a + b sqrt 2, rounded once for each kind of step.
-    lengths, counts = np.unique(np.hypot(steps[:, 0], steps[:, 1]), return_counts=True)
+    lengths, counts = np.unique(hypots(steps[:, 0], steps[:, 1]), return_counts=True)
     return math.fsum((lengths * counts).tolist())
 
 
@@ -351,6 +352,6 @@ def _move_graph(free: BoolArray) -> sparse.csr_array[np.float64, tuple[int, int]
         heads[:, k] = number[row + up, col + right]
     offsets = np.zeros(len(row) + 1, dtype=np.int32)
     np.cumsum(legal.sum(axis=1), out=offsets[1:])
-    lengths = np.array([math.hypot(*step) for step in _STEPS])
+    lengths = np.array([hypot(*step) for step in _STEPS])
     weights = np.broadcast_to(lengths, legal.shape)[legal]
     return sparse.csr_array((weights, heads[legal], offsets), shape=(len(row), len(row)))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import kernels
 from hybridnav.harness.judges.judge import (
@@ -75,7 +76,7 @@ def judge_line(
     crossed = segment_faults(grid, xy, allow_unexplored=allow_unexplored)
     faults = _wrong_endpoints(grid, xy, start, goal)
     faults += [f"{crossed[0]}{more(len(crossed))}"] if crossed else []
-    return Verdict(tuple(faults), math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist()))
+    return Verdict(tuple(faults), math.fsum(hypots(steps[:, 0], steps[:, 1]).tolist()))
 
 
 def line_cells(
@@ -233,10 +234,10 @@ class VisibilityGraph:
         row, col = self.corners.astype(np.int64).T
         to_goal = _lower_bounds(octile[row, col], self.corners - endpoints[1])
         away = self.corners - endpoints[0]
-        near = np.hypot(away[:, 0], away[:, 1]) + to_goal <= most
+        near = hypots(away[:, 0], away[:, 1]) + to_goal <= most
         nodes = np.concatenate([self.corners[near], endpoints])
         blocked = np.concatenate([self._blocked[near], np.zeros((2, 2), np.int64)])
-        straight = np.array([math.dist(start, goal), 0.0])
+        straight = np.array([dist(start, goal), 0.0])
         chain = kernels.shortest_chain(
             classes, self._free_of, nodes, blocked, np.concatenate([to_goal[near], straight]), most
         )
@@ -244,7 +245,7 @@ class VisibilityGraph:
 
     def _path(self, positions: FloatArray) -> AnyAnglePath:
         steps = np.diff(positions, axis=0)
-        length = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        length = math.fsum(hypots(steps[:, 0], steps[:, 1]).tolist())
         frame = self._grid.frame
         return AnyAnglePath(frame.points_of_grid(positions), length * frame.resolution_m)
 
@@ -253,7 +254,7 @@ def _lower_bounds(octile: FloatArray, offset: FloatArray) -> FloatArray:
     """Return lower bounds on paths at any angle by octile lengths, which begin at corners of the
     goal's cell, and by straight lines."""
     by_octile = (octile - kernels.ACROSS) / kernels.OCTILE_RATIO - kernels.ACROSS
-    bounds: FloatArray = np.maximum(by_octile, np.hypot(offset[:, 0], offset[:, 1]))
+    bounds: FloatArray = np.maximum(by_octile, hypots(offset[:, 0], offset[:, 1]))
     return bounds * (1 - ROUNDING)
 
 

@@ -6,8 +6,6 @@ copy of the map. The tests are exact for coordinates that are multiples of 2^-24
 differences of such numbers fit a float64, and products are compared with their rounding errors.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 
@@ -15,6 +13,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import compare_products
+from hybridnav._base.trig import hypot
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 """Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,
@@ -204,7 +203,7 @@ def octile_lengths(classes, free_of, start_row, start_col, goal_row, goal_col):
             for right in range(-1, 2):
                 if not _is_step(classes, free_of, row, col, up, right):
                     continue
-                total = length + math.hypot(up, right)
+                total = length + hypot(up, right)
                 if total < lengths[row + up, col + right]:
                     lengths[row + up, col + right] = total
                     heapq.heappush(heap, (total, row + up, col + right))
@@ -223,7 +222,7 @@ def _corners_round(classes, free_of, row, col):
             for there_row in range(r, r + 2):
                 for there_col in range(c, c + 2):
                     if crossing_at(classes, free_of, there_row, there_col) == 0:
-                        away = math.hypot(there_row - row, there_col - col)
+                        away = hypot(there_row - row, there_col - col)
                         corners.append((there_row, there_col, away))
     return corners
 
@@ -272,7 +271,7 @@ def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
             if code != CLEAR:
                 continue
         came[node] = before
-        lengths[node] = lengths[before] + math.hypot(from_row, from_col)
+        lengths[node] = lengths[before] + hypot(from_row, from_col)
         # The blocked cell lies to the left or right of the path that arrives, by this sign.
         side = from_row * blocked[node, 1] - from_col * blocked[node, 0]
         for head in range(n):
@@ -291,7 +290,7 @@ def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
                 if turn * side < 0 or from_row * to_row + from_col * to_col < 0:
                     continue
             # Longer paths are of no use to the caller, and the heap stays small without them.
-            estimate = lengths[node] + math.hypot(to_row, to_col) + to_goal[head]
+            estimate = lengths[node] + hypot(to_row, to_col) + to_goal[head]
             if estimate <= most:
                 heapq.heappush(heap, (estimate, head, node))
 

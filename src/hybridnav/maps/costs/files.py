@@ -17,7 +17,7 @@ from hybridnav._base.files import printable
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.costs import CostLayer
-from hybridnav.maps.costs.factors import checked_speeds, mask_on_map
+from hybridnav.maps.costs.factors import SpeedLimits, checked_speeds, mask_on_map
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.maps.messages import read_cells
 from hybridnav.maps.occupancy import extent
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.maps import Frame, OccupancyGrid
-    from hybridnav.maps.costs.factors import SpeedLimits
 
 _KEYS = {
     "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.poses import wrapped
-from hybridnav._base.trig import atan2, directions
+from hybridnav._base.trig import atan2, directions, hypot, hypots
 from hybridnav.planner.guide import Space
-from hybridnav.planner.guide.instruction import LEAST_BEND_RAD
+from hybridnav.planner.guide.instruction import LEAST_BEND_RAD, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.planner import Path
-    from hybridnav.planner.guide.instruction import Shape
     from hybridnav.topology.rooms import Door
 
 
@@ -93,7 +92,7 @@ class Line:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         parts = [_points_of(path) for path in paths]
-        lengths = [np.hypot(*np.diff(part, axis=0).T) for part in parts]
+        lengths = [hypots(*np.diff(part, axis=0).T) for part in parts]
         self.points: FloatArray = np.concatenate(parts)
         """float64 (n, 2), metres, map frame."""
         along: list[FloatArray] = []
@@ -118,7 +117,7 @@ class Line:
     def heading(self, begin_m: float, end_m: float) -> float:
         """Return the direction from one point to another, radians; NaN if they coincide."""
         (x, y), (to_x, to_y) = self.at(begin_m), self.at(end_m)
-        if math.hypot(to_x - x, to_y - y) < _ROUNDING_M:
+        if hypot(to_x - x, to_y - y) < _ROUNDING_M:
             return math.nan
         return atan2(to_y - y, to_x - x)
 
@@ -132,7 +131,7 @@ class Line:
         """Return where the line passes a point, not before a length and rather near a guess."""
         end_m = next((end for end in self.ends_m if end > begin_m), self.length_m)
         points, along = self.between(begin_m, end_m)
-        away = np.hypot(*(points - point).T) + 0.1 * np.abs(along - guess_m)
+        away = hypots(*(points - point).T) + 0.1 * np.abs(along - guess_m)
         return float(along[int(np.argmin(away))])
 
     def bends(self) -> list[Bend]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.trig import atan2, cos, dist, hypots, sin
 from hybridnav.maps import CellClass
 from hybridnav.topology.rooms.listing import FOUND_NAME
 
@@ -148,7 +148,7 @@ class DoorsInSight:
         for door in self._alike(look.door, room):
             if door.number in (look.door.number, look.came_by):
                 continue
-            away = np.hypot(*(points - door.position).T)
+            away = hypots(*(points - door.position).T)
             nearest = int(np.argmin(away))
             at_m = float(along[nearest])
             hand, is_clear = self._hand_of(
@@ -201,7 +201,7 @@ class DoorsInSight:
         it is, the nearest first; None if that is not clear.
         """
         point, facing_rad = seen_from
-        away_m = math.dist(point, door.position)
+        away_m = dist(point, door.position)
         others = [
             one for one in self._alike(door, room) if one.number not in (door.number, came_by)
         ]
@@ -234,7 +234,7 @@ class DoorsInSight:
                 if off > _RIVAL_RAD or not self._is_seen_in_part(list(point), other):
                     continue
                 is_one = False
-                farther_m = math.dist(point, other.position) - away_m
+                farther_m = dist(point, other.position) - away_m
                 is_sure = is_sure and (farther_m > NEARER_M or off <= _SECTOR_RAD)
                 is_sure = is_sure and abs(farther_m) > NEARER_M
                 nearer += farther_m < 0
@@ -307,7 +307,7 @@ class DoorsInSight:
     def _is_free(self, point: list[float], end: list[float]) -> bool:
         """Return whether no occupied cell, nor what is off the map, lies between two points."""
         frame = self._rooms.grid.frame
-        count = 1 + math.ceil(2 * math.dist(point, end) / frame.resolution_m)
+        count = 1 + math.ceil(2 * dist(point, end) / frame.resolution_m)
         shares = np.arange(1, count) / count
         (row, col), (to_row, to_col) = frame.position_of(*point), frame.position_of(*end)
         cells = np.floor([row + (to_row - row) * shares, col + (to_col - col) * shares])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import hypots
 from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
@@ -64,7 +65,7 @@ class Guide:
         """
         rooms, cells = self._rooms, path.cells
         vertices, arcs, steps = self._route_finder.crossings(cells)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
+        along = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
         scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
         labels = rooms.label_of_vertex[vertices].tolist()
         crossed = [number for number in range(len(arcs)) if labels[number] != labels[number + 1]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.poses import wrapped
-from hybridnav._base.trig import cos, directions, sin
+from hybridnav._base.trig import cos, directions, dist, hypots, sin
 from hybridnav.maps import CellClass
 from hybridnav.planner.guide import Landmark, Space, Wall
 from hybridnav.planner.guide.glances import (
@@ -89,7 +89,7 @@ class Landmarks(DoorsInSight):
         if room is None or self._is_corridor(room):
             return None
         near = sorted(
-            (math.dist(point, one.position), one.number)
+            (dist(point, one.position), one.number)
             for one in self._doors_of.get(room, ())
             if not one.is_opening and self._is_seen_in_part(list(point), one)
         )
@@ -199,7 +199,7 @@ class Landmarks(DoorsInSight):
         if None not in door.rooms:
             return True
         near = [
-            (math.dist(one.position, door.position), one.number, one.is_opening)
+            (dist(one.position, door.position), one.number, one.is_opening)
             for one in self._doors_of.get(None, ())
             if one.number != door.number and not set(one.rooms) & set(door.rooms) - {None}
         ]
@@ -235,7 +235,7 @@ class Landmarks(DoorsInSight):
         point, heading_rad = line.at(0.0), line.first_heading()
         found: list[tuple[int, float, int, Landmark]] = []
         for door in self._doors_of.get(room, ()):
-            away_m, is_exit = math.dist(point, door.position), door.number in exits
+            away_m, is_exit = dist(point, door.position), door.number in exits
             is_far = away_m > _FARTHEST_M and not is_exit
             named = self._beyond(door, room)
             others = [one for one in self._doors_of[room] if self._beyond(one, room) == named]
@@ -266,7 +266,7 @@ class Landmarks(DoorsInSight):
         near = [
             (away_m, door.number, door)
             for door in self._doors_of.get(room, ())
-            for away_m in [math.dist(point, door.position)]
+            for away_m in [dist(point, door.position)]
             if _NEAREST_M <= away_m <= _NEARBY_M and door.number not in but
             if not (door.is_opening and None in door.rooms) and self._is_seen(list(point), door)
         ]
@@ -283,7 +283,7 @@ class Landmarks(DoorsInSight):
         who stands beside it.
         """
         span = self._span(door)
-        away_m = np.hypot(*(span - point).T)
+        away_m = hypots(*(span - point).T)
         nearest = int(np.argmin(away_m))
         middle = turn_to(heading_rad, point, door.position)
         if away_m[nearest] < _NEAREST_M:

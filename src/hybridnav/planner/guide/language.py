@@ -1,7 +1,5 @@
 """The table that a language fills in, and the sentences in English and in German."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import hypots
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
@@ -59,7 +61,7 @@ class RoomWalls:
         float64 (n + 1,), in cells."""
         cells = self._sides[[*sides[::step], sides[0]]] // 4
         row, col = np.divmod(cells, self._inside.shape[1])
-        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(row), np.diff(col)))])
+        lengths = np.concatenate([[0.0], np.cumsum(hypots(np.diff(row), np.diff(col)))])
         ends = np.append(np.arange(0, len(sides), step), len(sides))
         return np.interp(np.arange(len(sides) + 1), ends, lengths)
 

@@ -14,14 +14,14 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import Motion
-from hybridnav._base.trig import directions
+from hybridnav._base.trig import directions, dist
 from hybridnav.maps.geometry import cells_of_line, polyline_length
 from hybridnav.planner import Path, PlanStatus, Refinement
 from hybridnav.planner.methods.discs import Discs
 from hybridnav.refine import LineOfSight, MotionCheck
-from hybridnav.refine.curves import driven, shortest_curve
+from hybridnav.refine.curves import Curve, Pose, driven, shortest_curve
 from hybridnav.refine.ompl import Corridors, OmplQuery, Setup, Worker
-from hybridnav.search.found import Query
+from hybridnav.search.found import ClosedCells, Found, Method, Query
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,9 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.result import Answer
     from hybridnav.planner.settings import OmplPlannerSettings
-    from hybridnav.refine.curves import Curve, Pose
     from hybridnav.refine.ompl import Reply, Search
-    from hybridnav.search.found import ClosedCells, Found, Method
 
 
 NEAR_BOUND = 1.05
@@ -336,7 +334,7 @@ class OmplPlanner:
         """Return the length of the shortest path without obstacles, a bound; never by OMPL, whose
         Reeds-Shepp distance is too long for some straight drives."""
         first, last = endpoints
-        straight_m = math.dist(first[:2], last[:2])
+        straight_m = dist(first[:2], last[:2])
         if self.ompl.turning_radius_m is None:
             return straight_m
         return max(self._curve(tuple(first.tolist()), tuple(last.tolist())).length_m, straight_m)

@@ -12,8 +12,9 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.geometry import cells_of_line, line_between, polyline_length, polyline_lengths
 from hybridnav.planner.methods.grid import KnownMap, enterable_of
@@ -33,7 +34,6 @@ from hybridnav.search.mesh.build import count_corners
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.planner.settings import ShortestSettings
     from hybridnav.search.distance_table import LabelSource
@@ -206,7 +206,7 @@ class OverMesh(Method):
         search = self._search
         self._label_meanwhile()
         if search is None:
-            bound = math.dist(*positions)
+            bound = dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
         began, closed = clock(), query.closed
         detours = None if closed is None else self._round(search, closed)

@@ -5,8 +5,6 @@ Conventions: edge e has the darts 2e and 2e + 1, so alpha(d) = d ^ 1. A *base ed
 edge starts at its lower cell. Compact arrays hold the edges of one level in the order of base ids.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels that divide the free cells of a map at its throats, by how far obstacles are away."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

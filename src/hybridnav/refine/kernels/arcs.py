@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import GRAIN, is_legal
-from hybridnav._base.trig import atan2, cos, sin, tan
+from hybridnav._base.trig import atan2, cos, hypot, sin, tan
 from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 _FREE = 1
@@ -58,7 +58,7 @@ def arc_cost(free, factors, a, bend, c):
     """
     in_row, in_col = bend[0] - a[0], bend[1] - a[1]
     out_row, out_col = c[0] - bend[0], c[1] - bend[1]
-    ahead = math.hypot(in_row, in_col)
+    ahead = hypot(in_row, in_col)
     turn = atan2(in_row * out_col - in_col * out_row, in_row * out_row + in_col * out_col)
     if turn == 0:  # of a bend that rounding has made straight
         return -1.0
@@ -87,7 +87,7 @@ def arc_cost(free, factors, a, bend, c):
         if not _box_is_free(free, low_row, low_col, high_row, high_col):
             return -1.0
         total += segment_cost(factors, row, col, at_row, at_col)
-        chords += math.hypot(at_row - row, at_col - col)
+        chords += hypot(at_row - row, at_col - col)
         row, col = at_row, at_col
     return total * (radius * abs(turn) / chords)
 
@@ -105,13 +105,13 @@ def _turn_at(line, i):
 def _direction(line, i):
     """Return the direction of a segment of a line, float64 (2,) of length 1."""
     step = line[i + 1] - line[i]
-    return step / math.hypot(step[0], step[1])
+    return step / hypot(step[0], step[1])
 
 
 @njit(cache=True, nogil=True)
 def _towards(first, last, distance):
     """Return the position at some distance from one towards another, rounded to 2^-24."""
-    whole = math.hypot(last[0] - first[0], last[1] - first[1])
+    whole = hypot(last[0] - first[0], last[1] - first[1])
     share = distance / whole
     position = np.empty(2)
     for k in range(2):
@@ -182,7 +182,7 @@ def _thinned(free, factors, line, radius, spare):
     for _ in range(_ROUNDS):
         before, i = n, 1
         while i < n - 2:
-            length = math.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
+            length = hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
             need = tan(_turn_at(line, i) / 2) + tan(_turn_at(line, i + 1) / 2)
             if radius * need > length:
                 added = _merged(free, factors, line, n, i, spare)
@@ -221,12 +221,12 @@ def round_bends(free, factors, line, radius, spare):
         # An arc begins `most` before its bend and ends as far behind: its radius times `half`.
         turn = max(_turn_at(line, i), _SMALLEST_TURN)
         half = tan(turn / 2)
-        most = math.hypot(ahead[0] - bend[0], ahead[1] - bend[1])
+        most = hypot(ahead[0] - bend[0], ahead[1] - bend[1])
         # Leave the next bend room for its smallest arc, unless this one needs that for its own.
         if i < n - 2:
             kept = radius * tan(_turn_at(line, i + 1) / 2) + _MARGIN
             most = max(most - kept, min(most, radius * half))
-        room = math.hypot(bend[0] - last[0], bend[1] - last[1])
+        room = hypot(bend[0] - last[0], bend[1] - last[1])
         most = min(room, most, _LARGEST * radius * half)
         a, c, arc = bend, bend, 0.0
         # The widest arc first, then halves of it down to the radius; else a turn on the spot.
@@ -246,8 +246,8 @@ def round_bends(free, factors, line, radius, spare):
                 break
             most = max(most / 2, radius * half)
         cost += segment_cost(factors, last[0], last[1], a[0], a[1]) + arc
-        length += math.hypot(a[0] - last[0], a[1] - last[1])
-        length += math.hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / sin(turn / 2)
+        length += hypot(a[0] - last[0], a[1] - last[1])
+        length += hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / sin(turn / 2)
         # An arc that begins where the one before ends has no line before it, and a line that goes
         # on at a bend has one point there.
         if turn > _LEAST_SPOT_TURN:
@@ -262,7 +262,7 @@ def round_bends(free, factors, line, radius, spare):
         points[size], directions[size] = line[n - 1], directions[size - 1]
         size += 1
     cost += segment_cost(factors, last[0], last[1], line[n - 1, 0], line[n - 1, 1])
-    length += math.hypot(line[n - 1, 0] - last[0], line[n - 1, 1] - last[1])
+    length += hypot(line[n - 1, 0] - last[0], line[n - 1, 1] - last[1])
     headings = np.empty(size)
     for i in range(size):
         headings[i] = atan2(directions[i, 0], directions[i, 1])

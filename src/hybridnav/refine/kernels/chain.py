@@ -3,12 +3,11 @@
 Positions are those of `taut`.
 """
 
-import math
-
 import numpy as np
 
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.arrays import total
+from hybridnav._base.trig import hypot
 from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 FINE = 2.0**12
@@ -70,7 +69,7 @@ def slopes_of(factors, chain, stride, aside, slope, bend, link):
     cost = 0.0
     for i in range(chain.shape[0] - 1):
         down, over = chain[i + 1, 0] - chain[i, 0], chain[i + 1, 1] - chain[i, 1]
-        length = math.hypot(down, over)
+        length = hypot(down, over)
         if length < 1e-9:
             continue
         ahead_row, ahead_col = down / length, over / length

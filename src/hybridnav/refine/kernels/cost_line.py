@@ -9,13 +9,12 @@ bends, the only ones left, move one at a time, by the cost itself.
 Positions are those of `taut`.
 """
 
-import math
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import total
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.trig import hypot
 from hybridnav.maps.costs.integral import legal_cost
 from hybridnav.refine.kernels.chain import FINE, costs_of, polish, slopes_of, solve
 
@@ -94,7 +93,7 @@ def _cut_short(free, factors, line):
                 break
             most = (least - total[i]) * (1 + _SLACK)
             # No factor is below 1.
-            away = math.hypot(row - line[i, 0], col - line[i, 1])
+            away = hypot(row - line[i, 0], col - line[i, 1])
             if away == 0 or away > most:
                 continue
             whole = legal_cost(free, factors, line[i, 0], line[i, 1], row, col, most)
@@ -122,7 +121,7 @@ def _spread(free, factors, line, spacing):
     n = line.shape[0]
     whole = 0.0
     for i in range(1, n):
-        whole += math.hypot(line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1])
+        whole += hypot(line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1])
     m = max(int(whole / spacing + 0.5), 1)
     chain = np.empty((m + n, 2))
     chain[0] = line[0]
@@ -133,7 +132,7 @@ def _spread(free, factors, line, spacing):
         while k < m and ahead < n:
             row, col = line[ahead - 1]
             down, over = line[ahead, 0] - row, line[ahead, 1] - col
-            step, left = math.hypot(down, over), whole * k / m - passed
+            step, left = hypot(down, over), whole * k / m - passed
             if step > left:
                 at[0] = np.rint((row + left / step * down) * FINE) / FINE
                 at[1] = np.rint((col + left / step * over) * FINE) / FINE
@@ -195,7 +194,7 @@ def _face_aside(chain, aside):
     """Set the directions in which the points of a chain move: across the line past each."""
     for i in range(1, chain.shape[0] - 1):
         down, over = chain[i + 1, 0] - chain[i - 1, 0], chain[i + 1, 1] - chain[i - 1, 1]
-        length = math.hypot(down, over)
+        length = hypot(down, over)
         aside[i, 0] = -over / length if length > 0 else 0.0
         aside[i, 1] = down / length if length > 0 else 0.0
 
@@ -258,7 +257,7 @@ def _thinned(free, factors, chain):
         j = i + 1
         while j < n - 1:
             down, over = chain[j + 1, 0] - chain[i, 0], chain[j + 1, 1] - chain[i, 1]
-            length = math.hypot(down, over)
+            length = hypot(down, over)
             is_flat = length > 0
             for k in range(i + 1, j + 1):
                 off = down * (chain[k, 1] - chain[i, 1]) - over * (chain[k, 0] - chain[i, 0])
@@ -340,12 +339,12 @@ def rest_of(free, factors, line, start, most):
         squared = down * down + across * across
         share = 0.0 if squared == 0.0 else (to_row * down + to_col * across) / squared
         share = min(max(share, 0.0), 1.0)
-        apart = math.hypot(to_row - share * down, to_col - share * across)
+        apart = hypot(to_row - share * down, to_col - share * across)
         if apart < nearest:
             nearest, ahead = apart, k
     # Not to a bend close by, which would turn the robot; and past one that is out of sight.
     first, last, total = ahead, line.shape[0] - 1, np.inf
-    while first < last and math.hypot(line[first, 0] - row, line[first, 1] - col) < _NEAR:
+    while first < last and hypot(line[first, 0] - row, line[first, 1] - col) < _NEAR:
         first += 1
     total = legal_cost(free, factors, row, col, line[first, 0], line[first, 1], most)
     while first < last and total == np.inf:

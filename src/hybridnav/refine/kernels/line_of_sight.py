@@ -6,6 +6,7 @@ import numpy as np
 
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.exact import GRAIN, is_legal
+from hybridnav._base.trig import hypot
 from hybridnav.refine.kernels.taut import FREE, grown, tighten
 
 _FIRST, _STEP = 0.01, 0.5
@@ -50,7 +51,7 @@ def apart(marks, candidates, n_taken, spacing, most):
             other = first[up + around // 3 - 1, right + around % 3 - 1]
             while other >= 0 and not is_seen:
                 to_row, to_col = candidates[other, 0], candidates[other, 1]
-                if math.hypot(to_row - row, to_col - col) <= spacing:
+                if hypot(to_row - row, to_col - col) <= spacing:
                     is_seen = (row == to_row and col == to_col) or is_legal(
                         marks, row, col, to_row, to_col, FREE, FREE
                     )
@@ -108,8 +109,8 @@ def shared(marks, starts, goals, limits, positions):
                 k = -1 if found[i] else first[up, right]
                 while k >= 0:
                     at_row, at_col = positions[k, 0], positions[k, 1]
-                    way = math.hypot(at_row - row, at_col - col)
-                    way += math.hypot(at_row - down, at_col - across)
+                    way = hypot(at_row - row, at_col - col)
+                    way += hypot(at_row - down, at_col - across)
                     if (
                         way <= limits[i]
                         and is_legal(marks, row, col, at_row, at_col, FREE, FREE)
@@ -269,7 +270,7 @@ def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     rows, cols = marks.shape
     row, col = _cell_at(marks, u_row, u_col, w_row, w_col)
     to_row, to_col = w_row - u_row, w_col - u_col
-    distance = math.hypot(to_row, to_col)
+    distance = hypot(to_row, to_col)
     if row < 0 or distance == 0.0:
         return 0, 0
     string[0, 0], string[0, 1], string[0, 2] = u_row, u_col, 1.0
@@ -377,7 +378,7 @@ def improve(marks, string, n, budget):
                 string[j, 1],
             )
             # A part that is almost straight has too little to gain for a walk.
-            if length - math.hypot(w_row - u_row, w_col - u_col) < _SLACK * length * (span > 2):
+            if length - hypot(w_row - u_row, w_col - u_col) < _SLACK * length * (span > 2):
                 continue
             for hand in (1, -1):
                 if budget <= 0:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav._base.trig import acos, asin, atan2, cos, sin
+from hybridnav._base.trig import acos, asin, atan2, cos, hypot, sin
 from hybridnav.refine.kernels.sweep import (
     ROUNDING,
     STAYS,
@@ -51,7 +51,7 @@ def _critical(part, square, low, high, headings):
     count = 0
     i = part.shape[0] - 1
     for j in range(part.shape[0]):
-        radius, angle = math.hypot(part[j, 0], part[j, 1]), atan2(part[j, 1], part[j, 0])
+        radius, angle = hypot(part[j, 0], part[j, 1]), atan2(part[j, 1], part[j, 0])
         for offset in range(2):
             row, col = square[0] + offset, square[1] + offset
             if abs(row) < radius:
@@ -63,11 +63,11 @@ def _critical(part, square, low, high, headings):
                 count = _note(headings, count, at - angle, low, high)
                 count = _note(headings, count, -at - angle, low, high)
         d_x, d_y = part[j, 0] - part[i, 0], part[j, 1] - part[i, 1]
-        away = (d_y * part[j, 0] - d_x * part[j, 1]) / math.hypot(d_x, d_y)
+        away = (d_y * part[j, 0] - d_x * part[j, 1]) / hypot(d_x, d_y)
         angle = atan2(-d_x, d_y)
         for corner in range(4):
             row, col = square[0] + corner // 2, square[1] + corner % 2
-            radius = math.hypot(row, col)
+            radius = hypot(row, col)
             if abs(away) < radius:
                 at, phi = acos(away / radius), atan2(row, col)
                 count = _note(headings, count, phi - angle - at, low, high)
@@ -105,7 +105,7 @@ def _overlaps(part, square, heading):
     i = part.shape[0] - 1
     for j in range(part.shape[0]):
         d_x, d_y = part[j, 0] - part[i, 0], part[j, 1] - part[i, 1]
-        length = math.hypot(d_x, d_y)
+        length = hypot(d_x, d_y)
         off = hand * (d_y * (centre_x - part[i, 0]) - d_x * (centre_y - part[i, 1]))
         # Half the width of the cell across the side.
         across = 0.5 * (abs(cosine * d_y + sine * d_x) + abs(sine * d_y - cosine * d_x))

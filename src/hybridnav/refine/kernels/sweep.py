@@ -21,7 +21,7 @@ import numpy as np
 
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.exact import GRAIN, is_legal
-from hybridnav._base.trig import cos, sin
+from hybridnav._base.trig import cos, hypot, sin
 
 BLOCKED, OPEN, STAND = 0, 1, 2
 """Marks of cells in a query: not free, free but outside the corridor, free to stand on."""
@@ -295,7 +295,7 @@ def near(clearance, row, col):
     centre."""
     r = min(max(math.floor(row), 0), clearance.shape[0] - 1)
     c = min(max(math.floor(col), 0), clearance.shape[1] - 1)
-    offset = math.hypot(row - r - 0.5, col - c - 0.5)
+    offset = hypot(row - r - 0.5, col - c - 0.5)
     return clearance[r, c] - offset - _HALF_DIAGONAL, clearance[r, c] + offset
 
 
@@ -331,7 +331,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     if offsets.size == 1:
         return True
     reach = radii[1]
-    length = abs(radius * turn) if radius != 0.0 else math.hypot(d_row, d_col)
+    length = abs(radius * turn) if radius != 0.0 else hypot(d_row, d_col)
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
     columns = room(ahead.shape[0], reach, length)
     moves = SHIFTS if turn == 0.0 else TURNS

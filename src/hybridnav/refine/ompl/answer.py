@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.moves import path_length_in_cells
-from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.trig import atan2, cos, hypot, hypots, sin
 from hybridnav.refine.ompl.attempts import Attempts, Simplifier, objective_of
 from hybridnav.refine.ompl.problem import Base, Box, SearchArea, bounds_of, search_area_of
 from hybridnav.refine.ompl.solve import IMPROVING, Problem, StateSpace, solve
@@ -102,10 +102,10 @@ def _joints(attempts: Attempts, cells: LongArray) -> list[int]:
         crossings = (np.flatnonzero(np.diff(fields)) + 1).tolist()
     waiting = list(itertools.pairwise(sorted({0, *crossings, last})))[::-1]
     joints = [0]
-    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
+    at = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
     while waiting:
         first, end = waiting.pop()
-        straight = math.hypot(*(cells[end] - cells[first]))
+        straight = hypot(*(cells[end] - cells[first]))
         if at[end] - at[first] > _WINDING * straight + _SLACK_CELLS:
             middle = (first + end) // 2
             waiting += [(middle, end), (first, middle)]
@@ -212,7 +212,7 @@ def _window(
 
 def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
     """Return the indices of the states just before and after a part of a path's length."""
-    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    at = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(points[:, :2], axis=0).T))])
     first = int(np.searchsorted(at, along[0] * at[-1], side="right")) - 1
     last = int(np.searchsorted(at, along[1] * at[-1]))
     return max(first, 0), min(last, len(points) - 1)
@@ -224,7 +224,7 @@ def _ellipse(corridor: SearchArea, inner: FloatArray, cost: float) -> tuple[Floa
     They lie inside the bounds of the corridor (J. Gammell and others: Informed RRT*, 2014).
     """
     offset = (inner[-1] - inner[0])[:2]
-    straight = float(np.hypot(*offset))
+    straight = float(hypots(*offset))
     across = math.sqrt(max(cost * cost - straight * straight, 0.0)) / 2
     direction = offset / straight if straight > 0 else np.array([1.0, 0.0])
     half = np.sqrt((cost / 2 * direction) ** 2 + (across * direction[::-1]) ** 2)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base, geometric
 
+from hybridnav._base.trig import hypot, hypots
 from hybridnav.refine.ompl.client import OmplQuery, Reply, Search
 from hybridnav.refine.ompl.solve import StateSpace
 
@@ -98,7 +99,7 @@ class Attempts:
     def _miss(self, points: FloatArray) -> float:
         if not len(points):
             return math.inf
-        return float(np.hypot(*(points[-1] - self.query.goal)[:2]))
+        return float(hypots(*(points[-1] - self.query.goal)[:2]))
 
     def _outcome(self) -> Any:
         if len(self._best):
@@ -229,7 +230,7 @@ class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings h
         super().__init__(space.information)
 
     def motionCost(self, first: Any, second: Any) -> Any:  # noqa: N802 - OMPL's names
-        return base.Cost(math.hypot(second.getX() - first.getX(), second.getY() - first.getY()))
+        return base.Cost(hypot(second.getX() - first.getX(), second.getY() - first.getY()))
 
     def motionCostHeuristic(self, first: Any, second: Any) -> Any:  # noqa: N802
         return self.motionCost(first, second)

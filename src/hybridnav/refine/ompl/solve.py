@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base, geometric
 
+from hybridnav._base.trig import hypot, hypots
 from hybridnav.errors import OmplError
 from hybridnav.refine.curves import driven, shortest_curve
 from hybridnav.refine.ompl.settings import PARAMETERS, REAL, ROADMAPS
@@ -130,7 +131,7 @@ class StateSpace:
             curve = partial(shortest_curve, radius_m=self._radius_m, reverses=not self._is_dubins)
             return math.fsum(curve(*pair).length_m for pair in itertools.pairwise(points.tolist()))
         steps = np.diff(points[:, :2], axis=0)
-        return math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        return math.fsum(hypots(steps[:, 0], steps[:, 1]).tolist())
 
 
 def _space_of(settings: OmplSettings) -> Any:
@@ -390,7 +391,7 @@ def _found(problem: Problem, definition: Any) -> Searched:
     # OMPL's own flag is wrong for roadmaps that grew after a first answer.
     off = points[-1] - problem.goal
     turned = 0.0 if problem.space.dimension == 2 else math.remainder(off[2], math.tau)  # noqa: PLR2004
-    return Searched(points, is_exact=bool(math.hypot(off[0], off[1]) + abs(turned) <= NEAR))
+    return Searched(points, is_exact=bool(hypot(off[0], off[1]) + abs(turned) <= NEAR))
 
 
 def _note_edges(space: StateSpace, planner: Any, search: Search) -> None:

@@ -1,7 +1,5 @@
 """Kernels of A* on cells: by lengths, and by lengths times factors of cells."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

@@ -1,12 +1,11 @@
 """Kernels of proofs: the tree of shortest paths that bounds all others, and walls round an area."""
 
-import math
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.kernels.moves import COL_STEP, FAR, ROW_STEP
+from hybridnav._base.trig import hypot
 
 ONE = 2**14
 """The factor 1 in units."""
@@ -269,8 +268,8 @@ def strings_of(walls, grain, ends, points, limit):
                         if _bend(walls, line, to, up)[0] == 0:
                             continue
                         # A string over it is worth a look if the rest may be straight.
-                        over = so_far + math.hypot(line - y, to - x)
-                        whole = over + math.hypot(line - ends[1, 0], to - ends[1, 1])
+                        over = so_far + hypot(line - y, to - x)
+                        whole = over + hypot(line - ends[1, 0], to - ends[1, 1])
                         if whole < limit and over < length[line, to]:
                             length[line, to], before[line, to] = over, name
                             if size == len(heap):
@@ -285,7 +284,7 @@ def strings_of(walls, grain, ends, points, limit):
                     best = (x * ahead + ends[1, 1] * height) / (ahead + height)
                     best = max(best, (col + shaft[1] * top / shaft[0]) / grain)
                     best = min(best, (col + shaft[3] * top / shaft[2]) / grain)
-                    whole = math.hypot(height, best - x) + math.hypot(ahead, best - ends[1, 1])
+                    whole = hypot(height, best - x) + hypot(ahead, best - ends[1, 1])
                     if so_far + whole < limit:
                         shafts[left] = at + up, *shaft
                         left += 1
@@ -309,7 +308,7 @@ def strings_of(walls, grain, ends, points, limit):
                     # No corner lies in between.
                     if _bend(walls, line, to, 1)[0] != 0:
                         over = so_far + abs(to - x)
-                        whole = over + math.hypot(line - ends[1, 0], to - ends[1, 1])
+                        whole = over + hypot(line - ends[1, 0], to - ends[1, 1])
                         if whole < limit and over < length[line, to]:
                             length[line, to], before[line, to] = over, name
                             if size == len(heap):

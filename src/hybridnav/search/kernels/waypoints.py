@@ -1,7 +1,5 @@
 """Kernel of the cheapest waypoints: a spread from one set of cells to another."""
 
-from __future__ import annotations
-
 import heapq
 
 import numpy as np

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import dist, hypots
 from hybridnav.search.lattice.kernels import bound as kernels
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def _bound_of(
     covered, slopes = np.empty((0, 2), np.int64), np.empty((0, 2))
     for (row, col), cell in zip(ends, cells, strict=True):
         corner = round(row), round(col)
-        joins += float(factors[tuple(cell)]) * math.dist((row, col), corner)
+        joins += float(factors[tuple(cell)]) * dist((row, col), corner)
         corners.append(np.array(corner, dtype=np.int64))
     limit = min((known + joins) * _RATIO, _MOST)
     # As no factor is below 1, nothing outside of this box is within the limit.
@@ -140,7 +141,7 @@ def _bound_of(
         covered = np.stack(np.divmod(band[0], factors.shape[1]), axis=1) + low
         slopes = np.stack([four[:, 2] + four[:, 3], four[:, 1] + four[:, 3]], axis=1)
         slopes -= np.stack([four[:, 0] + four[:, 1], four[:, 0] + four[:, 2]], axis=1)
-    return min(max(found, math.dist(*ends)), known), covered, slopes / 2
+    return min(max(found, dist(*ends)), known), covered, slopes / 2
 
 
 def _by_potential(
@@ -162,7 +163,7 @@ def _by_potential(
     for k, (from_end, (position, cell)) in enumerate(zip(costs, ends, strict=True)):
         inside = np.clip(np.subtract(position, cell), 0.0, 1.0)
         wave = np.full(len(flat_corners), np.inf)
-        wave[corners[own[k]]] = of_cells[own[k]] * np.hypot(*(_CORNERS - inside).T)
+        wave[corners[own[k]]] = of_cells[own[k]] * hypots(*(_CORNERS - inside).T)
         order = np.argsort(from_end[flat_corners[corners]].min(axis=1), kind="stable")
         kernels.march(corners, of_cells, order, wave)
         waves.append(wave)

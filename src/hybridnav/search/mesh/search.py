@@ -13,8 +13,9 @@ import numpy as np
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
+from hybridnav._base.trig import hypots
 from hybridnav.search.mesh.build import (
     MANY_CORNERS,
     CornerHierarchy,
@@ -30,7 +31,6 @@ from hybridnav.search.mesh.kernels.repairs import footing_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
 
@@ -364,7 +364,7 @@ class MeshSearch:
         if known is not None:
             first, last = (round_into(*end) for end in zip(cells, positions, strict=True))
             known = np.concatenate([[first], known[1:-1], [last]])
-            upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
+            upper = float(hypots(*np.diff(known, axis=0).T).sum())
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
         graph, works = self.engine() if repaired is None else (self._graph, self.corner_works)

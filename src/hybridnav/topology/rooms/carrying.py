@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
@@ -408,7 +409,7 @@ def _doors(
         there = after.labels[at].tolist()
         heirs = [heir_of.get(room, NO_ROOM if room == NO_ROOM else None) for room in side]
         firm = sum(heir is not None and heir in there for heir in heirs)
-        off_m = float(np.hypot(*(after.sides[after.boundary_of == at] - known[number]).T).min())
+        off_m = float(hypots(*(after.sides[after.boundary_of == at] - known[number]).T).min())
         confidence = round((1 - off_m) * firm / 2, 3)
         is_sure = firm == len(side) and after.passages_m[at] >= LEAST_DOOR_M
         if not firm or (off_m > _SURE_DOOR_M and not is_sure):

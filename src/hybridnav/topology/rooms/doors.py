@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.trig import cos, sin, sines_and_cosines
+from hybridnav._base.trig import cos, hypots, sin, sines_and_cosines
 from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.islands import unique_rows
@@ -160,7 +160,7 @@ class RoomBoundaries:
         row, col = np.nonzero(np.isfinite(away))
         boundary = self.boundary_of[nearest[row, col]]
         half_cells = np.round(2 * away[row, col] / self.resolution_m)
-        to_middle = np.hypot(*(points[row] - self.middles[boundary]).T)
+        to_middle = hypots(*(points[row] - self.middles[boundary]).T)
         names = names[row]
         order = np.lexsort((boundary, names, to_middle, half_cells))
         candidates = dict.fromkeys(
@@ -222,7 +222,7 @@ def farthest_ends(edges: LongArray, cols: int) -> FloatArray:
     sines, cosines = sines_and_cosines(np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS))
     along = corners[:, :1] * cosines + corners[:, 1:] * sines
     pairs = corners[np.stack([along.argmin(axis=0), along.argmax(axis=0)], axis=1)]
-    lengths = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T)
+    lengths = hypots(*(pairs[:, 1] - pairs[:, 0]).T)
     return pairs[int(lengths.argmax())]
 
 

@@ -57,7 +57,8 @@ class Listing:
         is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
         begins = is_wide | (areas == areas.max(initial=0))
         can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
-        is_large = areas * level.grid.resolution_m**2 >= _LEAST_AREA_M2
+        side_m = level.grid.resolution_m
+        is_large = areas * (side_m * side_m) >= _LEAST_AREA_M2
         is_listed = is_wide & can_enter & is_large
         is_own = np.array(
             [FOUND_NAME.fullmatch(name) is None for name in labels.names], dtype=np.bool_
@@ -159,13 +160,13 @@ def kinds_of(
             continue
         inside = ndimage.binary_fill_holes(np.pad(label[window] == number, 1))
         depths_m = (clearance_cells(~inside)[inside]) * resolution_m
-        area_m2 = np.count_nonzero(inside) * resolution_m**2
+        area_m2 = np.count_nonzero(inside) * (resolution_m * resolution_m)
         broadest_m, breadth_m = 2 * depths_m.max(), 2 * float(np.quantile(depths_m, 0.9))
         sides = sum(np.count_nonzero(inside ^ np.roll(inside, 1, axis)) for axis in (0, 1))
         outline_m = sides * resolution_m * np.pi / 4  # that of a disc of as many sides
         is_narrow = breadth_m <= WIDEST_CORRIDOR_M and 4 * depths_m.mean() >= _NARROWEST_M
         is_smooth = 2 * area_m2 >= _SMOOTH * breadth_m * outline_m
-        length = area_m2 / broadest_m**2
+        length = area_m2 / (broadest_m * broadest_m)
         if is_narrow and is_smooth and length >= _LONG:
             found.append(RoomKind("corridor", float(1 - 0.5 * _LONG / length)))
         elif area_m2 >= _LEAST_HALL_M2:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import printable
+from hybridnav._base.trig import hypots
 from hybridnav.errors import (
     HybridNavError,
     InvalidValueError,
@@ -257,7 +258,7 @@ def _at_door(
         )
     points = grid.frame.points_of(np.stack([rows[kept], cols[kept]], axis=1))
     away = points - np.array(door.position)
-    x, y = points[int(np.argmin(np.hypot(away[:, 0], away[:, 1])))].tolist()
+    x, y = points[int(np.argmin(hypots(away[:, 0], away[:, 1])))].tolist()
     return (x, y), yaw_rad
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.files import NewFile, printable
+from hybridnav._base.trig import dist
 from hybridnav._base.yaml_file import read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.fleet import Building, BuildingGraph, FloorGraph
@@ -275,7 +276,7 @@ def _add_door(
     if len(set(cells)) < 2:  # noqa: PLR2004 - an edge has two ends
         layer.graph["boundaries"][boundary] = facts | {"cells": cells}
         return
-    apart = math.dist(*(layer.nodes[cell]["point"] for cell in cells))
+    apart = dist(*(layer.nodes[cell]["point"] for cell in cells))
     facts |= {"weight": round(apart, _DECIMALS), "boundary": boundary}
     layer.add_edge(cells[0], cells[1], f"{boundary}.edge", **facts)
 
@@ -293,7 +294,7 @@ def _add_links(layer: nx.MultiGraph[str], building: Building) -> Iterator[str]:
             point = tuple(round(each, _DECIMALS) for each in end.position_m)
             layer.add_node(cell, name=f"{link.kind} {link.name}", point=point, **facts)
             beside = f"P{numbers[end.floor]}.{place}"
-            apart = math.dist(point, layer.nodes[beside]["point"])
+            apart = dist(point, layer.nodes[beside]["point"])
             layer.add_edge(beside, cell, f"{cell}.edge", weight=round(apart, _DECIMALS))
             stops.append((cell, end.floor))
         for (one, below), (other, above) in pairwise(stops):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from hybridnav._base.trig import dist
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
 from hybridnav.ext.graphs import WaypointGraph
@@ -299,7 +300,7 @@ class _Links:
             ends = [at for _, at in (known[0], known[-1])]
             incline = line.tags.get("incline", "")
             if len(lost) == 1:
-                stops[lost[0]] = max(ends, key=lambda at: math.dist(at, *stops.values()))
+                stops[lost[0]] = max(ends, key=lambda at: dist(at, *stops.values()))
             elif incline:
                 is_down = incline == "down" or incline.startswith("-")
                 stops = dict(zip(levels, ends[:: -1 if is_down else 1], strict=True))

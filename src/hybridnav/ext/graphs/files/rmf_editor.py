@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from hybridnav._base.trig import cos, sin
+from hybridnav._base.trig import cos, dist, hypot, sin
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import DoorLine
 from hybridnav.ext.graphs.files import rmf_read as rmf
@@ -372,7 +372,7 @@ def _measured(content: dict[str, Any], where: str) -> Drawing:
             raise MapError(
                 f"{at}: expected two points and distance: [3, METRES], got {entry!r:.60}"
             )
-        pixels = math.dist(ends[0], ends[1])
+        pixels = dist(ends[0], ends[1])
         if pixels > 0 and metres / pixels > 0:
             scales.append(metres / pixels)
         else:
@@ -408,14 +408,14 @@ def _fitted(
         for i in range(len(pairs))
         for j in range(i + 1, len(pairs))
     ]
-    if any(one == 0 or other == 0 for one, other in between):
+    if not all(_length(one) and _length(other) for one, other in between):
         raise MapError(f"{where}: two fiducials lie at one point")
     turns = sum((_unit(one) * _unit(other).conjugate() for one, other in between), 0j)
-    relative = math.fsum(abs(other) / abs(one) for one, other in between) / len(between)
+    relative = math.fsum(_length(other) / _length(one) for one, other in between) / len(between)
     turn = (_unit(turns) if turns else 1.0) * scale / relative
     shift = sum(scale * one - turn * other for one, other in pairs) / len(pairs)
     off, name = max(
-        (abs(turn * other + shift - scale * one), name) for name, (one, other) in marks.items()
+        (_length(turn * other + shift - scale * one), name) for name, (one, other) in marks.items()
     )
     doubts = []
     if off > _MOST_OFF_M:
@@ -429,4 +429,8 @@ def _fitted(
 
 
 def _unit(vector: complex) -> complex:
-    return vector / math.hypot(vector.real, vector.imag)
+    return vector / _length(vector)
+
+
+def _length(vector: complex) -> float:
+    return hypot(vector.real, vector.imag)  # `abs` takes that of the C library

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import NewFile
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import BuildingGraph, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
@@ -274,7 +275,7 @@ def _apart(link: Link) -> tuple[float, LinkEnd, LinkEnd]:
     """Return the two ends of a link that lie farthest apart, and their distance in metres."""
     pairs = itertools.combinations(link.ends, 2)
     return max(
-        ((math.dist(a.position_m, b.position_m), a, b) for a, b in pairs), key=lambda each: each[0]
+        ((dist(a.position_m, b.position_m), a, b) for a, b in pairs), key=lambda each: each[0]
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.moves import legal_moves, length_in_cells
-from hybridnav._base.trig import atan2
+from hybridnav._base.trig import atan2, hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
 from hybridnav.ext.live.explore import goals as plans
@@ -219,7 +219,7 @@ class Robot:
         self._returns[last] += 1
         if self._returns[last] > _TRIES:
             return False
-        steps = np.hypot(*np.diff(track[::-1], axis=0).T)
+        steps = hypots(*np.diff(track[::-1], axis=0).T)
         driven = np.concatenate([[0.0], np.cumsum(steps)])[::-1]
         inside = back[driven[back] <= driven[back[-1]] + 2 * _NEAR_M][0]
         self._drive(track[inside:][::-1], None)
@@ -242,7 +242,7 @@ class Robot:
         seldom = (spot for spot in plans.narrow_spots(grid, self._at) if self._is_seldom_seen(spot))
         spots = np.array([*plans.doubtful_spots(grid, self._at), *seldom], np.int64).reshape(-1, 2)
         looked = np.reshape(self._spots, (-1, 1, 2))
-        apart_m = np.hypot(*np.moveaxis(grid.frame.points_of(spots) - looked, -1, 0))
+        apart_m = hypots(*np.moveaxis(grid.frame.points_of(spots) - looked, -1, 0))
         spots = spots[(apart_m < _NEAR_M).sum(axis=0) < _TRIES]
         if len(spots):
             flat = spots @ np.array([grid.shape[1], 1])
@@ -268,7 +268,7 @@ class Robot:
         """Return whether too few scans were taken near a cell, in its sight."""
         grid, centre = self.topology.grid, spot.astype(np.float64) + 0.5
         at = grid.frame.positions_of(np.array(self.points))
-        at = at[np.hypot(*(at - centre).T) < _BESIDE_CELLS]
+        at = at[hypots(*(at - centre).T) < _BESIDE_CELLS]
         return int(in_sight(grid, centre, at).sum()) < _SCANS_BESIDE
 
     def _path_to(self, cell: LongArray) -> FloatArray | None:
@@ -283,7 +283,7 @@ class Robot:
         """Drive along points, with scans on the way, until a cell is known."""
         points = np.concatenate([[self.pose[:2]], points])
         self._track.append(points)
-        steps = np.hypot(*np.diff(points, axis=0).T)
+        steps = hypots(*np.diff(points, axis=0).T)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         n_scans = max(1, math.ceil(along[-1] / _SCAN_EVERY_M))
         x_m, y_m = self.pose[:2]

@@ -3,8 +3,6 @@
 Windows and tables are those of `near`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

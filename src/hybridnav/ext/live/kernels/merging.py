@@ -1,7 +1,5 @@
 """Kernels that merge whole places; see `cells` for windows and tables."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

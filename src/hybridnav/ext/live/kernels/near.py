@@ -5,8 +5,6 @@ row and column, two integers. A `table` has the columns of the places (see `Plac
 the numbers ascending.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

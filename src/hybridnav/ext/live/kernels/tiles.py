@@ -6,8 +6,6 @@ the tiles that a box of cells meets, from the one with the number `begin`; what 
 one is passed over. A box has its least row and column and the first ones beyond it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit

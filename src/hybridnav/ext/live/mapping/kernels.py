@@ -4,14 +4,12 @@ Positions are (row, col) counted in 2^-16 of a cell and always odd, so that no e
 line of the lattice; beams of up to 2^14 cells are compared without rounding in int64.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.trig import cos, exp, sin
+from hybridnav._base.trig import cos, exp, hypot, sin
 
 _SHIFT = 16
 _NONE, _HIT, _CLEAR = 0, 1, 2
@@ -196,7 +194,7 @@ def ray_lengths(classes, obstacle, start, targets):
         while True:
             inside = 0 <= row < classes.shape[0] and 0 <= col < classes.shape[1]
             if inside and classes[row, col] == obstacle:
-                lengths[k] = share * math.hypot(end_row - start_row, end_col - start_col)
+                lengths[k] = share * hypot(end_row - start_row, end_col - start_col)
                 lengths[k] /= 1 << _SHIFT
                 break
             if row == last_row and col == last_col:

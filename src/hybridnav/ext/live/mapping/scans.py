@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import frozen
+from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.frame import FARTHEST_M
 
@@ -203,6 +204,6 @@ def _fault_between(before: LaserScan, after: LaserScan) -> str | None:
     if elapsed_s < 0:
         return "time runs back"
     seconds = elapsed_s if math.isfinite(elapsed_s) else 0.0
-    if math.dist(after.pose[:2], before.pose[:2]) > _JUMP_M + _SPEED_M_S * seconds:
+    if dist(after.pose[:2], before.pose[:2]) > _JUMP_M + _SPEED_M_S * seconds:
         return "pose jumps"
     return None

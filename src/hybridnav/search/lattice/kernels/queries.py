@@ -3,12 +3,11 @@
 Positions are (row, col) in grid units. See `build` for nodes, edges and parts.
 """
 
-import math
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.trig import hypot
 from hybridnav.maps.costs.integral import legal_cost
 from hybridnav.search.lattice.kernels.build import path_inside
 
@@ -60,7 +59,7 @@ def _nodes_near(lattice, at, cell, nodes, costs):
         free, factors, side, parts, np.int64(row * cols + col), np.int64(cells[node]), room
     )
     nodes[0] = node
-    costs[0] = cost + factors[row, col] * math.hypot(at[0] - row - 0.5, at[1] - col - 0.5)
+    costs[0] = cost + factors[row, col] * hypot(at[0] - row - 0.5, at[1] - col - 0.5)
     return 1, True
 
 
@@ -85,7 +84,7 @@ def _costs_towards(landmarks, starts):
 @njit(cache=True, nogil=True)
 def _cost_left(landmarks, towards, node, down, over):
     """Return a lower bound on the cost from a node to the start, which lies so far from it."""
-    least = math.hypot(down, over) * (1 - _ROUNDING)
+    least = hypot(down, over) * (1 - _ROUNDING)
     for j in range(landmarks.shape[1]):
         at = landmarks[node, j]
         if at < np.inf:
@@ -237,7 +236,7 @@ def find_line(lattice, ends, ends_in, work):
     n, n_inside = _nodes_near(lattice, ends[0], ends_in[0], nodes[0], costs[0])
     m, m_inside = _nodes_near(lattice, ends[1], ends_in[1], nodes[1], costs[1])
     straight = np.inf
-    if math.hypot(ends[0, 0] - ends[1, 0], ends[0, 1] - ends[1, 1]) <= _NEAR:
+    if hypot(ends[0, 0] - ends[1, 0], ends[0, 1] - ends[1, 1]) <= _NEAR:
         straight = legal_cost(free, factors, ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1], np.inf)
     starts, goals = (nodes[0, :n], costs[0, :n]), (nodes[1, :m], costs[1, :m])
     last, expanded, is_full = _search(lattice, ends[0], starts, goals, straight, work)

@@ -13,6 +13,7 @@ from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
+from hybridnav._base.trig import hypot
 from hybridnav.search.contraction import grow_rows
 from hybridnav.search.mesh.kernels.intervals import (
     APART,
@@ -419,5 +420,5 @@ def look_round(mesh, where, endpoints, rooms, bounds, around):
         is_hidden = how == SPLIT and not is_seen
         if is_hidden or crosses(around[0], around[1], sx, sy, tx, ty):
             return PAUSED, n, n_all
-    bounds[:] = math.hypot(tx - sx, ty - sy)
+    bounds[:] = hypot(tx - sx, ty - sy)
     return DONE, 0, 0

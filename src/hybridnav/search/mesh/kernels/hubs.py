@@ -19,6 +19,7 @@ from numba.extending import overload
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import fetch, grow, push
 from hybridnav._base.kernels.exact import is_legal, turn_of
+from hybridnav._base.trig import hypot
 from hybridnav.search.kernels.labels import reach_next
 from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, WORK_FULL, put_corner
 from hybridnav.search.mesh.kernels.squares import line_before, quarter_of
@@ -183,7 +184,7 @@ def query_hubs(mesh, labels, where, endpoints, work, effort):
     none = np.empty(0, np.int32)
     counts[:] = 0
     # The straight line, if nothing is in between.
-    bounds[:] = math.hypot(tx - sx, ty - sy)
+    bounds[:] = hypot(tx - sx, ty - sy)
     if _see_each_other(polygon_at, cells, endpoints):
         return DONE, _path_through(mesh, endpoints, none, none)
     bounds[:] = np.inf

@@ -10,6 +10,7 @@ import math
 
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.exact import turn_of
+from hybridnav._base.trig import hypot
 
 # Columns of a node's whole numbers.
 SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3
@@ -80,10 +81,10 @@ def estimate(x, y, lx, ly, rx, ry, tx, ty):
         share = 2.0 * far / (vx * vx + vy * vy)
         tx, ty = tx + share * vy, ty - share * vx
     if (lx - x) * (ty - y) - (ly - y) * (tx - x) > 0.0:
-        return math.hypot(lx - x, ly - y) + math.hypot(tx - lx, ty - ly)
+        return hypot(lx - x, ly - y) + hypot(tx - lx, ty - ly)
     if (rx - x) * (ty - y) - (ry - y) * (tx - x) < 0.0:
-        return math.hypot(rx - x, ry - y) + math.hypot(tx - rx, ty - ry)
-    return math.hypot(tx - x, ty - y)
+        return hypot(rx - x, ry - y) + hypot(tx - rx, ty - ry)
+    return hypot(tx - x, ty - y)
 
 
 @njit(cache=True, nogil=True)
@@ -95,7 +96,7 @@ def estimate_of(mesh, endpoints, whole, real, node):
     x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
     a, b = mesh[_BEGINS][slot], mesh[_STOPS][slot]
     if root in (a, b):
-        return math.hypot(tx - x, ty - y)
+        return hypot(tx - x, ty - y)
     lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
     if not marks & _LEFT:
         lx, ly = _cut(x, y, lx, ly, cx[a], cy[a], cx[b], cy[b])
@@ -186,18 +187,18 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
     lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
     turns_right = marks & _RIGHT and turns(kinds[b], cx[b] - x, cy[b] - y, -1)
     turns_left = marks & _LEFT and turns(kinds[a], cx[a] - x, cy[a] - y, 1)
-    g_right = g + math.hypot(cx[b] - x, cy[b] - y) if turns_right else math.inf
-    g_left = g + math.hypot(cx[a] - x, cy[a] - y) if turns_left else math.inf
+    g_right = g + hypot(cx[b] - x, cy[b] - y) if turns_right else math.inf
+    g_left = g + hypot(cx[a] - x, cy[a] - y) if turns_left else math.inf
 
     # The goal is seen, or hidden behind the one end that a path to it bends round.
     if is_goal:
         to_right, to_left = turn_of(x, y, rx, ry, tx, ty), turn_of(x, y, lx, ly, tx, ty)
         if to_right >= 0 and to_left <= 0:
-            n = _put_goal(nodes, n, root, node, g + math.hypot(tx - x, ty - y))
+            n = _put_goal(nodes, n, root, node, g + hypot(tx - x, ty - y))
         elif to_right < 0 and turns_right:
-            n = _put_goal(nodes, n, b, node, g_right + math.hypot(tx - cx[b], ty - cy[b]))
+            n = _put_goal(nodes, n, b, node, g_right + hypot(tx - cx[b], ty - cy[b]))
         elif to_left > 0 and turns_left:
-            n = _put_goal(nodes, n, a, node, g_left + math.hypot(tx - cx[a], ty - cy[a]))
+            n = _put_goal(nodes, n, a, node, g_left + hypot(tx - cx[a], ty - cy[a]))
 
     # Counter-clockwise from the right end of the entry. A turn above zero means left of the ray;
     # those of the far end w serve as those of the near end u of the next side.
@@ -224,12 +225,12 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
             elif right_u == 0 and right_w == 0:
                 # On the line of the right ray, which passes the end u first: there a path bends.
                 if (u == b and turns_right) or (u != b and turns(kinds[u], ux - x, uy - y, -1)):
-                    cost = g + math.hypot(ux - x, uy - y)
+                    cost = g + hypot(ux - x, uy - y)
                     n = put(nodes, n, twin, u, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
             elif left_u == 0 and left_w == 0:
                 # On the line of the left ray, which passes the end w first.
                 if (w == a and turns_left) or (w != a and turns(kinds[w], wx - x, wy - y, 1)):
-                    cost = g + math.hypot(wx - x, wy - y)
+                    cost = g + hypot(wx - x, wy - y)
                     n = put(nodes, n, twin, w, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
 
             # Hidden on the right, wholly or in part: a path comes round b. Where the right ray cuts
@@ -272,7 +273,7 @@ def _hidden(mesh, corner, near, far, is_cut, hand):
         dx, dy = cx[near] - cx[corner], cy[near] - cy[corner]
         if not turns(mesh[_KINDS][near], dx, dy, hand):
             return -1, 0.0, 0
-        return near, math.hypot(dx, dy), -1 - corner
+        return near, hypot(dx, dy), -1 - corner
     return corner, 0.0, WHOLE_SIDE
 
 
@@ -294,7 +295,7 @@ def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
     x, y = cx[root], cy[root]
     polygon = polygon_of[entry]
     if is_goal:
-        n = _put_goal(nodes, n, root, node, g + math.hypot(tx - x, ty - y))
+        n = _put_goal(nodes, n, root, node, g + hypot(tx - x, ty - y))
     for slot in range(first[polygon], first[polygon + 1]):
         twin = twins[slot]
         if slot == entry or twin < 0 or not is_open[block_of[slot]]:
@@ -306,7 +307,7 @@ def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
             by, hand = along(mesh, x, y, u, w)
             if not turns(kinds[by], cx[by] - x, cy[by] - y, hand):
                 continue
-            cost += math.hypot(cx[by] - x, cy[by] - y)
+            cost += hypot(cx[by] - x, cy[by] - y)
         n = put(nodes, n, twin, by, node, WHOLE_SIDE, cost, wx, wy, ux, uy)
     return n
 

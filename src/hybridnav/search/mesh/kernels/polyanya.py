@@ -3,13 +3,12 @@
 M. L. Cui, D. D. Harabor, A. Grastien: Compromise-free pathfinding on a navigation mesh, 2017.
 """
 
-import math
-
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow
 from hybridnav._base.kernels.exact import GRAIN, turn_of
+from hybridnav._base.trig import hypot
 from hybridnav.search.mesh.kernels.intervals import (
     ENDS,
     PARENT,
@@ -72,7 +71,7 @@ def seed(mesh, blocks, endpoints, starts, work):
                 x, y = cx[root], cy[root]
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
-                g = math.hypot(x - sx, y - sy)
+                g = hypot(x - sx, y - sy)
             put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
             key = g + estimate_of(mesh, endpoints, whole, real, n)
             if key < bounds[UPPER]:

@@ -1,7 +1,5 @@
 """Kernels of one query on a mesh: the polygons of its endpoints, the search, and its clean-up."""
 
-import math
-
 import numpy as np
 from numba import types
 from numba.extending import overload
@@ -9,6 +7,7 @@ from numba.extending import overload
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.moves import FAR
+from hybridnav._base.trig import hypot
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
 from hybridnav.search.mesh.kernels.closures import look_round
@@ -90,7 +89,7 @@ def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
             bounds[:] = np.inf
             return DONE, none
         if how == MET:
-            bounds[:] = math.hypot(endpoints[2] - endpoints[0], endpoints[3] - endpoints[1])
+            bounds[:] = hypot(endpoints[2] - endpoints[0], endpoints[3] - endpoints[1])
             return DONE, path_to(mesh, endpoints, nodes[0], -1)
 
         # A shortest path stays in the blocks between its endpoints (see `open_blocks`). An endpoint

@@ -84,7 +84,8 @@ def apart(grid: OccupancyGrid) -> BoolArray:
     would lead from the part inside into the part outside.
     """
     part_of, _ = ndimage.label(grid.measured == CellClass.FREE)
-    small = np.bincount(part_of.ravel()) * grid.resolution_m**2 < _LEAST_NAMELESS_M2
+    side_m = grid.resolution_m
+    small = np.bincount(part_of.ravel()) * (side_m * side_m) < _LEAST_NAMELESS_M2
     small[0] = False
     return small[part_of]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.trig import atan2, cos, hypots, sin
 from hybridnav._base.trig import directions as directions_of
 from hybridnav.maps.islands import unique_rows
 
@@ -67,7 +67,7 @@ def _in_line(
 ) -> FloatArray:
     """Return points after bringing those along one wall into line."""
     step = points[sides[:, 1]] - points[sides[:, 0]]
-    length = np.hypot(*step.T)
+    length = hypots(*step.T)
     heading = directions_of(step[:, 1], step[:, 0])
     off = np.full((len(directions), len(sides)), np.inf)
     middle = (points[sides[:, 0]] + points[sides[:, 1]]) / 2

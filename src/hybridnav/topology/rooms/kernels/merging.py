@@ -1,7 +1,5 @@
 """Kernels of segments of free space: their shapes, the sides between them, merging."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.arrays import find
-from hybridnav._base.trig import atan2, cos, exp, sin
+from hybridnav._base.trig import atan2, cos, exp, hypot, sin
 from hybridnav.topology.rooms.kernels.merging import union_hull
 
 
@@ -86,7 +86,7 @@ def grow_labels(label_of, region, most_steps):
 def sharpness(rows, cols, angles):
     """Measure how sharp the projections of points on two square axes are at each angle."""
     found = np.zeros(len(angles))
-    side = int(math.hypot(np.abs(rows).max(), np.abs(cols).max())) + 2
+    side = int(hypot(np.abs(rows).max(), np.abs(cols).max())) + 2
     one, other = np.zeros(2 * side + 1, np.int64), np.zeros(2 * side + 1, np.int64)
     for k in range(len(angles)):
         cosine, sine = cos(angles[k]), sin(angles[k])
@@ -203,7 +203,7 @@ def opening_of(state, pair, reach, found):
     half = math.sqrt(max(0.0, (rr - cc) ** 2 / 4 + rc * rc))
     major, minor = (rr + cc) / 2 + half, max(0.0, (rr + cc) / 2 - half)
     by_row, by_col = rc, major - rr
-    norm = math.hypot(by_row, by_col)
+    norm = hypot(by_row, by_col)
 
     # Few or close sides have no clear main axis: the direction of most decides. The vector vanishes
     # where the axis is that of the rows.
