@@ -111,18 +111,80 @@ def test_the_way_out_crosses_no_wall_of_the_zone() -> None:
     assert within.leaves_m is None
 
 
+@pytest.mark.parametrize("preset", ["robot", "grid-astar", "paper"])
+@pytest.mark.parametrize("kind", ["keepout", "closed"])
+def test_costs_that_close_the_start_are_left_like_closures(preset: str, kind: str) -> None:
+    """Zones in rows 0 and 1: the start's of 3 columns, and one of costs on the only way back."""
+    grid = hn.OccupancyGrid(
+        np.zeros((6, 14), np.float32), frame=hn.Frame(resolution_m=1.0), robot_radius_m=0.0
+    )
+    zone, other = np.zeros((6, 14), np.bool_), np.zeros((6, 14), np.bool_)
+    zone[:2, :3], other[:5, 7] = True, True
+    factors = np.ones((6, 14), np.float32)
+    factors[:, 5] = 3.0
+    topology = topology_of(grid)
+    query: dict[str, Any] = {"start": (0.5, 0.5), "goal": (12.5, 0.5)}
+    closes: dict[str, Any] = {kind: zone | other}
+    by_costs = hn.HybridPlanner(topology, preset=preset, costs=hn.CostLayer(factors, **closes))
+    before = by_costs.plan(**query)
+    assert str(before.status) == "start blocked"
+    found = by_costs.plan(**query, leave_zone=True)
+    assert found.solved
+    assert found.leaves_m == pytest.approx(2)  # up, in its column
+    assert found.path is not None
+    inside = zone[tuple(found.path.cells.T)]
+    assert inside[: inside.sum()].all(), "it comes back into the zone"
+    assert not other[tuple(found.path.cells.T)].any()
+    # The same zones as closures of the query.
+    cells = np.argwhere(zone | other)
+    plain = hn.HybridPlanner(topology, preset=preset, costs=hn.CostLayer(factors))
+    wanted = plain.plan(**query, blocked=hn.Blocked(cells=cells), leave_zone=True)
+    assert (found.cost, found.leaves_m) == pytest.approx((wanted.cost, wanted.leaves_m))
+    assert found.lower_bound <= found.cost + 1e-9
+    # With closures of a query, `paper` searches the whole map, and has its bound.
+    assert preset == "paper" or found.lower_bound == pytest.approx(wanted.lower_bound)
+    # The planner is as it was; a goal that costs close stays closed, and so does a zone of costs
+    # beside one that is left.
+    assert str(by_costs.plan(**query).status) == "start blocked"
+    assert str(by_costs.plan((0.5, 0.5), (7.5, 0.5), leave_zone=True).status) == "start blocked"
+    column = hn.Blocked(cells=[(row, 3) for row in range(6)])
+    beside = by_costs.plan((3.5, 0.5), query["goal"], blocked=column, leave_zone=True)
+    assert beside.path is not None
+    assert beside.leaves_m == pytest.approx(1)
+    assert not (zone | other)[tuple(beside.path.cells.T)].any()
+    both = hn.Blocked(cells=[(0, col) for col in range(3)])
+    again = by_costs.plan(**query, blocked=both, leave_zone=True)
+    assert again.cost == pytest.approx(found.cost)
+
+
+def test_the_command_leaves_a_keepout_mask_of_costs(cli: Any, tmp_path: Any) -> None:
+    mask = np.zeros((60, 60), np.float32)
+    mask[:30, :20] = 1.0
+    frame = hn.Frame(resolution_m=0.05, origin_m=(0.5, 12.5))
+    hn.write_ros_map(hn.OccupancyGrid(mask, frame=frame), tmp_path / "zone.yaml")
+    query: tuple[str, ...] = ("plan", "maps/office/office.yaml", "--robot-radius", "0.25")
+    query += (
+        "--start",
+        "1.0,13.2",
+        "--goal",
+        "40.6,19.4",
+        "--costs",
+        f"keepout:{tmp_path}/zone.yaml",
+    )
+    shut = cli(*query)
+    assert shut.code == 1
+    assert "The start is closed by the keep-out of the costs.\n" in shut.out
+    done = cli(*query, "--leave-zone")
+    assert done.code == 0, done.err
+    assert "leaves     the keep-out of the costs over " in done.out
+
+
 def test_it_is_refused_where_it_means_nothing() -> None:
     grid = hn.OccupancyGrid(np.zeros((3, 9), np.float32), frame=hn.Frame(resolution_m=1.0))
     topology = topology_of(grid)
     planner = hn.HybridPlanner(topology)
     with pytest.raises(InvalidValueError, match="leave_zone does not go with within_m"):
         planner.plan(*ENDS, leave_zone=True, within_m=1.0)
-    keepout = np.zeros((3, 9), np.bool_)
-    keepout[0, 0] = True
-    layer = hn.CostLayer(np.ones((3, 9), np.float32), keepout=keepout)
-    by_costs = hn.HybridPlanner(topology, preset="robot", costs=layer)
-    with pytest.raises(InvalidValueError, match="costs close the start: give the zone as blocked"):
-        by_costs.plan(*ENDS, leave_zone=True)
     # A goal in the zone stays closed.
     both = planner.plan(*ENDS, blocked={"keepout": [shapely.box(0, 0, 9, 1)]}, leave_zone=True)
     assert str(both.status) == "start blocked"

@@ -142,7 +142,7 @@ LeaveZoneOption = Annotated[
     bool,
     typer.Option(
         "--leave-zone",
-        help="Let a start that --blocked closes leave the closed cells by the shortest way.",
+        help="Let a start that --blocked or --costs close leave them by the shortest way.",
     ),
 ]
 

@@ -105,7 +105,7 @@ class Request:
             beside = _alternatives_figures(found)
         elif self.compare and isinstance(outcome, hn.PlanResult):
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
-        beside |= _leaving(outcome, closed, topology) | self._why(planner, outcome, closed, seconds)
+        beside |= _leaving(outcome, closed, planner) | self._why(planner, outcome, closed, seconds)
         self._respond(grid, outcome, beside, seconds)
         if self.poses is not None:
             hn.export_path(outcome, self.poses)
@@ -293,20 +293,22 @@ def _closed_for(result: hn.PlanResult, closed: hn.Blocked | None) -> Any:
 
 
 def _leaving(
-    outcome: hn.PlanResult | hn.Tour, closed: hn.Blocked | None, topology: hn.TopologicalMap
+    outcome: hn.PlanResult | hn.Tour, closed: hn.Blocked | None, planner: hn.HybridPlanner
 ) -> dict[str, Any]:
     """Return what reasons call the closures that a plan leaves; nothing of others."""
-    if closed is None or not isinstance(outcome, hn.PlanResult) or outcome.leaves_m is None:
+    if not isinstance(outcome, hn.PlanResult) or outcome.leaves_m is None:
         return {}
     from hybridnav.planner.why import each_closure  # noqa: PLC0415 - loads shapely
-    from hybridnav.planner.why_words import closure_words  # noqa: PLC0415
+    from hybridnav.planner.why_words import Closure, closure_words  # noqa: PLC0415
 
     assert outcome.start is not None  # noqa: S101 - every plan has one
-    row, col = topology.grid.frame.cell_of(*outcome.start[:2])
-    flat, closures = row * topology.grid.shape[1] + col, each_closure(closed)
-    return {
-        "leaves": [closure_words(k, "en") for k, own in closures if flat in own.cells_of(topology)]
-    }
+    grid, costs = planner.grid, planner.costs
+    row, col = grid.frame.cell_of(*outcome.start[:2])
+    flat, closures = row * grid.shape[1] + col, each_closure(closed or hn.Blocked())
+    left = [one for one, own in closures if flat in own.cells_of(planner.topology)]
+    if costs is not None and flat in costs.closed_flat:
+        left.append(Closure("costs", None))
+    return {"leaves": [closure_words(one, "en") for one in left]}
 
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:

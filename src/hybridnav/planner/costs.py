@@ -90,6 +90,16 @@ class PlannerCosts:
         )
         return costs, wide
 
+    def opened(self, cells: list[int]) -> PlannerCosts:
+        """Return the costs with flat cells open that they close; all factors stay."""
+        assert self.layer is not None  # noqa: S101 - the caller has found closed cells
+        keepout = np.zeros(self.layer.shape, np.bool_)
+        keepout.ravel()[np.setdiff1d(self.layer.closed_flat, cells)] = True
+        costs = copy(self)
+        vars(costs).pop("closed", None)
+        costs.layer = replace(self.layer, closed=None, keepout=keepout)
+        return costs
+
     def _shut(self, given: CostLayer, box: Box, window: Box) -> BoolArray | None:
         """Return the cells of a box that a layer keeps the robot's centre out of; the closed cells
         that lie within its radius are in the window."""

@@ -114,6 +114,14 @@ def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     return replace(now, grid=grid, built=built, method=method, costs=costs, closures={})
 
 
+def opened(now: Planning, cells: list[int]) -> Planning:
+    """Return how to plan with flat cells open that the costs close; what is now stays."""
+    costs = now.costs.opened(cells)
+    known = KnownMap(now.grid, now.topology, costs.layer)
+    method = now.method.changed(MapChange(*known[:3], np.empty((0, 2), np.int64)))
+    return replace(now, method=method or make_method(known, now.preset.planner), costs=costs)
+
+
 def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongArray:
     """Return the cells whose class changed, int64 (m, 2), (row, col), in the order of rows.
 

@@ -16,7 +16,7 @@ from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import no_places, read_points
-from hybridnav.planner.follow import begun, update_of
+from hybridnav.planner.follow import begun, opened, update_of
 from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
@@ -256,9 +256,9 @@ class HybridPlanner(Questions):
             most so many metres from the goal, by the crow. The status is then `near the goal`,
             `short_m` is the distance, and cost and bound are those of that point. Not with OMPL.
         leave_zone
-            Whether a start that `blocked` closes may leave the closed cells by the shortest way.
-            The cells of that way are open for this plan, cost and bound are those with them open,
-            and `leaves_m` is the length of the way. Not with OMPL, nor `within_m`.
+            Whether a start that `blocked` or the costs close may leave the closed cells by the
+            shortest way. The cells of that way are open for this plan, cost and bound are those
+            with them open, and `leaves_m` is the length of the way. Not with OMPL, nor `within_m`.
 
         Returns
         -------
@@ -270,13 +270,14 @@ class HybridPlanner(Questions):
         InvalidValueError
             When a point is not two or three finite numbers, a name is not known, or a closed item
             is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or
-            another method is given `keep`. With `leave_zone`, when costs close the start.
+            another method is given `keep`. When `leave_zone` is given with OMPL or `within_m`.
         """
         with self._query():
             now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
             request, leaves_m = now.read(start, goal, smooth, closed, at, keep), None
             if leave_zone:
-                request, leaves_m = now.leaving(request, within_m)
+                request, leaves_m, cells = now.leaving(request, within_m)
+                now = opened(now, cells) if cells else now
             result = now.plan(request)
             if leaves_m is not None:
                 closed, result = request.closed, replace(result, leaves_m=leaves_m)

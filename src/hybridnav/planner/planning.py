@@ -253,37 +253,37 @@ class Planning:
 
     def leaving(
         self, request: PlanRequest, within_m: float | None
-    ) -> tuple[PlanRequest, float | None]:
-        """Return a request whose closed start may leave the closed cells, and how long the way out
-        is; as it is, and None, where nothing closes the start alone, or no way leads out."""
+    ) -> tuple[PlanRequest, float | None, list[int]]:
+        """Return a request whose closed start may leave the closed cells, how long the way out is,
+        and its flat cells where the costs close the start; as it is, None, and none of them, where
+        nothing closes the start alone, or no way leads out of what does."""
         if self.ompl is not None or within_m is not None:
             given = (
                 "within_m" if self.ompl is None else f"OMPL, which preset {self.preset.name} has"
             )
             raise InvalidValueError(f"leave_zone does not go with {given}: leave one out")
-        closed, always = request.closed, self.costs.closed
+        stays, closed, always = (request, None, list[int]()), request.closed, self.costs.closed
         cells = self.grid.frame.cells_of(np.stack([pose[:2] for pose in request.poses]))
-        on_map = ((cells >= 0) & (cells < self.grid.shape)).all()
-        if not on_map:
-            return request, None
+        if not ((cells >= 0) & (cells < self.grid.shape)).all():
+            return stays
         ends = cells @ np.array([self.grid.shape[1], 1])
         may_enter = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
-        if always is not None:
-            if may_enter.ravel()[ends[0]] and always.holds(ends[:1])[0]:
-                raise InvalidValueError(
-                    "leave_zone opens cells that blocked closes, and the costs close the start: "
-                    "give the zone as blocked, such as --blocked keepout:FILE"
-                )
-            may_enter.ravel()[always.flat] = False
-        if closed is None or not may_enter.ravel()[ends].all():
-            return request, None
-        if closed.holds(ends).tolist() != [True, False]:
-            return request, None
-        way = way_out(may_enter, closed, int(ends[0]), corner_cutting=self.grid.corner_cutting)
+        zone: ClosedCells | None = None
+        for each in filter(None, (closed, always)):
+            if each.holds(ends[:1])[0] and not each.holds(ends[1:])[0]:
+                zone = each if zone is None else zone | each
+            else:
+                may_enter.ravel()[each.flat] = False
+        if zone is None or not may_enter.ravel()[ends].all():
+            return stays
+        way = way_out(may_enter, zone, int(ends[0]), corner_cutting=self.grid.corner_cutting)
         if way is None:
-            return request, None
-        left = ClosedCells(np.setdiff1d(closed.flat, way[0]), closed.solid)
-        return request._replace(closed=left), way[1] * self.grid.resolution_m
+            return stays
+        if closed is not None:
+            left = ClosedCells(np.setdiff1d(closed.flat, way[0]), closed.solid)
+            request = request._replace(closed=left)
+        opened = [] if always is None or not always.holds(ends[:1])[0] else way[0]
+        return request, way[1] * self.grid.resolution_m, opened
 
     def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
         """Return a result, or where its goal cannot be reached one to the nearest point that can

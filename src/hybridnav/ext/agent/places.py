@@ -154,9 +154,7 @@ class NamedPlaces:
             "ground": ground.name.lower(),
             "beside": beside[:SHOWN],
         }
-        near = min(
-            rooms.listed_doors, key=lambda door: dist(door.position, point), default=None
-        )
+        near = min(rooms.listed_doors, key=lambda door: dist(door.position, point), default=None)
         if near is not None:
             straight_m = round(dist(near.position, point), 2)
             answer["nearest_door"] = {"number": near.number, "straight_m": straight_m}
