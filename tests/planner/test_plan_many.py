@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -132,3 +133,30 @@ def test_bounds_that_take_a_search_are_found_when_they_are_read(
         np.testing.assert_array_equal(other.points, batch.points)
         np.testing.assert_array_equal(other.gap, batch.gap)
     assert len(read) == np.isfinite(batch.cost).sum()
+
+
+@pytest.mark.parametrize("preset", ["octile", "shortest", "grid-astar"])
+def test_costs_that_are_not_the_length_of_their_points_are_refused(
+    monkeypatch: pytest.MonkeyPatch, preset: str
+) -> None:
+    grid = grid_of(np.ones((6, 9)))
+    planner = hn.HybridPlanner(map_of(grid), preset=preset)
+    points, method = grid.frame.points_of(np.array([[0, 0], [2, 6]])), planner.method
+    ends = points[:1], points[1:]
+    assert np.isfinite(planner.plan_many(*ends).cost).all()
+    many, one = method.find_many, method.find
+
+    def dearer_many(queries: Any) -> Any:
+        found = many(queries)
+        return None if found is None else replace(found, cost_m=found.cost_m + 0.1)
+
+    def dearer(query: Any) -> Any:
+        found = one(query)
+        return replace(found, cost=found.cost_m + 0.1)
+
+    monkeypatch.setattr(method, "find_many", dearer_many)
+    monkeypatch.setattr(method, "find", dearer)
+    with pytest.raises(hn.errors.InvalidValueError, match=r"states a length of .* of its points"):
+        planner.plan_many(*ends)
+    with pytest.raises(hn.errors.InvalidValueError, match=r"states a length of .* of its points"):
+        _ = planner.plan(ends[0][0], ends[1][0]).path.points  # type: ignore[union-attr]

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav.maps import CellClass
+from hybridnav.planner.path import check_length, is_length
 from hybridnav.planner.result import PlanStatus
 from hybridnav.search.found import ClosedCells, QueryMany
 
@@ -112,6 +113,7 @@ def plan_many(
         found = at_once.find_many(QueryMany(cells, (starts[asked], goals[asked]), closed))
     if at_once is not None and found is not None:
         kept = found.is_done
+        _check_lengths(found, at_once.metric)
         if closed is not None:
             on_cells = found if at_once.metric == "octile" else None
             kept = kept & ~_met(closed, cells, grid, on_cells)
@@ -153,6 +155,19 @@ def plan_many(
         points=points,
         headings_rad=np.concatenate(headings) if has_yaw else None,
     )
+
+
+def _check_lengths(found: FoundMany, metric: str) -> None:
+    """Refuse paths whose costs are not the lengths of their points, by metrics of lengths."""
+    if metric not in {"octile", "any-angle"}:
+        return
+    from hybridnav.maps.geometry import polyline_lengths  # noqa: PLC0415 - compiled
+
+    driven_m = polyline_lengths(found.points, found.path_start)
+    goes = found.is_done & np.isfinite(found.cost_m)
+    stated_m, driven_m = found.cost_m[goes], driven_m[goes]
+    for wrong in np.flatnonzero(~is_length(stated_m, driven_m))[:1]:
+        check_length(stated_m[wrong], driven_m[wrong])
 
 
 def _rows(begin: LongArray, counts: LongArray) -> LongArray:

@@ -74,7 +74,7 @@ class Path:
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
         if not callable(vars(self)["points"]):
-            _check_length(self.length_m, float(self._motion.lengths_m.sum()))
+            check_length(self.length_m, float(self._motion.lengths_m.sum()))
 
     @cached_property
     def _motion(self) -> Motion:
@@ -235,28 +235,38 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     points: Any = found.points
     cells, length_m = found.cells_on_demand, found.cost_m
     # Compiled: a copy of a result needs none.
-    from hybridnav.maps.geometry import centres, polyline_length  # noqa: PLC0415
+    from hybridnav.maps.geometry import polyline_length  # noqa: PLC0415
 
     if points is None:
-        points = partial(centres, found.cells, frame.for_kernels)
+        points = partial(_centres, found.cells, frame, length_m)
     else:
         # A copy, because read-only arrays would compile the kernel again.
-        _check_length(length_m, polyline_length(np.array(points, np.float64)))
+        check_length(length_m, polyline_length(np.array(points, np.float64)))
         points = frozen(points if is_of_cells or length_m > 0 else points[:1])
     cells = cells if callable(cells) else frozen(cells)
     return filled(Path, cells=cells, points=points, length_m=length_m)
+
+
+def _centres(cells: LongArray, frame: Frame, length_m: float) -> FloatArray:
+    """Return the centres of the cells of a path, after a check of the length that it states."""
+    from hybridnav.maps.geometry import centres, polyline_length  # noqa: PLC0415 - compiled
+
+    points = centres(cells, frame.for_kernels)
+    check_length(length_m, polyline_length(points))
+    return points
 
 
 _SHARE = 1e-6
 """Share of the length, and of a metre, that the rounding of points far away may amount to."""
 
 
-def is_length(stated_m: float, driven_m: float) -> bool:
-    """Return whether a path is as long as stated, but for the rounding of its points."""
+def is_length(stated_m: Any, driven_m: Any) -> Any:
+    """Return whether a path, or each, is as long as stated, but for the rounding of its points."""
     return abs(stated_m - driven_m) <= _SHARE * (1 + driven_m)
 
 
-def _check_length(stated_m: float, driven_m: float) -> None:
+def check_length(stated_m: float, driven_m: float) -> None:
+    """Refuse a path that is not as long as stated."""
     if not is_length(stated_m, driven_m):
         raise InvalidValueError(
             f"a path states a length of {stated_m:.6g} m, expected that of its points, "
