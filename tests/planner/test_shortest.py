@@ -299,7 +299,8 @@ def test_a_large_mesh_is_announced_before_it_is_built(
     monkeypatch.setattr(methods_shortest, "_LARGE", n_corners)
     monkeypatch.setattr(methods_shortest, "_S", 0.5)
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-    with pytest.warns(UserWarning, match=f"about {n_corners * 0.5:.0f} s") as told:
+    takes = rf"about {n_corners * 0.5:.0f} s and [\d.]+ GB, once, and a far path as much again"
+    with pytest.warns(UserWarning, match=takes) as told:
         planner.plan(*ends)
     assert len(told) == 1
     with warnings.catch_warnings():
