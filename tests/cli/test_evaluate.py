@@ -12,7 +12,7 @@ from hybridnav.harness.scenes import sample_pairs
 from hybridnav.maps.files import load_map
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, importable, label_of, name_of, run_here, write_map
 
 OUTPUTS = {RECORDS_FILE, "runs.jsonl", "summary.csv", "maps.csv", "summary.md", "report.html"}
 
@@ -73,8 +73,8 @@ def test_an_evaluation_of_the_figure(cli, tmp_path):
 
 def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):
     out = tmp_path / "run"
-    bad = name_of(faulty.ThroughWall)
-    done = cli("evaluate", rooms, "--baseline", bad, "--pairs", 12, "-o", out)
+    bad = faulty.ThroughWall
+    done = cli("evaluate", rooms, "--baseline", name_of(bad), "--pairs", 12, "-o", out)
     assert done.code == 1
     assert done.err.startswith("hybridnav: ")
     assert done.err.count("\n") == 1
@@ -82,7 +82,7 @@ def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):
     assert "is not free" in done.err
     assert "## Consistency" in done.out
     assert {path.name for path in out.iterdir()} == OUTPUTS
-    assert {record["method"] for record in read_records(out)} == {"grid-astar", bad}
+    assert {record["method"] for record in read_records(out)} == {"grid-astar", label_of(bad)}
 
 
 def test_queries_in_which_a_method_raises_are_counted(cli, rooms, tmp_path):
@@ -117,7 +117,7 @@ def test_a_method_that_forks_has_one_record_a_pair(cli, rooms, tmp_path, monkeyp
     assert (done.code, done.err) == (0, "")
     records = read_records(out)
     assert len({record["id"] for record in records}) == len(records)
-    answered = [r["status"] for r in records if r["method"] == name_of(faulty.Forks)]
+    answered = [r["status"] for r in records if r["method"] == label_of(faulty.Forks)]
     assert len(answered) == 1 + 6 + 1
     assert set(answered) <= {"ready", "solved", "no path"}
     assert len([r for r in records if r["status"] == "timed"]) == 7

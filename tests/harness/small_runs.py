@@ -4,7 +4,9 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from hybridnav.harness import RunSettings, evaluate
 from hybridnav.maps import CellClass
 
 ROOT = Path(__file__).parents[2]
@@ -58,6 +60,15 @@ def outcome_of(study, method):
     """Return what a study holds of a method, by its class or by its name in tables."""
     names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
     return next(outcome for outcome in study.outcomes if outcome.label in names)
+
+
+def run_in(folder, **settings):
+    """Make a run without a process of its own into a folder, on `ROOMS` unless maps are given."""
+    maps = (str(write_map(folder, ROOMS)),)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridnav.harness.run.run_local", run_here)
+        evaluate(RunSettings(**{"maps": maps} | settings), folder / "run")
+    return folder / "run"
 
 
 def run_here(tasks, **_settings):

@@ -15,7 +15,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.harness.analysis import load_study, to_frame
-from hybridnav.harness.baselines import MethodResult
+from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.columns import MEANINGS, consistency_row, figures, rows_of_study
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
@@ -24,7 +24,7 @@ from hybridnav.harness.records import read_records
 from hybridnav.harness.report import command_of
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.scenes import Pair
-from hybridnav.harness.yardstick import KINDS
+from hybridnav.harness.yardstick import KINDS, contradiction
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import (
     ROOMS,
@@ -307,7 +307,7 @@ def test_head_tables_records_and_data_frame_count_alike(tmp_path, cli, costs):
         method = str(row["method"])
         mine = frame[frame["method"] == method]
         of_pairs = int(mine["faults"].sum())
-        known = found[name_of(faulty.TornRegion) if method == "TornRegion" else method]
+        known = found[method]
         assert (row["faults"], of_pairs + int(row["regions wrong"])) == (known, known)
         assert mine["length_m"].count() == row["solved"]
         assert mine.loc[mine["faults"] > 0, "length_m"].isna().all()
@@ -320,7 +320,7 @@ def test_a_false_no_path_of_a_method_with_regions_counts_once(folder, study):
     outcome = outcome_of(study, faulty.MissingDoor)
     wrong = [one for one in outcome.records if one["status"] == "no path" and one["faults"]]
     lines = map(json.loads, (folder / "records.jsonl").read_text().splitlines())
-    written = [one for one in lines if one["method"] == name_of(faulty.MissingDoor)]
+    written = [one for one in lines if one["method"] == label_of(faulty.MissingDoor)]
     assert len(wrong) == len(outcome.faults) == sum(len(one["faults"]) for one in written) > 5
 
 
@@ -331,6 +331,50 @@ def test_a_bound_that_is_no_factor_is_a_contradiction(bound):
     answer = MethodResult(np.array([[0, 0], [0, 1]]), bound=bound)
     _, found, _ = Judge(grid, prepared, reference=False).faults(Pair((0, 0), (0, 1)), answer)
     assert found == [("bounds", f"a bound is a factor of 1 or more, got {bound}")]
+
+
+OPTIMA = {"status": "solved", "length_m": 5.0, "any_angle_m": 4.5, "weighted_m": 7.0}
+LINE = {"status": "solved", "metric": "any-angle", "length_m": 6.0}
+CELLS = {"status": "solved", "length_m": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        (CELLS | {"length_m": 4.99999995}, "length 4.99999995 m is below the optimum 5.0 m"),
+        (
+            CELLS | {"length_m": 7.500000075, "bound": 1.5},
+            "length 7.500000075 m breaks its bound, 1.500000 x optimum 5.000000 m = 7.5 m",
+        ),
+        (CELLS | {"cost_m": 6.99999993}, "cost 6.99999993 m is below the weighted optimum 7.0 m"),
+        (
+            CELLS | {"cost_m": 8.0, "cost_lower_bound_m": 7.00000007},
+            "the lower bound on costs 7.00000007 m is above the weighted optimum 7.0 m",
+        ),
+        (
+            LINE | {"cost_m": 8.0, "cost_grid_bound_m": 7.00000007},
+            "the lower bound on paths of cells 7.00000007 m is above the weighted optimum 7.0 m",
+        ),
+        (
+            LINE | {"length_m": 4.5 * (1 - 1.1e-6)},
+            "length 4.499995 m is below the any-angle optimum 4.500000 m",
+        ),
+    ],
+)
+def test_a_contradiction_is_seen_in_its_digits(record, words):
+    assert contradiction(record, OPTIMA) == ("bounds", words)
+
+
+def test_a_claim_that_is_wrong_is_seen_in_its_digits():
+    grid = hn.OccupancyGrid(np.zeros((1, 2), np.float32), robot_radius_m=0)
+    judge = Judge(grid, Prepared(faulty.Sound(grid), None, 0.0, 0.0), reference=False)
+    points = np.array([[0.5, 0.5], [1.5, 0.5]])
+    line = AnyAngleResult(points, 1.00000002, lower_bound_m=1.00000001)
+    _, found, _ = judge.faults(Pair((0, 0), (0, 1)), MethodResult(None, any_angle=line))
+    assert [text for _, text in found] == [
+        "the length is 1.0 m, not 1.00000002 m as reported",
+        "the lower bound 1.00000001 m is above the length 1.0 m",
+    ]
 
 
 def test_a_data_frame_without_pandas_is_refused_in_one_line(study, monkeypatch):

@@ -29,7 +29,16 @@ from hybridnav.maps.files import load_map
 from hybridnav.planner import load_preset
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, ROOT, label_of, name_of, outcome_of, run_here, write_map
+from tests.harness.small_runs import (
+    ROOMS,
+    ROOT,
+    label_of,
+    name_of,
+    outcome_of,
+    run_here,
+    run_in,
+    write_map,
+)
 
 FAULTS = {
     faulty.LineThroughWall: "m enters a blocked cell",
@@ -51,19 +60,14 @@ N_PAIRS = 40
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("lines")
     smooth = [load_preset(name, overrides=["planner.smooth=line-of-sight"]) for name in PRESETS]
-    settings = RunSettings(
-        maps=(str(write_map(folder, ROOMS)),),
+    return run_in(
+        tmp_path_factory.mktemp("lines"),
         presets=("paper", *smooth),
         baselines=tuple(map(name_of, (*FAULTS, *SOUND))),
         pairs=N_PAIRS,
         merge_distance_m=4.0,
     )
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridnav.harness.run.run_local", run_here)
-        evaluate(settings, folder / "run")
-    return folder / "run"
 
 
 @pytest.fixture(scope="module")

@@ -1,18 +1,25 @@
 """Methods by name: aliases, files of methods, classes that were mended, tracebacks."""
 
+import csv
+import json
+import re
 import sys
 import time
 from dataclasses import replace
+from html import unescape
 
 import pytest
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.analysis import load_study, to_frame
 from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, load_methods, source_hash
 from hybridnav.harness.output import write_outputs
-from hybridnav.harness.records import read_records
+from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.harness.tables import compare_runs
+from hybridnav.harness.workers import run_local
 from tests.harness.small_runs import ROOMS, write_map
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -84,6 +91,147 @@ def test_a_class_that_takes_the_name_of_another_method_has_its_path(settings, tm
     assert study.faults == []
 
 
+OTHERS = """
+import os
+from hybridnav.errors import UnsuitableMapError
+from hybridnav.harness.baselines.grid import GridAstar
+
+class Base(GridAstar):
+    name = ""
+    def __init__(self, grid):
+        own = type(self).name
+        super().__init__(grid)
+        self.name = own or "said when made"
+        self.is_real = grid.shape != (30, 40)
+
+class Said(Base):
+    name = "said by the class"
+
+class Made(Base):
+    pass
+
+class Reference(Base):
+    name = "grid-astar"
+
+class Preset(Base):
+    name = "octile"
+
+class Twin(Base):
+    name = "twin"
+
+class OtherTwin(Twin):
+    pass
+
+class Lost(Base):
+    name = "ends in a query"
+    def solve(self, start, goal):
+        if self.is_real:
+            os._exit(3)
+        return super().solve(start, goal)
+
+class LostUnmade(Base):
+    def __init__(self, grid):
+        super().__init__(grid)
+        if self.is_real:
+            os._exit(4)
+
+class Wrong(Base):
+    name = "cannot be made"
+    def __init__(self, grid):
+        super().__init__(grid)
+        if self.is_real:
+            raise RuntimeError("not today")
+
+class Narrow(Base):
+    def __init__(self, grid):
+        super().__init__(grid)
+        if len(grid.classes) > 11 and self.is_real:
+            raise UnsuitableMapError("up to 11 rows")
+"""
+NAMES = {
+    "Said": "said by the class",
+    "Made": "said when made",
+    "Reference": "others:Reference",
+    "Preset": "others:Preset",
+    "Twin": "others:Twin",
+    "OtherTwin": "others:OtherTwin",
+    "Lost": "ends in a query",
+    "LostUnmade": "others:LostUnmade",
+    "Wrong": "cannot be made",
+}
+"""What each class is called, wherever it is."""
+
+
+def names_in_tables(folder):
+    """Return the names of methods in all that is written of a run but its records."""
+    study = write_outputs(folder)
+    found = {"labels": study.labels, "frame": to_frame(study)["method"].unique().tolist()}
+    for file in ("summary.csv", "maps.csv"):
+        with (folder / file).open() as stream:
+            found[file] = [row["method"] for row in csv.DictReader(stream)]
+    text = (folder / "summary.md").read_text()
+    methods = text.partition("## Methods\n\n")[2].partition("\n\n")[0].splitlines()[2:]
+    found["summary.md"] = [line.split(" | ")[0].removeprefix("| ") for line in methods]
+    (facts,) = re.findall(
+        r"<dt>methods</dt>\s*<dd>(.*?)</dd>", (folder / "report.html").read_text()
+    )
+    found["report.html"] = unescape(facts).split(", ")
+    return {where: set(names) for where, names in found.items()}
+
+
+def test_a_method_has_one_name_in_records_and_tables(tmp_path, monkeypatch):
+    """Of classes that name themselves, take others' names, end their process, and are not made."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_local)  # processes end
+    monkeypatch.setattr("hybridnav.harness.workers._ATTEMPTS", 1)
+    (tmp_path / "others.py").write_text(OTHERS)
+    settings = RunSettings(
+        maps=(str(write_map(tmp_path, ROOMS)),),
+        presets=("octile",),
+        baselines=tuple(f"others:{name}" for name in NAMES),
+        methods=(NamedMethod("class", "others:Said", "named by a user"),),
+        pairs=1,
+    )
+    evaluate(settings, tmp_path / "run")
+    expected = {"grid-astar", "octile", "named by a user", *NAMES.values()}
+    file = tmp_path / "run" / RECORDS_FILE
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    assert {line["method"] for line in lines} == expected
+    for path, name in NAMES.items():
+        of_class = [one for one in lines if f"/others:{path}-" in one["id"]]
+        assert {one["method"] for one in of_class} == {name}
+        assert [one["made_by"] for one in of_class if "made_by" in one] == [f"others:{path}"]
+    names = names_in_tables(tmp_path / "run")
+    assert names == dict.fromkeys(names, expected)
+    assert load_study(tmp_path / "run").faults == []
+    compared = compare_runs(tmp_path / "run", tmp_path / "run")
+    assert {row["method"] for row in compared} == expected - {"grid-astar"}
+    assert evaluate(settings, tmp_path / "run") == 0
+    # Version 0.1 wrote `module:class`, and what a class calls itself into its preparation alone.
+    older = []
+    for line in lines:
+        path = line["id"].split("/")[1].rpartition("-")[0]
+        is_named = path.startswith("others:") and line["method"] == NAMES[path[7:]] != path
+        own = {"label": line["method"]} if is_named and line["type"] == "preparation" else {}
+        older.append(line | {"method": path if is_named else line["method"]} | own)
+    file.write_text("".join(f"{json.dumps(line)}\n" for line in older))
+    assert names_in_tables(tmp_path / "run") == names
+    assert {one["method"] for one in read_records(tmp_path / "run")} == expected
+    assert evaluate(settings, tmp_path / "run") == 0
+
+
+def test_a_class_has_its_name_on_maps_too_on_which_it_is_not_asked(settings, tmp_path):
+    (tmp_path / "others.py").write_text(OTHERS)
+    tall = str(write_map(tmp_path, [*ROOMS, *ROOMS], "tall"))
+    run = replace(settings, maps=(tall, *settings.maps), baselines=("others:Narrow",))
+    evaluate(run, tmp_path / "run")
+    names = names_in_tables(tmp_path / "run")
+    assert names == {where: {"grid-astar", "said when made"} for where in names}
+    records = read_records(tmp_path / "run")
+    assert {one["method"] for one in records} == {"grid-astar", "said when made"}
+
+
 def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
     made = evaluate(settings, tmp_path / "run")
     assert evaluate(settings, tmp_path / "run") == 0
@@ -112,8 +260,8 @@ def test_answers_before_a_class_was_mended_enter_no_table_with_new_ones(settings
     (row,) = [row for row in rows_of_study(study) if row["method"] == "HPA* of mine"]
     assert (row["maps"], row["pairs"]) == (1, 5)
     words = (
-        "Left out, because class mine:Mine was changed after them: answers 6 on rooms (asked "
-        "again), 6 on halls (not asked again)."
+        "Left out, because class mine:Mine (HPA* of mine) was changed after them: answers 6 on "
+        "rooms (asked again), 6 on halls (not asked again)."
     )
     assert study.warnings[:1] == [words]
     for name in ("summary.md", "report.html"):

@@ -27,7 +27,7 @@ from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.tables import Row, ahead_of_presets, rows_of_methods
-from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, name_of, run_in, write_map
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -49,7 +49,8 @@ class Narrow(GridAstar):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("not_asked")
     wide = [f"{'.' * 120}" for _ in range(6)]
-    settings = RunSettings(
+    return run_in(
+        folder,
         maps=(str(write_map(folder, ROOMS)), str(write_map(folder, wide, "wide"))),
         presets=("octile",),
         baselines=(f"{__name__}:Narrow",),
@@ -60,10 +61,6 @@ def folder(tmp_path_factory):
         pairs=N_PAIRS,
         repeat=2,
     )
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridnav.harness.run.run_local", run_here)
-        evaluate(settings, folder / "run")
-    return folder / "run"
 
 
 @pytest.fixture(scope="module")
@@ -298,7 +295,7 @@ def of_method(folder, name):
 def test_what_is_left_is_not_asked(settings, tmp_path):
     folder = tmp_path / "run"
     made = evaluate(replace(settings, limit_s=2.5 * QUERY_S), folder)
-    slow = of_method(folder, name_of(Slow))
+    slow = of_method(folder, Slow.name)
     asked = [record for record in slow if record["status"] != "too slow"]
     left = [record for record in slow if record["status"] == "too slow"]
     assert 1 <= len(asked) <= 3
@@ -316,7 +313,7 @@ def test_what_is_left_is_not_asked(settings, tmp_path):
 
 def test_without_a_limit_everything_is_asked(settings, tmp_path):
     evaluate(replace(settings, repeat=0), tmp_path / "run")
-    slow = of_method(tmp_path / "run", name_of(Slow))
+    slow = of_method(tmp_path / "run", Slow.name)
     assert {record["status"] for record in slow} == {"no path"}
 
 

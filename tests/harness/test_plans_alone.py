@@ -12,7 +12,7 @@ from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.tables import compare_runs
 from hybridnav.maps import CellClass
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_in, write_map
 from tests.oracle.grid import distances, move_graph
 
 N_PAIRS = 20
@@ -21,18 +21,13 @@ METHODS = (faulty.SoundPlaces, faulty.PlansAlone)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plans")
-    settings = RunSettings(
-        maps=(str(write_map(folder, ROOMS)),),
+    return run_in(
+        tmp_path_factory.mktemp("plans"),
         presets=("octile",),
         baselines=tuple(map(name_of, METHODS)),
         pairs=N_PAIRS,
         repeat=1,
     )
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridnav.harness.run.run_local", run_here)
-        evaluate(settings, folder / "run")
-    return folder / "run"
 
 
 @pytest.fixture(scope="module")

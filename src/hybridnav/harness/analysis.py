@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +12,14 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome
-from hybridnav.harness.records import commands_of, latest_sources, loads_of, query_key, read_records
+from hybridnav.harness.records import (
+    commands_of,
+    latest_sources,
+    loads_of,
+    query_key,
+    read_records,
+    who_of,
+)
 from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
@@ -173,11 +179,10 @@ def load_study(
     together = lay_times(timed, pairs)
     metric = _metric_of(preparations, metric, folder)
     names = _map_labels(every, root)
-    own = _own_names(preparations.values())
     digests: dict[str, set[tuple[str, str]]] = {}
     for record in preparations.values():
         settings = record["method_sha"], names[record["map_sha"]]
-        digests.setdefault(f"{own[record['method']]}@{settings[1]}", set()).add(settings)
+        digests.setdefault(f"{record['method']}@{settings[1]}", set()).add(settings)
     optima = {
         sha: {query_key(record): record for record in pairs.get((sha, method), ())}
         for (sha, method), record in preparations.items()
@@ -185,8 +190,7 @@ def load_study(
     }
     outcomes = []
     for (sha, method), record in preparations.items():
-        name = names[sha]
-        label = own[record["method"]]
+        name, label = names[sha], record["method"]
         if len(digests[f"{label}@{name}"]) > 1:
             label = f"{label} {method[:4]}"
         answers = pairs.get((sha, method), [])
@@ -298,17 +302,6 @@ def _columns(outcome: Outcome) -> dict[str, object]:
     }
 
 
-def _own_names(records: Iterable[Record]) -> dict[str, str]:
-    """Return the name of each method in tables: the one that its class gives itself, unless another
-    method has it, else that of its records."""
-    own: dict[str, str] = {}
-    for record in records:
-        name: str = record["method"]
-        own[name] = record.get("label") or own.get(name, name)
-    taken = Counter([*own.values(), *(name for name in own if own[name] != name)])
-    return {name: label if taken[label] == 1 else name for name, label in own.items()}
-
-
 def _latest(
     preparations: dict[tuple[str, str], Record], folder: Path
 ) -> dict[tuple[str, str], Record]:
@@ -317,13 +310,14 @@ def _latest(
     sources = latest_sources(folder)
     shown: dict[str, str | None] = {}
     for record in preparations.values():
-        method = record["method"]
-        if method not in shown or shown[method] != sources.get(method):
-            shown[method] = record.get("source")
+        who, names = who_of(record), (record["method"], record.get("made_by"))
+        latest = next((sources[name] for name in names if name in sources), None)
+        if who not in shown or shown[who] != latest:
+            shown[who] = record.get("source")
     return {
         key: record
         for key, record in preparations.items()
-        if record.get("source") == shown[record["method"]]
+        if record.get("source") == shown[who_of(record)]
     }
 
 
@@ -334,17 +328,19 @@ def _left_out(
     names: dict[str, str],
 ) -> list[str]:
     """Return in words the answers that no table shows, a sentence for each method."""
-    current = {(record["method"], sha) for (sha, _), record in shown.items()}
+    current = {(who_of(record), sha) for (sha, _), record in shown.items()}
     found: dict[str, list[str]] = {}
     for key, record in preparations.items():
         if key not in shown:
             method, sha = record["method"], key[0]
-            again = "asked again" if (method, sha) in current else "not asked again"
+            made_by = record.get("made_by", method)
+            made_of = made_by if made_by == method else f"{made_by} ({method})"
+            again = "asked again" if (who_of(record), sha) in current else "not asked again"
             count = f"{len(pairs.get(key, ())):,} on {names[sha]} ({again})"
-            found.setdefault(method, []).append(count)
+            found.setdefault(made_of, []).append(count)
     return [
-        f"Left out, because class {method} was changed after them: answers {', '.join(counts)}."
-        for method, counts in found.items()
+        f"Left out, because class {made_of} was changed after them: answers {', '.join(counts)}."
+        for made_of, counts in found.items()
     ]
 
 

@@ -14,7 +14,7 @@ from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid, close_method
-from hybridnav.harness.names import baseline_name, class_of, source_hash
+from hybridnav.harness.names import baseline_name, class_of, own_name, source_hash
 from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -74,16 +74,13 @@ class MethodSpec:
     """Settings of a grid of its own; empty for that of the run."""
     source: str = ""
     """Hash of the file of a class of others: a class that was mended is another method."""
+    label: str = ""
+    """Name that a class of others gives itself, as far as known before it is made; else empty."""
 
     @property
     def made_by(self) -> str:
         """The baseline, or the class as `module:class`."""
         return self.factory or self.name
-
-    @property
-    def is_named(self) -> bool:
-        """Whether a user named it: else a class names itself."""
-        return bool(self.factory)
 
     @property
     def metric(self) -> Metric:
@@ -113,6 +110,12 @@ class MethodSpec:
             parts.append(self.grid)
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    @property
+    def who(self) -> str:
+        """What has its name: the hash of a class of others with its settings, mended or not; the
+        name itself of other methods."""
+        return replace(self, source="").digest if self.source else self.name
 
 
 def preset_spec(
@@ -176,11 +179,14 @@ def baseline_spec(
     """
     if ":" not in name:
         name = baseline_name(name, BASELINES)
-    class_of(BASELINES.get(name, (name, {}))[0])
-    spec = MethodSpec(name, None, source="" if name in BASELINES else source_hash(name))
+    made_of = class_of(BASELINES.get(name, (name, {}))[0])
+    spec = MethodSpec(name, None)
+    if name not in BASELINES:
+        spec = replace(spec, source=source_hash(name), label=own_name(made_of) or name)
     if named is not None and (named.name or named.settings or named.grid):
-        settings = named.settings
-        spec = replace(spec, name=named.name or name, factory=name, settings=settings)
+        spec = replace(
+            spec, name=named.name or name, factory=name, settings=named.settings, label=""
+        )
     if name not in ON_PLACES:
         return spec
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
@@ -237,8 +243,8 @@ class Prepared:
     method_seconds: float
     by_costs: bool = False
     """Whether it plans by the costs of the run."""
-    is_named: bool = True
-    """Whether its name in tables is that of its specification: a class of others names itself."""
+    label: str = ""
+    """Name that a class of others gives itself, empty for other methods."""
 
     def ask(self, start: tuple[int, int], goal: tuple[int, int]) -> Callable[[], MethodResult]:
         """Ask the method for a path; return what tells the answer whole.
@@ -285,8 +291,8 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     if spec.grid:
         method, topology = OnOwnGrid(method, grid), None
     seconds = built - began, clock() - built
-    is_named = spec.is_named or not spec.source
-    return Prepared(method, topology, *seconds, by_costs, is_named)
+    label = spec.label and (own_name(method) or spec.label)
+    return Prepared(method, topology, *seconds, by_costs, label)
 
 
 def _of_class(
@@ -300,7 +306,7 @@ def _of_class(
         costs = None
     if costs is not None:
         options = options | {"costs": costs}
-    if spec.is_named and _takes(made_of, "name"):
+    if spec.factory and _takes(made_of, "name"):
         options = {"name": spec.name} | options
     own = os.getpid()
     try:

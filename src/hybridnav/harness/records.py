@@ -7,6 +7,7 @@ import json
 import os
 import platform
 import re
+from collections import Counter
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 import hybridnav
 from hybridnav._base.moves import STEPS
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.yardstick import Fault, contradiction
 from hybridnav.maps.cells import MAX_CELLS
 
@@ -95,18 +96,58 @@ def _processor() -> str:
     return platform.processor() or "unknown"
 
 
+def who_of(record: Record) -> str:
+    """Return what has the name of a preparation's method; see `MethodSpec.who`."""
+    return str(record.get("settings_sha", record["method"]))
+
+
+class _Names:
+    """The names of methods in one folder. A class is called what it calls itself where no other
+    method is, and `module:class` where it never came to say a name.
+
+    `specs`: methods whose names no class takes; one that two classes give themselves is nobody's.
+    """
+
+    def __init__(self, specs: Iterable[MethodSpec] = ()) -> None:
+        given = {spec.digest: spec for spec in specs}
+        called = Counter(spec.label for spec in given.values())
+        self._whose = {label: "" for label, count in called.items() if count > 1}
+        self._whose |= {name: name for name in BASELINES}
+        self._whose |= {spec.name: spec.who for spec in given.values()}
+        self._of: dict[str, str] = {}
+        for digest, spec in given.items():
+            if spec.label:
+                self._call(digest, spec.label, spec.who)
+
+    def _call(self, sha: str, own: str, who: str) -> None:
+        """Note what a method calls itself, unless another one has that name."""
+        if self._whose.setdefault(own, who) == who:
+            self._of[sha] = own
+
+    def lay(self, record: Record) -> None:
+        """Name the method of a record."""
+        sha, own = record["method_sha"], record.pop("label", record["method"])
+        is_said = sha not in self._of or own != record.get("made_by", own)
+        if record["type"] == "preparation" and is_said:
+            self._call(sha, own, who_of(record))
+        record["method"] = self._of.get(sha, record["method"])
+
+
 class RecordFile:
     """The records of one run. Opening it drops a last line that a kill cut short.
 
-    `folder`: folder of `records.jsonl`, which may be missing. Raises `InvalidValueError` when the
-    file holds a line that is no record.
+    `folder`: folder of `records.jsonl`, which may be missing; `specs`: the methods of the run.
+    Raises `InvalidValueError` when the file holds a line that is no record.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, specs: Iterable[MethodSpec] = ()) -> None:
         self.path = folder / RECORDS_FILE
         self.ids: set[str] = set()
         _drop_cut_line(self.path)
+        self._names = _Names(specs)
         there = read_records(folder)
+        for record in there:
+            self._names.lay(record)
         self.ids = {record["id"] for record in there}
         made = (record for record in there if record["type"] == "preparation")
         self.costs = {str(record.get("costs", "")) for record in made}
@@ -131,6 +172,8 @@ class RecordFile:
     def append(self, records: Iterable[Record]) -> None:
         """Write records that are missing; they are on disk when this returns."""
         fresh = [record for record in records if record["id"] not in self.ids]
+        for record in fresh:
+            self._names.lay(record)
         lines = [json.dumps(record, allow_nan=False, separators=(",", ":")) for record in fresh]
         if not lines:
             return
@@ -198,9 +241,9 @@ def loads_of(folder: Path) -> list[float]:
 def read_records(folder: Path) -> list[Record]:
     """Return all whole records of a run in the order written; none without a file.
 
-    Their faults are all that is known: what the judge found of the answer, and what the reference
-    of the same run contradicts, one text for each kind. All counts of contradictions are counts of
-    them.
+    Their methods have the names that tables show. Their faults are all that is known: what the
+    judge found of the answer, and what the reference of the same run contradicts, one text for each
+    kind. All counts of contradictions are counts of them.
 
     Raises `InvalidValueError` when the file cannot be read, or a line of it is no record, or one of
     an older version whose any-angle length is not proved to be shortest.
@@ -228,6 +271,7 @@ def read_records(folder: Path) -> list[Record]:
                 "no optimum: take a new folder"
             )
         records.append(record)
+    _lay_names(records)
     optima = {
         (record["map_sha"], query_key(record)): record
         for record in records
@@ -239,6 +283,14 @@ def read_records(folder: Path) -> list[Record]:
         elif record["type"] == "preparation":
             _lay_contradiction(record, None)
     return records
+
+
+def _lay_names(records: list[Record]) -> None:
+    """Name the methods of records of one folder. Those of older versions say what a class calls
+    itself in the `label` of its preparations alone."""
+    names, made = _Names(), [record for record in records if record["type"] == "preparation"]
+    for record in (*sorted(made, key=lambda one: "label" in one), *records):
+        names.lay(record)
 
 
 def _lay_contradiction(record: Record, reference: Record | None) -> None:

@@ -180,7 +180,7 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
         path.mkdir(parents=True, exist_ok=True)
         if any(path.iterdir()) and not (path / RECORDS_FILE).exists():
             raise InvalidValueError(f"folder {folder} holds other files and no run: take a new one")
-        with RecordFile(path) as records:
+        with RecordFile(path, [task.method for task in tasks]) as records:
             _check_costs(settings, records)
             _write_settings(settings, path, _sources(tasks))
             total = len({name for task in tasks for name in task.ids})

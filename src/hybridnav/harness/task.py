@@ -15,7 +15,7 @@ from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapErr
 from hybridnav.harness.adapters import checked
 from hybridnav.harness.judging import Judge, status_of
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
-from hybridnav.harness.names import own_name, own_settings
+from hybridnav.harness.names import own_settings
 from hybridnav.harness.records import (
     encode_path,
     environment,
@@ -85,7 +85,7 @@ class Task:
             "faults": [],
         }
         if not index:
-            common |= source_fields(self.method)
+            common |= _of_method(self.method)
         if self.map.costs and not index:
             common["costs"] = text_of_costs(self.map.costs)
         if index:
@@ -107,7 +107,7 @@ def run_task(task: Task) -> Iterator[Record]:
         "method": task.method.name,
         "method_sha": task.method.digest,
     }
-    head = {"id": task.ids[0], "type": "preparation", **common, **source_fields(task.method)}
+    head = {"id": task.ids[0], "type": "preparation", **common, **_of_method(task.method)}
     try:
         prepared, judge = _ready(scene, task)
         about = _about(scene, task) | _of_preparation(prepared, judge)
@@ -146,9 +146,8 @@ def _of_refusal(error: Exception) -> tuple[str, Record]:
 
 def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     method = prepared.method
-    label = "" if prepared.is_named else own_name(method)
     return {
-        **({"label": label} if label else {}),
+        **({"label": prepared.label} if prepared.label else {}),
         **({"version": str(version)} if (version := getattr(method, "version", "")) else {}),
         **({"settings_text": words} if (words := own_settings(method)) else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
@@ -179,7 +178,6 @@ def _about(scene: Scene, task: Task) -> Record:
     grid = scene.grid
     return {
         **_of_costs(scene, task.map),
-        **_of_graph(task.method),
         "file": task.map.path,
         "shape": list(grid.shape),
         "resolution_m": grid.resolution_m,
@@ -187,12 +185,6 @@ def _about(scene: Scene, task: Task) -> Record:
         "robot_radius_m": grid.robot_radius_m,
         "corner_cutting": grid.corner_cutting,
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
-        "metric": task.method.metric,
-        "made_by": task.method.made_by,
-        **({"settings": task.method.settings} if task.method.settings else {}),
-        **({"grid": task.method.grid} if task.method.grid else {}),
-        "preset": None if task.method.preset is None else _plain(task.method.preset),
-        "pyramid": _plain(task.method.pyramid),
         "environment": environment(),
     }
 
@@ -208,13 +200,24 @@ def _of_costs(scene: Scene, spec: MapSpec) -> Record:
     }
 
 
-def _of_graph(spec: MethodSpec) -> Record:
-    """Return the fields that the record of a preparation has for a method that follows a graph."""
-    graph = spec.graph
-    if graph is None:
-        return {}
-    about = {"name": graph.name, "format": graph.format, "sha256": graph.digest}
-    return {"graph": about | {"clear_edges_only": spec.clear_edges_only}}
+def _of_method(spec: MethodSpec) -> Record:
+    """Return the fields that the record of a preparation has of its method, even where the method
+    was lost."""
+    graph, about = spec.graph, {}
+    if graph is not None:
+        about = {"name": graph.name, "format": graph.format, "sha256": graph.digest}
+        about = {"graph": about | {"clear_edges_only": spec.clear_edges_only}}
+    return {
+        **about,
+        "metric": spec.metric,
+        "made_by": spec.made_by,
+        **({"label": spec.label} if spec.label else {}),
+        **({"source": spec.source, "settings_sha": spec.who} if spec.source else {}),
+        **({"settings": spec.settings} if spec.settings else {}),
+        **({"grid": spec.grid} if spec.grid else {}),
+        "preset": None if spec.preset is None else _plain(spec.preset),
+        "pyramid": _plain(spec.pyramid),
+    }
 
 
 def _plain(settings: Record) -> Record:
@@ -233,13 +236,6 @@ def _reason(error: Exception) -> str:
     known = isinstance(error, HybridNavError)
     text = str(error) if known else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]
-
-
-def source_fields(spec: MethodSpec) -> Record:
-    """Return the fields that the record of a preparation has for a class of others."""
-    if not spec.source:
-        return {}
-    return {"source": spec.source, "settings_sha": replace(spec, source="").digest}
 
 
 def _traceback_of(error: Exception) -> str:
