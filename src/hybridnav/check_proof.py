@@ -433,8 +433,12 @@ def check(measured, frame, proof):
     closed = sum(end - first for first, end in proof["closed"])
     ends += f", {closed} cells closed" * (closed > 0) + f", {proof['costs']}" * bool(proof["costs"])
     ends += ", unexplored cells too" * (proof["allow_unexplored"] is True)
-    costs = ": costs {cost:.6f} m, none less than {bound:.6f} m" if kind != "no path" else ""
-    return f"{'path' if costs else kind} {ends}{costs.format(**proof)}"
+    if kind == "no path":
+        return f"{kind} {ends}"
+    cost, bound = proof["cost"], proof["bound"]
+    if bound < cost * (1 - 1e-9):  # else the path is optimal, and its bound is its cost
+        bound = math.floor(bound * 1e6) / 1e6
+    return f"path {ends}: costs {cost:.6f} m, none less than {min(bound, cost):.6f} m"
 
 
 def check_path(walls, factors, proof, ends):

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 
 import hybridnav as hn
 from hybridnav.cli import common
-from hybridnav.cli.rendering import summary
+from hybridnav.cli.rendering import rounded_bound, summary
 
 MAPS = Path(__file__).parents[2] / "maps"
 FIGURE = MAPS / "figure1" / "figure1.yaml"
@@ -126,6 +128,18 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
     assert "arcs       0\n" in done.out
     query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "octile")
     assert "loss 0.00 %" in cli(*query, "--compare").out
+
+
+@given(st.floats(0, 1e4), st.floats(0, 2))
+def test_a_bound_is_rounded_down_and_that_of_an_optimal_path_is_its_length(cost, gap):
+    bound = cost / (1 + gap)
+    least, stated = rounded_bound(bound, cost)
+    assert least == f"{cost:.2f}" if stated == "optimal" else float(least) <= bound + 1e-12
+    assert stated == "optimal" or gap > 0
+    assert stated != "optimal" or gap < 1e-6 or cost < 1e-300
+    assert rounded_bound(0.0, 1.0) == ("0.00", "not proved to be near the optimum")
+    above = math.nextafter(0.045, 1)  # prints as 0.05, and the bound as 0.04
+    assert rounded_bound(math.nextafter(0.045, 0), above) == (f"{above:.2f}", "optimal")
 
 
 def test_a_path_that_ends_short_of_the_goal_says_by_how_much():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,6 +166,25 @@ def test_an_answer_that_is_none_is_refused(
     with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, "Faulty").plan(START, GOAL)
     assert str(caught.value).startswith(f"planner.method: mine:Faulty: find returned {shown}, exp")
+
+
+@pytest.mark.parametrize("metric", ["octile", "any-angle"])
+def test_a_path_without_a_bound_is_not_called_optimal(
+    topology: hn.TopologicalMap, metric: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = hn.HybridPlanner(topology, preset="grid-astar").plan(START, GOAL)
+    assert found.path is not None
+    length_m = found.path.length_m
+    answer = Found(found.path.cells, length_m, 0.0, found.path.points)
+    monkeypatch.setattr(Faulty, "answer", answer)
+    monkeypatch.setattr(Faulty, "metric", metric)
+    planner = planner_of(topology, "Faulty")
+    result = planner.plan(START, GOAL)
+    assert result.lower_bound == pytest.approx(math.dist(*found.path.points[[0, -1]]))
+    assert result.gap == pytest.approx(length_m / result.lower_bound - 1)
+    monkeypatch.setattr(Faulty, "answer", replace(answer, lower_bound_m=math.inf))  # not stated
+    with pytest.raises(hn.errors.PresetError, match="a path whose lower_bound_m is inf, expected"):
+        planner.plan(START, GOAL)
 
 
 def test_costs_do_not_go_with_a_method_that_is_not_known(topology: hn.TopologicalMap) -> None:

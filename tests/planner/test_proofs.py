@@ -61,8 +61,11 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
             if result.solved and preset != "robot":
                 assert proof["bound"] == result.lower_bound
                 assert proof["bound"] == pytest.approx(proof["cost"], rel=1e-9)
+                assert len(set(re.findall(r"\d+\.\d{6}(?= m)", said))) == 1  # the cost is the bound
             elif result.solved:
                 assert proof["bound"] <= min(proof["cost"], result.cost)
+                told = float(re.findall(r"none less than (\S+) m", said)[0])
+                assert told <= proof["bound"] < told + 1.000001e-6
             for kind, false, measured in false_proofs(grid, result, proof, rng):
                 kinds[kind] = kinds.get(kind, 0) + 1
                 assert not is_accepted(grid, false, measured), (kind, false)

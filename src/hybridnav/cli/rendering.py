@@ -109,7 +109,7 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         lines += _duration_lines(figures)
         if by_costs:
             lines.append(f"cost       {figures['cost']:.2f} m{in_metric(figures)}")
-        bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
+        bound, stated = rounded_bound(figures["lower_bound"], figures["cost"])
         stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
         lines += _end_lines(figures)
@@ -214,10 +214,7 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     else:
         lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
     lines += _duration_lines(figures)
-    bound, gap = figures["lower_bound"], 0.0
-    if bound > 0:
-        gap = figures["cost"] / bound - 1
-    least, stated = rounded_bound(bound, gap)
+    least, stated = rounded_bound(figures["lower_bound"], figures["cost"])
     stated = stated.replace("long", "dear") if by_costs else stated
     unit = "m " if by_costs or figures["cost"] == length_m else ""
     return [
@@ -226,10 +223,12 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     ]
 
 
-def rounded_bound(bound: float, gap: float) -> tuple[str, str]:
-    """Return a bound and how far from the optimum a path is at most, rounded to the safe side; the
-    bound of an optimal path is its length, and rounded like that."""
-    if gap <= _OPTIMAL:
-        return f"{bound:.2f}", "optimal"
+def rounded_bound(bound: float, cost: float) -> tuple[str, str]:
+    """Return a bound and how far from the optimum a path of a cost is at most, rounded to the safe
+    side; the bound of an optimal path is its cost, and rounded like that."""
+    if cost <= bound * (1 + _OPTIMAL):
+        return f"{cost:.2f}", "optimal"
+    if bound <= 0:
+        return "0.00", "not proved to be near the optimum"
     low = math.floor(bound * 100) / 100
-    return f"{low:.2f}", f"at most {math.ceil(gap * 1000) / 10:.1f} % too long"
+    return f"{low:.2f}", f"at most {math.ceil((cost / bound - 1) * 1000) / 10:.1f} % too long"

@@ -31,6 +31,7 @@ from hybridnav.harness.yardstick import (
     SLACK,
     AnyAngleOptimum,
     Fault,
+    compared,
 )
 from hybridnav.maps import CellClass
 from hybridnav.maps.costs import cost_along
@@ -222,11 +223,10 @@ def _false_claims(line: AnyAngleResult, length_m: float) -> list[str]:
     """
     wrong = []
     if not abs(line.length_m - length_m) <= SLACK * length_m:
-        wrong.append(f"the length is {length_m:.6f} m, not {line.length_m:.6f} m as reported")
+        wrong.append(compared("the length is {}, not {} as reported", length_m, line.length_m))
     if not line.lower_bound_m <= length_m * (1 + SLACK):
-        wrong.append(
-            f"the lower bound {line.lower_bound_m:.6f} m is above the length {length_m:.6f} m"
-        )
+        words = "the lower bound {} is above the length {}"
+        wrong.append(compared(words, line.lower_bound_m, length_m))
     return wrong
 
 
@@ -251,7 +251,8 @@ def _false_proof(
     if length_m is None or proof["costs"] is not None:
         return None
     is_alike = abs(proof["cost"] - length_m) <= SLACK * length_m
-    return None if is_alike else f"the proof is about another path, of {proof['cost']:.6f} m"
+    words = "the proof is about another path, of {}, not {}"
+    return None if is_alike else compared(words, proof["cost"], length_m)
 
 
 class Oracles:
@@ -284,21 +285,21 @@ class Oracles:
             optimum = float(self._scipy.lengths_from(pair.start)[pair.goal])
             known["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
             if not (length == optimum or abs(length - optimum) <= SLACK * optimum):
-                faults.append(f"the optimum by scipy is {optimum:.6f} m, not {length:.6f} m")
+                faults.append(compared("the optimum by scipy is {}, not {}", optimum, length))
         if pair.stated_optimum_cells is not None:
             stated = pair.stated_optimum_cells * self._grid.resolution_m
             off = STATED_SLACK_CELLS * self._grid.resolution_m + STATED_SLACK * stated
             if not abs(length - stated) <= off:
-                faults.append(f"the scenario states {stated:.6f} m, not {length:.6f} m")
+                faults.append(compared("the scenario states {}, not {}", stated, length))
         if self._any_angle is not None and answer.cells is not None and not faults:
             optimum = self._any_angle.length_m(pair.start, pair.goal)
-            words = f"the any-angle optimum by the mesh is {optimum:.6f} m"
+            words = "the any-angle optimum by the mesh is {}"
             if not optimum <= length * (1 + SLACK):
-                return known, [f"{words}, a path of cells has {length:.6f} m"]
+                return known, [compared(words + ", a path of cells has {}", optimum, length)]
             if sampled:
                 other = self._visibility.shortest(pair.start, pair.goal).length_m
                 if not abs(optimum - other) <= SLACK * other:
-                    return known, [f"{words}, by a visibility graph {other:.6f} m"]
+                    return known, [compared(words + ", by a visibility graph {}", optimum, other)]
                 known["visibility_optimum_m"] = other
             known["any_angle_m"] = optimum
         return known, faults
@@ -346,11 +347,11 @@ class CostJudge:
             stated = claim.lower_bound_m
             bound_m = stated() if callable(stated) else stated
             if not abs(claim.cost_m - cost_m) <= slack_m:
-                faults.append(f"the cost is {cost_m:.6f} m, not {claim.cost_m:.6f} m as reported")
+                words = "the cost is {}, not {} as reported"
+                faults.append(compared(words, cost_m, claim.cost_m))
             if not bound_m <= cost_m + slack_m:
-                faults.append(
-                    f"the lower bound on costs {bound_m:.6f} m is above the cost {cost_m:.6f} m"
-                )
+                words = "the lower bound on costs {} is above the cost {}"
+                faults.append(compared(words, bound_m, cost_m))
             if claim.grid_bound_m is not None:
                 of_cells = {"cost_grid_bound_m": claim.grid_bound_m}
                 if not 0 <= claim.grid_bound_m < math.inf:

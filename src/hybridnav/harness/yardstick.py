@@ -138,6 +138,15 @@ def is_any_angle(record: Record) -> bool:
     return bool(record.get("metric") == "any-angle")
 
 
+def compared(words: str, *lengths: float) -> str:
+    """Return words with lengths in their braces: with six decimals, or in full where lengths that
+    differ would look alike."""
+    texts = [f"{length:.6f} m" for length in lengths]
+    if len(set(texts)) < len(set(lengths)):
+        texts = [f"{float(length)!r} m" for length in lengths]
+    return words.format(*texts)
+
+
 def contradiction(record: Record, reference: Record) -> Fault | None:
     """Return the contradiction of an answer by the optima, None if there is none.
 
@@ -171,28 +180,26 @@ def _cost_contradiction(record: Record, optimum: float | None) -> str | None:
     if optimum is None or cost is None:
         return None
     if cost < optimum * (1 - SLACK) and not is_any_angle(record):
-        return f"cost {cost:.6f} m is below the weighted optimum {optimum:.6f} m"
+        return compared("cost {} is below the weighted optimum {}", cost, optimum)
     of_cells = record.get("cost_grid_bound_m")
     if of_cells is not None and of_cells > optimum * (1 + SLACK):
-        return (
-            f"the lower bound on paths of cells {of_cells:.6f} m is above the weighted optimum "
-            f"{optimum:.6f} m"
-        )
+        words = "the lower bound on paths of cells {} is above the weighted optimum {}"
+        return compared(words, of_cells, optimum)
     slack = ANY_ANGLE_SLACK if is_any_angle(record) else SLACK
     if bound is not None and bound > optimum * (1 + slack):
-        return (
-            f"the lower bound on costs {bound:.6f} m is above the weighted optimum {optimum:.6f} m"
-        )
+        words = "the lower bound on costs {} is above the weighted optimum {}"
+        return compared(words, bound, optimum)
     return None
 
 
 def _cells_contradiction(record: Record, reference: Record) -> str | None:
     length, optimum = record["length_m"], octile_optimum_m(reference)
     if length < optimum * (1 - SLACK):
-        return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
+        return compared("length {} is below the optimum {}", length, optimum)
     bound = record.get("bound")
     if bound is not None and length > optimum * bound * (1 + SLACK) + SLACK:
-        return f"length {length:.6f} m breaks its bound, {bound:.6f} x optimum {optimum:.6f} m"
+        words = f"length {{}} breaks its bound, {bound:.6f} x optimum {optimum:.6f} m = {{}}"
+        return compared(words, length, bound * optimum)
     return None
 
 
@@ -201,8 +208,8 @@ def _any_angle_contradiction(record: Record, optimum: float | None) -> str | Non
         return None
     length = record["length_m"]
     if length < optimum * (1 - ANY_ANGLE_SLACK):
-        return f"length {length:.6f} m is below the any-angle optimum {optimum:.6f} m"
+        return compared("length {} is below the any-angle optimum {}", length, optimum)
     bound = record.get("lower_bound_m")
     if bound is not None and bound > optimum * (1 + ANY_ANGLE_SLACK):
-        return f"the lower bound {bound:.6f} m is above the any-angle optimum {optimum:.6f} m"
+        return compared("the lower bound {} is above the any-angle optimum {}", bound, optimum)
     return None

@@ -241,12 +241,12 @@ def _route_lines(figures: dict[str, Any]) -> list[str]:
         lines.append(f"{'' if number else 'rides':<10} {ride['link']} {floors}, {worth}")
     cost = f"cost       {figures['cost']:.2f} m, {figures['travel_s']:.0f} s"
     for number, leg in enumerate(figures.get("legs", ()), start=1):
-        on = rounded_bound(leg["lower_bound"], leg["gap"])[0]
+        on = rounded_bound(leg["lower_bound"], leg["cost"])[0]
         lines.append(f"leg {number:<6} cost {leg['cost']:.2f} m, bound {on} m")
     if figures["lower_bound"] is None:
         note = "none for the tour: each leg begins where the one before it ended"
         return [*lines, cost, f"bound      {note}"]
-    bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
+    bound, stated = rounded_bound(figures["lower_bound"], figures["cost"])
     stated = stated.replace("long", "dear")
     return [
         *lines,

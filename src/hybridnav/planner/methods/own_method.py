@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,8 +78,9 @@ class OwnMethod(Method):
     def find(self, query: Query) -> Found:
         """Find a path, and time it if the method does not; see `Method`.
 
-        Raises `PresetError` when the answer is no `Found`, or its path does not lead from start to
-        goal, or is not as long as stated.
+        The bound is never below the straight line. Raises `PresetError` when the answer is no
+        `Found`, or its path does not lead from start to goal, is not as long as stated, or states
+        no bound.
         """
         if not self._is_prepared:
             self.prepare()
@@ -94,11 +97,23 @@ class OwnMethod(Method):
             raise self._wrong(f"a path from {ends[0]} to {ends[1]}")
         if self.metric != "weighted" and not is_length(found.cost_m, self._driven_m(found)):
             raise self._wrong(f"{found.cost_m:.6g} m for a path of {self._driven_m(found):.6g} m")
+        found = replace(found, lower_bound_m=max(self._bound_m(found), self._straight_m(query)))
         if self.metric != "any-angle":
             return round_closed(found, query, self._refiner)
         if query.closed is not None and query.closed.meets(found.cells, self._refiner.grid):
             raise self._wrong("a path through closed cells")
         return found
+
+    def _bound_m(self, found: Found) -> float:
+        if found.optimum is None and not math.isfinite(found.lower_bound_m):
+            raise self._wrong(f"a path whose lower_bound_m is {found.lower_bound_m}")
+        return found.lower_bound_m
+
+    def _straight_m(self, query: Query) -> float:
+        """Return the straight line, between the centres of cells for paths of cells."""
+        if self.metric == "any-angle":
+            return query.straight_m
+        return math.dist(*query.cells) * self._refiner.grid.resolution_m
 
     def _driven_m(self, found: Found) -> float:
         if found.points is not None:
@@ -108,5 +123,6 @@ class OwnMethod(Method):
     def _wrong(self, what: str) -> PresetError:
         return PresetError(
             f"planner.method: {self._name}: find returned {what}, expected a Found with a path "
-            "from the first cell of the query to the last and its length, or without one"
+            "from the first cell of the query to the last, its length and a bound on that of all "
+            "paths (0 for none), or without a path"
         )
