@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 from numba.core.compiler_lock import global_compiler_lock
 
+import hybridnav as hn
 from hybridnav._base.clock import clock
+from hybridnav.ext.fleet import load_building
+from hybridnav.ext.fleet.search import LinkSearch
+from hybridnav.ext.live import OnlinePyramid, OnlineRooms, replay
+from hybridnav.ext.live.explore import explore
+from hybridnav.ext.live.mapping import Mapper
 from hybridnav.harness import RunSettings, evaluate
 from hybridnav.harness.records import read_records
 from hybridnav.search.grid_search import GridSearch
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import name_of, write_map
+from tests.harness.small_runs import ROOT, label_of, name_of, write_map
 
 LONG_S = 1000.0
 passed_s = 0.0
@@ -78,7 +84,7 @@ def test_no_time_of_a_record_contains_a_compilation(tmp_path):
     )
     evaluate(settings, tmp_path / "run")
     records = read_records(tmp_path / "run")
-    own = [one for one in records if one["method"] == name_of(Compiles)]
+    own = [one for one in records if one["method"] == label_of(Compiles)]
     seconds = [one["method_seconds" if "method_seconds" in one else "seconds"] for one in own]
     timed = [times for one in records for times in one.get("times", {}).values()]
     assert len(seconds) == 3
@@ -87,13 +93,7 @@ def test_no_time_of_a_record_contains_a_compilation(tmp_path):
 
 
 def test_no_time_of_a_comparison_contains_a_compilation(tmp_path, cli, monkeypatch):
-    right = GridSearch.search
-
-    def search(*given, **more):
-        compile_long()
-        return right(*given, **more)
-
-    monkeypatch.setattr(GridSearch, "search", search)
+    slowed(monkeypatch, GridSearch, "search")
     file = write_map(tmp_path, ["....", "...."])
     ends = "--start=0.5,0.5", "--goal=2.5,1.5"
     for preset in ("shortest", "grid-astar"):
@@ -101,3 +101,51 @@ def test_no_time_of_a_comparison_contains_a_compilation(tmp_path, cli, monkeypat
         figures = json.loads(cli("plan", file, *words).out)
         assert figures["grid_seconds"] < LONG_S
         assert all(seconds < LONG_S for seconds in figures["seconds"].values())
+
+
+def slowed(monkeypatch, owner, name):
+    """Let a method compile for long whenever it is called."""
+    right = getattr(owner, name)
+
+    def slow(*given, **more):
+        compile_long()
+        return right(*given, **more)
+
+    monkeypatch.setattr(owner, name, slow)
+
+
+def test_no_time_of_the_wing_contains_a_compilation(monkeypatch):
+    """Of maps that change, explorations, and routes over floors."""
+    grid = hn.OccupancyGrid(np.zeros((9, 21), np.float32), hn.Frame(0.25), robot_radius_m=0)
+    building = load_building(ROOT / "maps/building/building.yaml")
+    for owner, name in (
+        (hn.DualGraphPyramid, "build"),
+        (OnlinePyramid, "update"),
+        (OnlineRooms, "of"),
+        (OnlineRooms, "update"),
+        (Mapper, "add"),
+        (hn.HybridPlanner, "plan"),
+        (LinkSearch, "best"),
+    ):
+        slowed(monkeypatch, owner, name)
+    before = passed_s
+    first, second = replay([grid, grid])
+    seconds = [first.seconds, first.rooms_seconds, second.seconds, second.rooms_seconds]
+    seconds += explore(hn.example_map(robot_radius_m=0.1), most_goals=2).seconds.values()
+    floor, other = building.floors[0], building.floors[-1]
+    ends = [(one.name, one.rooms.names[0]) for one in (floor, other) if one.rooms]
+    plan = building.plan(ends[0], ends[1])
+    assert plan.solved
+    seconds += plan.stats.seconds.values()
+    assert passed_s - before > 5 * LONG_S
+    assert max(seconds) < LONG_S
+
+
+def test_only_deadlines_are_told_by_another_clock():
+    read = {
+        str(path.relative_to(ROOT / "src/hybridnav"))
+        for path in (ROOT / "src/hybridnav").rglob("*.py")
+        if "perf_counter" in path.read_text(encoding="utf-8")
+    }
+    mesh = {"search/mesh/cut.py", "search/mesh/search.py"}
+    assert read == {"_base/clock.py", "_base/jit.py", *mesh}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
@@ -452,7 +452,7 @@ class Building:
         self, start: FloorWaypoint, goal: FloorWaypoint, asked: _Asked, limits: tuple[int, float]
     ) -> BuildingAlternatives:
         """Plan as many routes as are wanted; again where a map changes meanwhile."""
-        began = time.perf_counter()
+        began = clock()
         answers = Answers(
             self.floors, self._network(asked.closed_links, asked.stairs), self.speed_m_s
         )

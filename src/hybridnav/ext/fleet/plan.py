@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
+from hybridnav._base.clock import clock
 from hybridnav.errors import PlanError
 from hybridnav.ext.fleet.floors import ROUNDED, Floor
 from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
@@ -231,7 +231,7 @@ class Answers:
 
         `search`: the search of a query; `endpoints`: its start and goal; `limits`: most routes, and
         cost of one over that of the first, at most; `began`: when the query began, by
-        `time.perf_counter`.
+        `clock`.
         """
         count, stretch = limits
         if count == 1:
@@ -242,7 +242,7 @@ class Answers:
             chosen = list(itertools.islice(ranked, count))
         bound = search.bound()
         results = [tuple(search.drafts[part].result() for part in one.parts) for one in chosen]
-        stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
+        stats = stats_of([draft.stats for draft in search.planned], clock() - began)
         if not chosen:
             metrics = [draft.result().metric for draft in search.planned[:1]]
             refused = self.refused(search.reason(), endpoints)

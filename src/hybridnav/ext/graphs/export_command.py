@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
+from hybridnav._base.clock import clock
 from hybridnav._base.files import printable
 from hybridnav.cli import common, options
 from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
@@ -124,13 +124,13 @@ def export(
     own = floor if keep is not None and keep.suffix in given.ENDINGS.get(kind, ()) else None
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=own)
     for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
-    began = time.perf_counter()
+    began = clock()
     build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with common.progress_bar("building the graph") as advance:
         graph = build(topology, progress=advance, **for_lanes)
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
-    seconds["graph"] = round(time.perf_counter() - began, 6)
+    seconds["graph"] = round(clock() - began, 6)
     with common.stage(f"writing {out}", seconds, "write"):
         aim = fleet or (robot and robot._replace(lifts=lifts))
         missing = list(_write_graph(topology, graph, aim, out, frame))
@@ -205,13 +205,13 @@ def _export_over_floors(
         reports.append(hn.ext.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
         return built
 
-    began = time.perf_counter()
+    began = clock()
     with common.progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
             building, name=map_file.stem, build=judging, progress=advance
         )
     judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
-    seconds["graph"] = round(time.perf_counter() - began, 6)
+    seconds["graph"] = round(clock() - began, 6)
     with common.stage(f"writing {out}", seconds, "write"):
         left_out = [*fleet.write_building(align_floors(graph), out), *bare]
     figures = {

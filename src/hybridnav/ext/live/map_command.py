@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import hybridnav as hn
+from hybridnav._base.clock import clock
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
@@ -160,9 +160,9 @@ def map(  # noqa: A001 - the command's name
         resolution_m=resolution_m, laser=model, least_probability=least, max_cells=max_cells
     )
     log = open_log(log_file, topic, frame)
-    began = time.perf_counter()
+    began = clock()
     _add_all(log, mapper)
-    seconds = time.perf_counter() - began
+    seconds = clock() - began
     where = f"log {printable(log_file)}"
     if not log.n_scans:
         raise MapError(f"{where}: no scan of a laser, expected {log.expected}; {log.summary()}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.identities import Flips, Numbered, flips_between
 from hybridnav.ext.live.pyramid import OnlinePyramid, Update, changed_cells
@@ -181,23 +181,23 @@ def _with_last(grids: Iterable[OccupancyGrid]) -> Iterator[tuple[int, OccupancyG
 
 
 def _first(grid: OccupancyGrid, merge_distance_m: float, labels: RoomLabels | None) -> ReplayStep:
-    began = time.perf_counter()
+    began = clock()
     pyramid = DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m)
     places = OnlinePyramid.of(pyramid)
-    built = time.perf_counter()
+    built = clock()
     rooms = OnlineRooms.of(grid, labels)
-    found = time.perf_counter()
+    found = clock()
     return ReplayStep(0, places, rooms, None, None, built - began, found - built, None, None)
 
 
 def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayStep:
     before, rooms = step.places, step.rooms
     changed = changed_cells(before.grid, grid)
-    began = time.perf_counter()
+    began = clock()
     update = before.update(grid, changed=changed)
-    updated = time.perf_counter()
+    updated = clock()
     rooms_update = rooms.update(grid) if with_rooms else None
-    found = time.perf_counter()
+    found = clock()
     after = update.version
     return ReplayStep(
         step.number + 1,

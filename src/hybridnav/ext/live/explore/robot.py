@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav._base.trig import atan2, hypots
 from hybridnav.errors import InvalidValueError
@@ -111,27 +111,27 @@ class Robot:
         self._scan()
 
     def _scan(self) -> None:
-        began = time.perf_counter()
+        began = clock()
         area = self._mapper.add(self._sensor.scan(self._world, self.pose, seed=self._noise))
         if area is not None:
             self._changed.append(area)
         self.points.append(self.pose[:2])
-        self.seconds["mapping"] += time.perf_counter() - began
+        self.seconds["mapping"] += clock() - began
 
     def _grid(self, area: Area | None = None) -> OccupancyGrid:
-        began = time.perf_counter()
+        began = clock()
         grid = self._mapper.to_grid(
             robot_radius_m=self._world.robot_radius_m,
             name=f"{self._world.name}-explored",
             area=area,
         )
-        self.seconds["mapping"] += time.perf_counter() - began
+        self.seconds["mapping"] += clock() - began
         return grid
 
     def look(self) -> plans.Goals:
         """Bring map and pyramid up to date, and return the goals."""
         grid = self._grid()
-        began = time.perf_counter()
+        began = clock()
         grid = plans.rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
         if self._version is None:
             self._version = OnlinePyramid.of(DualGraphPyramid.build(grid, seed=self._seed))
@@ -141,11 +141,11 @@ class Robot:
             self._version = self._version.update(grid, changed=changed).version
         self._changed.clear()
         self.topology = TopologicalMap(self._version.pyramid)
-        self.seconds["pyramid"] += time.perf_counter() - began
-        began = time.perf_counter()
+        self.seconds["pyramid"] += clock() - began
+        began = clock()
         self._at = self._cell(grid)
         goals = plans.Goals.of(self.topology, self._at, ~self._goal_cells(grid))
-        self.seconds["goals"] += time.perf_counter() - began
+        self.seconds["goals"] += clock() - began
         return goals
 
     def _cell(self, grid: OccupancyGrid) -> tuple[int, int]:
@@ -171,13 +171,13 @@ class Robot:
 
     def in_its_room(self, goals: plans.Goals) -> BoolArray:
         """Return the goals that lie in the room that the robot is in, bool (n,)."""
-        began = time.perf_counter()
+        began = clock()
         grid = self.topology.grid
         self._rooms = (
             OnlineRooms.of(grid) if self._rooms is None else self._rooms.update(grid).version
         )
         room_of = self._rooms.number_of
-        self.seconds["rooms"] += time.perf_counter() - began
+        self.seconds["rooms"] += clock() - began
         inside: BoolArray = room_of[tuple(goals.cells.T)] == room_of[self._at]
         return inside
 
@@ -237,7 +237,7 @@ class Robot:
 
         Return whether there is one within a distance that the robot has not looked from enough.
         """
-        began = time.perf_counter()
+        began = clock()
         grid = self.topology.grid
         seldom = (spot for spot in plans.narrow_spots(grid, self._at) if self._is_seldom_seen(spot))
         spots = np.array([*plans.doubtful_spots(grid, self._at), *seldom], np.int64).reshape(-1, 2)
@@ -251,7 +251,7 @@ class Robot:
             spots, costs = spots[costs >= 0], costs[costs >= 0]
             within = length_in_cells(costs) * grid.resolution_m < within_m
             spots, costs = spots[within], costs[within]
-        self.seconds["goals"] += time.perf_counter() - began
+        self.seconds["goals"] += clock() - began
         if not len(spots):
             return False
         spot = spots[costs.argmin()]
@@ -273,10 +273,10 @@ class Robot:
 
     def _path_to(self, cell: LongArray) -> FloatArray | None:
         """Return the points of a path to a cell, None if the planner finds none."""
-        began = time.perf_counter()
+        began = clock()
         from_m, to_m = self.topology.grid.frame.points_of(np.array([self._at, cell]))
         result = HybridPlanner(self.topology, preset="paper").plan(from_m, to_m)
-        self.seconds["planning"] += time.perf_counter() - began
+        self.seconds["planning"] += clock() - began
         return None if result.path is None else result.path.points
 
     def _drive(self, points: FloatArray, beyond: tuple[int, int] | None) -> None:
