@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 TOOLS := $(VENV)/.tools
-READY := $(VENV)/.ready
+KERNELS := $(VENV)/.kernels
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
@@ -23,6 +23,7 @@ route: $(INSTALLED)
 	mkdir -p out
 	$(BIN)/hybridnav plan maps/office/office.yaml --start 1.0,13.2 --goal 40.6,19.4 --compare --plot out/route.png
 	@echo "picture: out/route.png"
+	@$(MAKE) --no-print-directory $(KERNELS)
 
 # What uses one core runs side by side.
 test: setup
@@ -66,10 +67,10 @@ full: setup
 	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
-setup: $(READY)
+setup: $(TOOLS) $(KERNELS)
 
 # What the package needs, without bytecode: Python writes that of the modules that a command loads.
-# The kernels of the route are compiled by its first plan, those of all presets by `setup`.
+# The kernels of the route are compiled by its first plan, those of other commands after it.
 $(INSTALLED): requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'a clone needs Python 3.11 or newer')"
 	@echo "setting up $(VENV): half a minute the first time"
@@ -83,10 +84,11 @@ $(TOOLS): $(INSTALLED)
 	$(INSTALL) -r requirements.lock
 	touch $(TOOLS)
 
-$(READY): $(TOOLS)
-	@echo "compiling kernels: about a minute"
+# After the picture, so that nobody waits for it, and no later command has to compile.
+$(KERNELS): $(INSTALLED)
+	@echo "compiling what the other commands need, once: about a minute"
 	$(BIN)/python -m hybridnav.cli.warm
-	touch $(READY)
+	touch $(KERNELS)
 
 # Wheels that bring compiled kernels, one for each Python of PYTHONS, in out/wheels; from a clean tree.
 wheels: setup

@@ -10,11 +10,13 @@ import logging
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
@@ -23,7 +25,6 @@ from hybridnav.cli.common import complain, stage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-    from pathlib import Path
 
     from hybridnav.planner import Preset
 
@@ -165,6 +166,8 @@ PRESETS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
 ROOMS = "rooms"
 """The job of what finds rooms."""
+MODEL, HARNESS = "model", "harness"
+"""The jobs of what builds a model and plans on it, and of what evaluates."""
 _ENDPOINTS = ((2, 2), (60, 60))
 _CHANGED = (1.0, 1.0, 2.0, 2.0)
 
@@ -232,6 +235,34 @@ def compile_rooms() -> None:
     _ = rooms.listed_doors, rooms.point_of(rooms.names[0])
 
 
+def compile_model() -> None:
+    """Compile what builds a model with rooms, and what plans on it."""
+    from hybridnav.planner import load_preset  # noqa: PLC0415 - loads pydantic
+
+    grid = replace(small_grid(), frame=hn.Frame(resolution_m=0.25))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
+    presets = [load_preset(name) for name in ("shortest", "robot")]
+    planners = [hn.HybridPlanner(topology, preset=preset) for preset in presets]
+    for planner in planners:
+        planner.prepare()
+    with tempfile.TemporaryDirectory() as folder:
+        hn.save(planners, Path(folder) / "small.hnm")
+        rehearse(Path(folder) / "small.hnm", presets)
+
+
+def compile_harness() -> None:
+    """Compile what evaluates presets and the package's own baselines."""
+    from hybridnav.harness import RunSettings, evaluate  # noqa: PLC0415 - on demand
+    from hybridnav.harness.methods import BASELINES  # noqa: PLC0415
+
+    own = (name for name, (path, _) in BASELINES.items() if path.startswith("hybridnav."))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "small.map"
+        file.write_text("type octile\nheight 3\nwidth 5\nmap\n.....\n.@.@.\n...@.\n")
+        settings = RunSettings(maps=(str(file),), presets=("paper",), baselines=tuple(own), pairs=9)
+        evaluate(settings, Path(folder) / "run")
+
+
 def _end_with_parent() -> None:
     sys.stdin.buffer.read()
     os._exit(1)
@@ -245,7 +276,7 @@ def compile_all() -> None:
 
     # What all plans share first: processes that compile the same do it twice.
     first = [SEARCH + "shortest", "pyramid", SEARCH + "octile", SEARCH + "grid-astar"]
-    waves = first, (*PRESETS, ROOMS)
+    waves = first, (*PRESETS, ROOMS), (MODEL, HARNESS)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("compiling kernels", total=sum(map(len, waves)))
         for wave in waves:
@@ -262,9 +293,10 @@ def compile_all() -> None:
 
 
 def compile_job(job: str) -> None:
-    """Compile what a search, a preset, the pyramid or rooms need."""
-    if job == ROOMS:
-        compile_rooms()
+    """Compile what a search, a preset, the pyramid, rooms, a model or the harness need."""
+    others = {ROOMS: compile_rooms, MODEL: compile_model, HARNESS: compile_harness}
+    if job in others:
+        others[job]()
     elif job.startswith(SEARCH):
         compile_search(job.removeprefix(SEARCH))
     else:
