@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.progress import no_progress
+from hybridnav._base.trig import dist
 from hybridnav.errors import PresetError, brief
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planner.methods.grid import round_closed
@@ -113,7 +114,7 @@ class OwnMethod(Method):
         """Return the straight line, between the centres of cells for paths of cells."""
         if self.metric == "any-angle":
             return query.straight_m
-        return math.dist(*query.cells) * self._refiner.grid.resolution_m
+        return dist(*query.cells) * self._refiner.grid.resolution_m
 
     def _driven_m(self, found: Found) -> float:
         if found.points is not None:
