@@ -155,6 +155,10 @@ def place_of_name(name: str, known: tuple[str, ...], what: str) -> int:
     """
     if name in known:
         return known.index(name)
+    if not isinstance(name, str):
+        raise InvalidValueError(
+            f"the name of a {what} is a text, got {name!r:.80}: put it in quotes"
+        )
     raise InvalidValueError(f"no {what} is called {name!r:.80}{did_you_mean(str(name), known)}")
 
 

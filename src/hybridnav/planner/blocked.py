@@ -246,8 +246,8 @@ def as_blocked(value: Closable) -> Blocked:
     names = tuple(one.name for one in fields(Blocked))
     if not isinstance(value, Mapping):
         raise InvalidValueError(
-            "blocked must be a Blocked, a Door, a shapely geometry or a mapping, "
-            f"got {shown(value)}"
+            "blocked must be a Blocked, a Door, a shapely geometry or a mapping, as "
+            f"{{'doors': [4]}}, got {shown(value)}"
         )
     if unknown := [name for name in value if name not in names]:
         raise InvalidValueError(

@@ -140,3 +140,22 @@ def test_walls_and_floors_that_no_link_joins_are_named():
 def test_closures_without_floors_are_refused(blocked):
     with pytest.raises(InvalidValueError, match=r"mapping from names of floors .* as \{'1'"):
         building().plan(("1", KITCHEN), ("2", LAB), blocked=blocked)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"closed_links": 5}, r"list of names of links, as \['lift', 'stairs@2'\], got 5"),
+        ({"closed_links": None}, "list of names of links.* got None"),
+        ({"closed_links": "lift"}, "list of names of links.* got 'lift'"),
+        ({"closed_links": [5]}, "the name of a link is a text, got 5"),
+        (
+            {"blocked": {2: {"doors": [4]}}},
+            "the name of a floor is a text, got 2: put it in quotes",
+        ),
+        ({"blocked": {"2": ["door 4"]}}, r"or a mapping, as \{'doors': \[4\]\}, got \['door 4'\]"),
+    ],
+)
+def test_closures_of_the_wrong_kind_are_refused_with_an_example(given, message):
+    with pytest.raises(InvalidValueError, match=message):
+        building().plan(("1", KITCHEN), ("2", LAB), **given)

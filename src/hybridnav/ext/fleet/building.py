@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -427,13 +427,14 @@ class Building:
                 f"there, as {{{brief(self.floors[0].name)}: {{'doors': [4]}}}}, "
                 f"got {asked.blocked!r:.80}"
             )
-        if isinstance(asked.closed_links, str):
+        links_given = asked.closed_links
+        if isinstance(links_given, str) or not isinstance(links_given, Iterable):
             raise InvalidValueError(
-                f"closed_links must be names of links, got the text {asked.closed_links!r:.80}: "
-                "put it into a list"
+                f"closed_links must be a list of names of links, as ['lift', 'stairs@2'], got "
+                f"{links_given!r:.80}"
             )
         blocked = dict(asked.blocked)
-        links = [ClosedLink.of(text, self.links) for text in asked.closed_links]
+        links = [ClosedLink.of(text, self.links) for text in links_given]
         for item in () if self.journal is None else self.journal.items():
             try:
                 if item.link is not None:
