@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +25,7 @@ from hybridnav.cli.rendering import Waypoint, draw, query_of, respond
 from hybridnav.cli.warm import compiling_beside
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from hybridnav.cli.options import Closing, Costs
@@ -205,17 +207,29 @@ class Request:
         """Explain why there is no path, or, if asked, where a path is tightest."""
         if (outcome.solved and not self.why) or "outside" in outcome.status:
             return {}
+        from hybridnav.planner.why import explain_solved  # noqa: PLC0415 - loads shapely
+
         results = (outcome,) if isinstance(outcome, hn.PlanResult) else outcome.results
         with stage("explaining", seconds, "why"):
             found = [
-                planner.explain(one.start, one.goal, blocked=_closed_for(one, closed))
-                for one in results
+                explain_solved(
+                    planner.explain, (one.start, one.goal), named, blocked=_closed_for(one, closed)
+                )
+                for one, named in zip(results, self._named(planner, outcome), strict=False)
                 if one.start is not None and one.goal is not None and one.solved == outcome.solved
             ]
         tightest = min(found, key=lambda one: one.widest_m, default=None)
         if tightest is None:
             return {"why": None}
         return {"why": tightest.to_dict() | {"words": tightest.words(self.language)}}
+
+    def _named(
+        self, planner: hn.HybridPlanner, outcome: hn.PlanResult | hn.Tour
+    ) -> Iterator[tuple[Any, Any]]:
+        """Yield the ends of each leg; a name only where the leg may choose its end in it."""
+        is_choice = outcome.solved and self.at == "anywhere" and not planner.needs_headings
+        for leg in itertools.pairwise(self.waypoints):
+            yield leg if is_choice else (None, None)
 
     def _on_whole_grid(
         self, topology: hn.TopologicalMap, closed: hn.Blocked | None, costs: hn.CostLayer | None

@@ -22,7 +22,7 @@ from hybridnav.search.found import ClosedCells
 from hybridnav.topology.rooms import Door
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid
@@ -367,3 +367,25 @@ def explain(
         allow_unexplored=now.preset.planner.allow_unexplored,
     )
     return replace(case.explained(), unfit_end="" if unfit is None else unfit.split()[0])
+
+
+def explain_solved(
+    explain: Callable[..., Explanation],
+    points: Sequence[Any],
+    waypoints: Sequence[Any],
+    **how: Any,
+) -> Explanation:
+    """Explain how wide a path that is there can be; `explain`: of a planner, with its `how`.
+
+    A path to a named room ends beside the jambs of its door, where little fits: the widest to its
+    own point may be wider, and the wider one of both is told. `points`: the ends of the path;
+    `waypoints`: those that were given, points or names.
+    """
+    found = [explain(*points, **how)]
+    if any(isinstance(one, str) for one in waypoints):
+        ends = [
+            one if isinstance(one, str) else point
+            for one, point in zip(waypoints, points, strict=True)
+        ]
+        found.append(explain(*ends, **how))
+    return max(found, key=lambda one: one.widest_m)

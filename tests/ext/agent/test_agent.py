@@ -243,6 +243,22 @@ def test_a_route_ends_near_a_goal_that_cannot_be_reached(tmp_path):
     assert ask("route", start=start, goal=start, within=1)["status"] == "solved"
 
 
+def test_a_room_is_reached_as_wide_as_its_door(tmp_path):
+    """The path to a room ends beside the jambs of its door: that point is no narrow place."""
+    floor = PaintedFloor(2)
+    ask = asker(MapAnswers(session_of(floor, tmp_path)))
+    start = floor.inner_point()[0]
+    widths = []
+    for name in floor.names:
+        found = ask("can_reach", start=start, goal=name)
+        if found["can_reach"] and found["widest_m"] is not None:
+            widths.append(found["widest_m"])
+            assert ask("can_reach", start=start, goal=name, width=found["widest_m"] - 0.01)
+            told = ask("explain", start=start, goal=name)
+            assert found["widest_m"] >= told["widest_m"]
+    assert widths
+
+
 def test_a_mistake_is_answered_in_words(tmp_path):
     floor = PaintedFloor(2)
     answers = MapAnswers(session_of(floor, tmp_path))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -403,3 +404,20 @@ def test_a_client_asks_a_building(tmp_path):
             assert [part.type for part in picture.content] == ["text", "image"]
 
     asyncio.run(main())
+
+
+def test_the_widest_way_to_a_room_is_not_that_to_the_jambs_of_its_door(cli):
+    """All doors on these ways are 0.95 m wide; robots of 0.4 m go where a robot of 0.25 m goes."""
+    building = hn.ext.fleet.load_building(
+        SHIPPED / "building" / "building.yaml", robot_radius_m=0.4
+    )
+    assert building.plan("office 5", "2.04").solved
+    ends = "--from", "office 5", "--to", "2.04", "--robot-radius", "0.25", "--why"
+    over_floors = cli("plan", SHIPPED / "building" / "building.yaml", *ends).out
+    office = SHIPPED / "office" / "office.yaml"
+    stops = "--start", "1,13.2", "--to", "room-7", "--via", "room-6"
+    on_one = cli("plan", office, *stops, "--robot-radius", "0.25", "--why").out
+    for told, count in ((over_floors, 2), (on_one, 1)):
+        radii = [float(one) for one in re.findall(r"every radius below (\d\.\d+) m", told)]
+        assert len(radii) == count
+        assert min(radii) > 0.45

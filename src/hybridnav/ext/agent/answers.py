@@ -15,6 +15,7 @@ from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
+from hybridnav.planner.why import explain_solved
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -219,8 +220,9 @@ class MapAnswers:
         planner, tour = self._tour(asked)
         if not tour.solved:
             return {"can_reach": False, **self._no_path(planner, tour, asked, "en")}
-        ends: Any = tour.start, tour.goal
-        why = planner.explain(*ends, blocked=self._shut(asked.avoiding))
+        named = [self._places.place(one) for one in (asked.start, asked.goal)]
+        shut = self._shut(asked.avoiding)
+        why = explain_solved(planner.explain, (tour.start, tour.goal), named, blocked=shut)
         width = places.doubled(why.widest_m)
         limits = "nothing limits the width"
         if width is not None:

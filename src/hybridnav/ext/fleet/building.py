@@ -20,6 +20,7 @@ from hybridnav.maps.names import place_of_name
 from hybridnav.planner.blocked import Blocked, Closable, as_blocked
 from hybridnav.planner.private_rooms import Privacy
 from hybridnav.planner.profile import PROFILES, profile_of
+from hybridnav.planner.why import explain_solved
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -551,13 +552,16 @@ def tightest(
     `blocked`: what the query closes on floors; `radius_m`: of who goes, None for the robot.
     """
     journal, lines = building.journal, []
-    for leg in legs:
-        for name, result in zip(leg.floors, leg.results, strict=True):
+    for before, leg in zip([None, *legs], legs, strict=False):
+        begin = leg.start[1] if before is None else before.goal[1]
+        last = len(leg.floors) - 1
+        for at, (name, result) in enumerate(zip(leg.floors, leg.results, strict=True)):
             assert result.path is not None  # noqa: S101 - it is solved
             ends = result.path.points[0][:2], result.path.points[-1][:2]
+            named = begin if at == 0 else None, leg.goal[1] if at == last else None
             shut = blocked.get(name, Blocked())
             shut |= Blocked() if journal is None else journal.closures(name)
             planner = building.floor(name).planner
-            found = planner.explain(*ends, blocked=shut, radius_m=radius_m)
+            found = explain_solved(planner.explain, ends, named, blocked=shut, radius_m=radius_m)
             lines += [why.on_floor(name, line, language) for line in found.words(language)]
     return list(dict.fromkeys(lines))  # a tour passes a place again
