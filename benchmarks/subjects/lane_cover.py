@@ -50,12 +50,8 @@ def row_of(file: Path, name: str, radius_m: float) -> Row:
     shown = np.append(rooms.is_listed, True)
     cells = np.floor(graph.positions).astype(np.int64)
     visited = set(label_of[tuple(cells.T)].tolist())
-    at = [np.array(grid.frame.cell_of(*rooms.point_of(room))) for room in rooms.names]
-    wanted = [
-        room
-        for room in np.flatnonzero(rooms.is_listed & rooms.fits).tolist()
-        if is_kept[tuple(at[room])]
-    ]
+    inside = np.unique(label_of[is_kept])
+    wanted = np.intersect1d(np.flatnonzero(rooms.is_listed & rooms.fits), inside).tolist()
     passed = {n for doors in graph.edge_doors for n in doors} & set(graph.doors.tolist())
     flat = is_kept.ravel()
     doors = [

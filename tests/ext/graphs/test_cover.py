@@ -26,8 +26,8 @@ def narrow():
     return cells, hn.RoomLabels(("room-1", "room-2", "room-3", "room-4"), labels)
 
 
-def grown(cells, rooms, radius_m=0.2):
-    grid = hn.OccupancyGrid(cells, hn.Frame(SIDE_M), robot_radius_m=radius_m)
+def grown(cells, rooms, radius_m=0.2, side_m=SIDE_M):
+    grid = hn.OccupancyGrid(cells, hn.Frame(side_m), robot_radius_m=radius_m)
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
 
 
@@ -76,10 +76,82 @@ def test_nothing_lies_in_rooms_that_lists_leave_out():
     assert "room-4" not in report.rooms
 
 
+def test_a_closed_room_has_a_lane_of_its_own():
+    cells = np.ones((120, 120), dtype=np.float32)
+    cells[4:44, 4:116] = cells[50:116, 4:56] = cells[50:116, 60:84] = 0.0
+    labels = np.full(cells.shape, -1)
+    labels[:47], labels[47:, :58], labels[47:, 58:] = 0, 1, 2
+    labels[cells > 0] = -1
+    topology = grown(cells, hn.RoomLabels(("hall", "store", "shaft"), labels))
+    graph = build_lane_graph(topology)
+    assert {graph.rooms[node] for node in graph.edges.ravel()} == {"hall", "store", "shaft"}
+    lines = left_out(topology, graph)
+    assert [line.partition(":")[0] for line in lines] == ["store", "shaft"]
+    assert all(": lanes of its own, for no way leads there" in line for line in lines)
+
+
+def row_of_doors(seed):
+    """Two halls full of posts, and a row of doors of 0.3 to 0.5 m in the wall between them."""
+    rng = np.random.default_rng(seed)
+    cells = np.ones((60, 60), dtype=np.float32)
+    cells[2:58, 2:58] = 0.0
+    for row, col in rng.integers(8, 52, (25, 2)):
+        cells[row : row + 2, col : col + 2] = 1.0
+    cells[29:31], first = 1.0, 3
+    while first < 56:
+        width = int(rng.integers(3, 6))
+        cells[29:31, first : first + width] = 0.0
+        first += width + int(rng.integers(1, 4))
+    return cells, np.where(cells > 0, -1, np.arange(60)[:, None] // 30)
+
+
+@pytest.mark.parametrize("seed", [7, 11, 55])
+@pytest.mark.parametrize("turns", [0, 1])
+def test_each_of_a_row_of_doors_has_its_lane(seed, turns):
+    cells, labels = (np.ascontiguousarray(np.rot90(each, turns)) for each in row_of_doors(seed))
+    rooms = hn.RoomLabels(("south", "north"), labels)
+    topology = grown(cells, rooms, radius_m=0.1, side_m=0.1)
+    graph = build_lane_graph(topology)
+    doors = {door.number for door in topology.rooms.listed_doors if door.passable}
+    assert len(doors) >= 6
+    assert set(graph.doors.tolist()) - {0} == doors
+    assert {number for passed in graph.edge_doors for number in passed} == doors
+
+
+def strips():
+    """A hall; a strip of 0.7 m with a neck of 0.3 m, and another one that joins its far part."""
+    cells = np.ones((260, 100), dtype=np.float32)
+    cells[4:44, 4:96] = 0.0
+    cells[44:248, 40:54] = cells[234:248, 40:96] = cells[60:248, 80:94] = 0.0
+    cells[120:124, 40:48] = 1.0
+    labels = np.digitize(np.arange(260), (44, 220))[:, None] * np.ones((1, 100), dtype=int)
+    labels[46:, 60:] = 2
+    labels[cells > 0] = -1
+    return cells, hn.RoomLabels(("room-1", "room-2", "room-3"), np.asarray(labels, dtype=np.int32))
+
+
+def test_a_room_without_a_way_in_has_no_node_in_the_part_of_another_room_beside_it():
+    topology = grown(*strips())
+    assert topology.rooms.is_listed.tolist() == [True, True, False]
+    graph = build_lane_graph(topology)
+    assert set(graph.rooms) == {"room-1", "room-2"}
+    assert max(graph.positions[:, 0]) < 120
+    (line,) = left_out(topology, graph)
+    assert line.startswith("free space at")
+    # Who names the strip wants to see it, and what it leads to.
+    cells, rooms = strips()
+    topology = grown(cells, hn.RoomLabels(("room-1", "room-2", "strip"), rooms.label_of))
+    assert topology.rooms.is_listed.all()
+    assert set(build_lane_graph(topology).rooms) == {"room-1", "room-2", "strip"}
+
+
 MAPS = (
+    "bwi_gdc/3ne/3ne.yaml",
     "giraff_homes/UMA_236.yaml",
     "aws_small_warehouse/002/map.yaml",
     "willow/willow-2010-02-18-0.10.yaml",
+    pytest.param("strands/tsc_y4/tsc_1701.yaml", marks=pytest.mark.full),
+    pytest.param("radish_grids/infinite-corridor.yaml", marks=pytest.mark.full),
 )
 
 
@@ -89,11 +161,16 @@ def test_rooms_doors_and_free_points_of_real_maps(data, name):
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
     graph = build_lane_graph(topology)
     rooms, space = topology.rooms, FreeSpace.of(grid)
-    told = {line.partition(":")[0] for line in left_out(topology, graph)}
+    lines = [line for line in left_out(topology, graph) if "of its own" not in line]
+    told = {line.partition(":")[0] for line in lines}
     listed = np.array(rooms.names)[rooms.is_listed & rooms.fits].tolist()
     assert set(listed) <= set(graph.rooms) | told
-    passed = {door.number for door in rooms.listed_doors if door.passable}
-    assert {f"door {n}" for n in passed - set(graph.doors.tolist())} <= told
+    assert "room" not in {name.partition("-")[0] for name in told}
+    visited = rooms.labels.label_of[tuple(np.floor(graph.positions).astype(int).T)]
+    assert np.append(rooms.is_listed, True)[visited].all()
+    passed = {number for doors in graph.edge_doors for number in doors} & set(graph.doors.tolist())
+    listed = {door.number for door in rooms.listed_doors if door.passable}
+    assert {f"door {n}" for n in listed - passed} <= told
     free = np.argwhere(space.free & space.kept(rooms)[space.component_of])
     at = free[np.random.default_rng(0).integers(len(free), size=2000)]
     network = Network.of(space.sight, graph.positions, graph.edges)

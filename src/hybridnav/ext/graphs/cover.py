@@ -1,20 +1,21 @@
-"""Rooms, doors and free points that lanes have missed, and what is left out in the end."""
+"""Rooms, doors, parts and points of free space that lanes have missed, and what is left out."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.trig import hypots
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, checked_position
 from hybridnav.ext.graphs.lanes import DoorsPassed
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM
 from hybridnav.maps.geometry import cells_of_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.judge import FreeSpace
     from hybridnav.ext.graphs.sketch import Sketch
@@ -30,127 +31,183 @@ _UNSEEN = 0.02
 _REACH_M = 4.0
 """Distance in metres within which a node is chosen for points that see none."""
 _TRIED = 4
-"""Nearest nodes in a room that a door is joined to."""
+"""Nearest nodes that a lane is led to."""
 
 
-def rooms_to_reach(
-    rooms: Rooms, space: FreeSpace, is_kept: BoolArray
-) -> Iterator[tuple[int, FloatArray]]:
-    """Yield each listed room that the robot can be in, and the position of its point.
+@dataclass(frozen=True, eq=False)
+class Aims:
+    """What lanes are to reach: rooms, doors, parts of free space, and points that see a node."""
 
-    `is_kept`: bool (n_components,), the parts of free space that get nodes.
+    space: FreeSpace
+    is_kept: BoolArray
+    """bool (n_components,), the parts of free space that get nodes."""
+    step: int
+    """Cells between the points that are to see a node, along rows and columns."""
+    rooms: Rooms | None
+
+    @cached_property
+    def label_of(self) -> IntArray:
+        """int32 (rows, cols), the room of each cell, -1 for none."""
+        none = np.full(self.space.free.shape, -1, dtype=np.int32)
+        return none if self.rooms is None else self.rooms.labels.label_of
+
+    def _keeps(self, at: FloatArray | LongArray) -> bool:
+        return bool(self.is_kept[self.space.component_of[tuple(at.astype(np.int64))]])
+
+    @cached_property
+    def rooms_to_reach(self) -> list[tuple[int, FloatArray]]:
+        """Each listed room that the robot can be in, and the position of its point, or of its cell
+        with most room if no node may lie there."""
+        if (rooms := self.rooms) is None:
+            return []
+        kept = self.space.free & np.append(self.is_kept, np.False_)[self.space.component_of]
+        found = []
+        for room in np.flatnonzero(rooms.is_listed & rooms.fits).tolist():
+            at = checked_position(self.space, rooms.point_of(rooms.names[room]))
+            if at is None or not self._keeps(at):
+                cells = np.argwhere(kept & (self.label_of == room))
+                deepest = np.argsort(-rooms.clearance_m[tuple(cells.T)], kind="stable")[:1]
+                at = cells[deepest[0]] + 0.5 if len(cells) else None
+            if at is not None:
+                found.append((room, at))
+        return found
+
+    @cached_property
+    def doors_to_pass(self) -> list[tuple[int, LongArray]]:
+        """The number of each listed door that the robot passes, and the moves through it between
+        free cells, int64 (n, 2, 2), the nearest to its middle first."""
+        if (rooms := self.rooms) is None:
+            return []
+        found = []
+        for door in rooms.listed_doors:
+            moves = free_moves(rooms, door.number, self.space.free)
+            if door.passable and len(moves) and self._keeps(moves[0, 0]):
+                middle = rooms.grid.frame.positions_of(np.array([door.position]))
+                away = ((moves.mean(axis=1) + 0.5 - middle) ** 2).sum(axis=1)
+                found.append((door.number, moves[np.argsort(away, kind="stable")]))
+        return found
+
+    @cached_property
+    def _passes(self) -> DoorsPassed | None:
+        return None if self.rooms is None else DoorsPassed(self.rooms)
+
+    def passed(self, ends: FloatArray) -> set[int]:
+        """Return the doors that edges pass, float64 (m, 2, 2) positions of their ends."""
+        if self._passes is None:
+            return set()
+        lines = (cells_of_line(self.space.free, line) for line in ends)
+        return {number for line in lines for number in self._passes.passed(line)}
+
+    @cached_property
+    def looked(self) -> tuple[LongArray, FloatArray]:
+        """The free points that are to see a node: int64 (p, 2) rows and columns of a lattice in the
+        middle of the map, and float64 (p, 2) positions."""
+        free, step = self.space.free, self.step
+        first = [(side - 1) % step // 2 for side in free.shape]
+        lattice = tuple(slice(start, None, step) for start in first)
+        part_of = self.space.component_of[lattice]
+        spots = np.argwhere(free[lattice] & np.append(self.is_kept, np.False_)[part_of])
+        return spots, np.asarray(spots * step + first + 0.5, dtype=np.float64)
+
+
+def free_moves(rooms: Rooms, number: int, free: BoolArray) -> LongArray:
+    """Return the moves through a door between free cells, int64 (n, 2, 2)."""
+    moves = np.stack(np.divmod(rooms.moves_through(number), free.shape[1]), axis=-1)
+    return moves[free[moves[..., 0], moves[..., 1]].all(axis=1)]
+
+
+def complete(sketch: Sketch, aims: Aims, near: float) -> bool:
+    """Lead lanes to what has none: to rooms, through doors, where free points see no node, and in
+    parts of free space with a single node.
+
+    `near`: distance in cells within which edges lead through a new node. Returns whether anything
+    was missing.
     """
-    for room in np.flatnonzero(rooms.is_listed & rooms.fits).tolist():
-        at = checked_position(space, rooms.point_of(rooms.names[room]))
-        if at is not None and is_kept[space.components_at(at[None])[0]]:
-            yield room, at
+    passed = aims.passed(sketch.positions[sketch.edges])
+    kinds = set(sketch.kinds.tolist())
+    bare = [
+        (number, moves)
+        for number, moves in aims.doors_to_pass
+        if number not in passed or DOOR - 1 + number not in kinds
+    ]
+    for number, moves in bare:
+        sketch.kinds[sketch.kinds == DOOR - 1 + number] = NOTHING  # it lies beside the door
+        _lead_through(sketch, aims, number, moves, near)
+    visited = set(aims.label_of[tuple(aims.space.cells_at(sketch.positions).T)].tolist())
+    rooms = [at for room, at in aims.rooms_to_reach if room not in visited]
+    _add(sketch, rooms, ROOM, near)
+    chosen = _cover(sketch, aims)
+    _add(sketch, chosen, END, near)
+    return any([bare, rooms, chosen, _lengthen(sketch, aims)])
 
 
-def doors_to_pass(
-    rooms: Rooms, space: FreeSpace, is_kept: BoolArray
-) -> Iterator[tuple[int, LongArray]]:
-    """Yield the number of each listed door that the robot passes, and the moves through it between
-    free cells, int64 (n, 2, 2), the nearest to its middle first."""
-    frame, cols = rooms.grid.frame, space.free.shape[1]
-    for door in rooms.listed_doors:
-        if not door.passable:
-            continue
-        moves = np.stack(np.divmod(rooms.moves_through(door.number), cols), axis=-1)
-        moves = moves[space.free[moves[..., 0], moves[..., 1]].all(axis=1)]
-        if len(moves) and is_kept[space.component_of[tuple(moves[0, 0])]]:
-            middle = frame.positions_of(np.array([door.position]))
-            middle = frame.positions_of(np.array([door.position]))
-            away = ((moves.mean(axis=1) + 0.5 - middle) ** 2).sum(axis=1)
-            yield door.number, moves[np.argsort(away, kind="stable")]
-
-
-def complete(
-    sketch: Sketch, rooms: Rooms | None, is_kept: BoolArray, near: float, step: int
-) -> None:
-    """Add a node to each room and door without one, and where free points see none.
-
-    `is_kept`: bool (n_components,), the parts of free space that get nodes; `near`: distance in
-    cells within which edges lead through a new node; `step`: cells between the points looked at.
-    """
-    space = sketch.passage.space
-    if rooms is not None:
-        passes, at = DoorsPassed(rooms), sketch.positions
-        lines = [cells_of_line(space.free, at[edge]) for edge in sketch.edges]
-        passed = {number for line in lines for number in passes.passed(line)}
-        for number, moves in doors_to_pass(rooms, space, is_kept):
-            is_marked = sketch.kinds == DOOR - 1 + number
-            if number not in passed or not is_marked.any():
-                sketch.kinds[is_marked] = NOTHING  # it lies beside the door
-                _lead_through(sketch, number, moves[0] + 0.5, rooms.labels.label_of, near)
-        label_of = rooms.labels.label_of
-        bare = [
-            at
-            for room, at in rooms_to_reach(rooms, space, is_kept)
-            if not (label_of[tuple(space.cells_at(sketch.positions).T)] == room).any()
-        ]
-        _add(sketch, np.array(bare).reshape(-1, 2), ROOM, near)
-    looked = np.zeros_like(space.free)
-    looked[step // 2 :: step, step // 2 :: step] = True
-    looked &= space.free
-    looked[looked] = is_kept[space.component_of[looked]]
-    _cover(sketch, looked[step // 2 :: step, step // 2 :: step], near, step)
-
-
-def _add(sketch: Sketch, points: FloatArray, kind: int, near: float) -> None:
+def _add(sketch: Sketch, points: list[FloatArray], kind: int, near: float) -> None:
     """Add nodes, joined to the nearest edge in sight of them, or of their way to the next node."""
-    from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
-
-    space, at = sketch.passage.space, sketch.positions
-    part, tree = space.components_at(at), KDTree(at)
     for point in points:
+        at = sketch.positions
         sketch.add_points(point[None], near)
         (node,) = sketch.add_nodes(point[None])
         sketch.kinds[node] = max(sketch.kinds[node], kind)
-        if (sketch.edges == node).any():
-            continue
-        ends = np.asarray(tree.query(point, k=list(range(1, min(_NEAREST[1], len(at)) + 1)))[1])
-        ends = ends[part[ends] == space.components_at(point[None])[0]]
-        if not len(ends):
-            continue
-        paths = space.paths(np.repeat(point[None], len(ends), axis=0), at[ends])
-        k = int(np.argmin(paths.length_cells))
-        line = space.joinable(paths.positions[paths.path_start[k] : paths.path_start[k + 1]])
-        _lead(sketch, node, line[1:], near)
+        if not (sketch.edges == node).any():
+            _lead(sketch, node, _way(sketch, point, at), near)
 
 
-def _lead_through(
-    sketch: Sketch, number: int, move: FloatArray, label_of: IntArray, near: float
-) -> None:
-    """Add a node to a door, and lead a lane from it to the nearest one on either side.
+def _way(
+    sketch: Sketch, start: FloatArray, at: FloatArray, within: BoolArray | None = None
+) -> FloatArray:
+    """Return the way to the next of some nodes, float64 (k, 2), without its start; empty where
+    there is none.
 
-    `move`: float64 (2, 2), the centres of two cells, one on each side.
+    `at`: float64 (n, 2), the nodes; `within`: cells in which nodes come first.
     """
     space = sketch.passage.space
-    at = sketch.positions.copy()
-    (door,) = sketch.add_nodes(move[:1])
+    ends = at[space.components_at(at) == space.components_at(start[None])[0]]
+    inside = ends if within is None else ends[within[tuple(space.cells_at(ends).T)]]
+    ends = inside if len(inside) else ends
+    ends = ends[(ends != start).any(axis=1)]
+    ends = ends[np.argsort(((ends - start) ** 2).sum(axis=1), kind="stable")[:_TRIED]]
+    if not len(ends):
+        return np.empty((0, 2))
+    paths = space.paths(np.repeat(start[None], len(ends), axis=0), ends)
+    k = int(np.argmin(paths.length_cells))
+    line = paths.positions[paths.path_start[k] : paths.path_start[k + 1]]
+    return space.joinable(line)[1:]
+
+
+def _lead_through(sketch: Sketch, aims: Aims, number: int, moves: LongArray, near: float) -> None:
+    """Add a node to a door, and lead a lane from it to the nearest one on either side.
+
+    `moves`: int64 (n, 2, 2), pairs of cells, one on each side, the best one first.
+    """
+    taken = sketch.positions[sketch.kinds >= DOOR]
+    ways = np.stack([moves, moves[:, ::-1]], axis=1).reshape(-1, 2, 2) + 0.5
+    is_taken = (ways[:, None, 0] == taken).all(axis=2).any(axis=1)
+    one, other = ways[int(np.argmin(is_taken))]
+    at = sketch.positions
+    (door,) = sketch.add_nodes(one[None])
     sketch.kinds[door] = DOOR - 1 + number
-    labels = label_of[tuple(space.cells_at(at).T)]
-    part = space.components_at(at)
-    for side in move:
-        cell = tuple(side.astype(int))
-        within = label_of == label_of[cell]
-        before = len(sketch.edges)
-        sketch.add_points(move[:1], near, within)
-        if len(sketch.edges) > before:
-            continue
-        there = np.flatnonzero(part == space.component_of[cell])
-        inside = there[labels[there] == label_of[cell]]
-        ends = inside if len(inside) else there
-        away = ((at[ends] - side) ** 2).sum(axis=1)
-        ends = ends[np.argsort(away, kind="stable")[:_TRIED]]
-        ends = ends[ends != door]
-        if not len(ends):
-            continue
-        paths = space.paths(np.repeat(side[None], len(ends), axis=0), at[ends])
-        k = int(np.argmin(paths.length_cells))
-        line = paths.positions[paths.path_start[k] : paths.path_start[k + 1]]
-        line = line if side is move[0] else np.concatenate([move[:1], line])
-        _lead(sketch, door, space.joinable(line)[1:], near, within)
+    here, there = (aims.label_of == aims.label_of[tuple(side.astype(int))] for side in (one, other))
+    _join(sketch, door, at, here, near)
+    before = sketch.positions, sketch.kinds.copy(), sketch.edges
+    _join(sketch, door, at, there, near)
+    ends = sketch.edges[(sketch.edges == door).any(axis=1)]
+    if number not in aims.passed(sketch.positions[ends]):
+        # A straight edge passes beside the door: this one leads through it.
+        sketch.positions, sketch.kinds, sketch.edges = before
+        (beyond,) = sketch.add_nodes(other[None])
+        sketch.set_edges([*sketch.edges.tolist(), (door, beyond)])
+        _join(sketch, beyond, at, there, near)
+
+
+def _join(sketch: Sketch, node: int, at: FloatArray, within: BoolArray, near: float) -> None:
+    """Join a node to an edge in some cells, or lead a lane from it to the next node there.
+
+    `at`: float64 (n, 2), the nodes to choose from.
+    """
+    count = len(sketch.edges)
+    sketch.add_points(sketch.positions[[node]], near, within)
+    if len(sketch.edges) == count:
+        _lead(sketch, node, _way(sketch, sketch.positions[node], at, within), near, within)
 
 
 def _lead(
@@ -169,24 +226,40 @@ def _lead(
             break
 
 
-def _cover(sketch: Sketch, looked: BoolArray, near: float, step: int) -> None:
-    """Add nodes where free points see none: of points nearby, those that most of them see.
+def _lengthen(sketch: Sketch, aims: Aims) -> bool:
+    """Lead a lane along the middle of each part of free space without an edge; return whether there
+    was one."""
+    space, passage = aims.space, sketch.passage
+    part = space.components_at(sketch.positions)
+    bare = np.setdiff1d(np.flatnonzero(aims.is_kept), part[sketch.edges])
+    for which in bare.tolist():
+        spots: FloatArray = np.argwhere(space.component_of == which).astype(np.float64) + 0.5
+        room = passage.at(spots)
+        nodes = sketch.positions[: len(part)][part == which]
+        start = nodes[0] if len(nodes) else spots[int(room.argmax())]
+        fits = space.joins(np.repeat(start[None], len(spots), axis=0), spots)
+        away = np.where(fits, hypots(*(spots - start).T), 0.0)
+        away = np.where(room >= room.max() / 2, away, away / len(spots))
+        if away.max() > 0:
+            ends = sketch.add_nodes(np.stack([start, spots[int(away.argmax())]]))
+            sketch.set_edges([*sketch.edges.tolist(), ends])
+    return len(bare) > 0
 
-    `looked`: bool (rows, cols), which of the cells at a distance of `step` are looked at.
-    """
+
+def _cover(sketch: Sketch, aims: Aims) -> list[FloatArray]:
+    """Choose nodes where free points see none: of points nearby, those that most of them see."""
     from scipy import ndimage  # noqa: PLC0415 - on demand
     from scipy.spatial import KDTree  # noqa: PLC0415
 
-    space = sketch.passage.space
-    spots = np.argwhere(looked)
-    points = np.asarray(spots * step + step // 2 + 0.5, dtype=np.float64)
-    is_unseen = ~sees(space.sight, points, sketch.positions)
+    sight = aims.space.sight
+    spots, points = aims.looked
+    is_unseen = ~sees(sight, points, sketch.positions)
     most = int(_UNSEEN * len(points))
     if is_unseen.sum() <= most:
-        return
-    places = np.zeros_like(looked)
+        return []
+    places = np.zeros(spots.max(axis=0) + 1, dtype=np.bool_)
     places[tuple(spots[is_unseen].T)] = True
-    reach_m = _REACH_M / (step * space.grid.resolution_m)
+    reach_m = _REACH_M / (aims.step * aims.space.grid.resolution_m)
     beside = ndimage.binary_dilation(
         places, np.ones((3, 3), dtype=np.bool_), iterations=max(1, round(reach_m / 4))
     )
@@ -194,17 +267,17 @@ def _cover(sketch: Sketch, looked: BoolArray, near: float, step: int) -> None:
     unseen, new = points[is_unseen], points[fits]
     # By clearance: of equal ones the first is chosen.
     new = new[np.argsort(-sketch.passage.at(new), kind="stable")]
-    near_by = KDTree(unseen).query_ball_point(new, reach_m * step, return_sorted=True)
+    near_by = KDTree(unseen).query_ball_point(new, reach_m * aims.step, return_sorted=True)
     of = np.repeat(np.arange(len(new)), [len(each) for each in near_by])
     seen = np.concatenate(near_by).astype(np.int64)
-    fits = space.sight.clear(new[of], unseen[seen])
+    fits = sight.clear(new[of], unseen[seen])
     of, seen = of[fits], seen[fits]
     left, chosen = np.ones(len(unseen), dtype=np.bool_), []
     while left.sum() > most:
         best = int(np.bincount(of[left[seen]], minlength=len(new)).argmax())
         chosen.append(new[best])
         left[seen[of == best]] = False
-    _add(sketch, np.array(chosen), END, near)
+    return chosen
 
 
 def sees(sight: Sight, points: FloatArray, nodes: FloatArray) -> BoolArray:
@@ -227,7 +300,8 @@ def sees(sight: Sight, points: FloatArray, nodes: FloatArray) -> BoolArray:
 
 
 def left_out(topology: TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
-    """Return a line for each listed room and door, and each part of free space, without a node.
+    """Return a line for each listed room, door, and part of free space that no lane leads into, and
+    for each part whose lanes nothing joins with those of the largest.
 
     Doors are those that the robot passes, rooms those that it fits into, and parts those of 1 m² or
     more; each line states why.
@@ -235,12 +309,13 @@ def left_out(topology: TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
     from scipy import ndimage  # noqa: PLC0415 - on demand
 
     grid = topology.grid
-    part_of, count = ndimage.label(grid.enterable(allow_unexplored=False))
+    free = grid.enterable(allow_unexplored=False)
+    part_of, count = ndimage.label(free)
     cells = np.floor(graph.positions).astype(np.int64)
     has_node = np.bincount(part_of[tuple(cells.T)], minlength=count + 1) > 0
     area_m2 = np.bincount(part_of.ravel(), minlength=count + 1) * grid.cell_area_m2
-    is_told = has_node | (area_m2 < LEAST_AREA_M2)
-    is_told[0] = True
+    is_told = (area_m2 < LEAST_AREA_M2) & ~has_node
+    is_told[[0, int(np.where(has_node, area_m2, 0).argmax())]] = True
 
     def why(part: int) -> str:
         if has_node[part]:
@@ -255,13 +330,18 @@ def left_out(topology: TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
             part = part_of[grid.frame.cell_of(*rooms.point_of(rooms.names[room]))]
             lines.append(f"{rooms.names[room]}: {why(part)}")
             is_told[part] = True
+        passed = {number for doors in graph.edge_doors for number in doors}
         for door in rooms.listed_doors:
-            beside = part_of.ravel()[rooms.cells_beside(door.number)].max()
-            if door.passable and door.number not in graph.doors:
-                lines.append(f"door {door.number}: {why(beside)}")
+            moves = free_moves(rooms, door.number, free)
+            is_missed = door.number not in graph.doors or door.number not in passed
+            if door.passable and is_missed and len(moves):
+                lines.append(f"door {door.number}: {why(part_of[tuple(moves[0, 0])])}")
+    room_of = dict(zip(part_of[tuple(cells.T)].tolist(), graph.rooms, strict=True))
     parts = np.flatnonzero(~is_told)
     for part in parts[np.argsort(-area_m2[parts], kind="stable")].tolist():
-        row, col = np.argwhere(part_of == part)[0].tolist()
-        x, y = grid.frame.points_of(np.array([row, col])).tolist()
-        lines.append(f"free space at ({x:.2f}, {y:.2f}): {why(part)}")
+        x, y = grid.frame.points_of(np.argwhere(part_of == part)[:1])[0].tolist()
+        where = room_of.get(part) or f"free space at ({x:.2f}, {y:.2f})"
+        own = "lanes of its own, for " if has_node[part] else ""
+        rest = "the other ones" if has_node[part] else "the graph"
+        lines.append(f"{where}: {own}no way leads there from {rest} ({area_m2[part]:.1f} m²)")
     return tuple(lines)

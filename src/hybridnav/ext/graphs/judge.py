@@ -77,16 +77,16 @@ class FreeSpace:
 
     def kept(self, rooms: Rooms | None = None) -> BoolArray:
         """Return which parts of free space get nodes, bool (n_components,): those of 1 m² or more
-        that do not lie outside the building, nor in rooms alone that lists leave out.
+        that do not lie outside the building and have a way in, as rooms in lists.
 
         `rooms`: the rooms, if there are some.
         """
         if rooms is None:
             return self._is_large & ~self.outside()
         is_kept: BoolArray = self._is_large & ~self.outside(rooms.labels)
-        shown = rooms.listed_cells[self.free]
-        is_shown = np.bincount(self.component_of[self.free], weights=shown, minlength=1) > 0
-        return is_kept & is_shown if (is_kept & is_shown).any() else is_kept
+        begins = rooms.begin_cells[self.free]
+        is_kept &= np.bincount(self.component_of[self.free], weights=begins, minlength=1) > 0
+        return is_kept
 
     @property
     def _is_large(self) -> BoolArray:

@@ -14,7 +14,7 @@ from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.bends import Nodes
 from hybridnav.ext.graphs.build import missing_bends
-from hybridnav.ext.graphs.cover import complete
+from hybridnav.ext.graphs.cover import Aims, complete
 from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.nav2_rules import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
+    from hybridnav.maps import OccupancyGrid
     from hybridnav.topology.rooms import Rooms
 
 _APART_M = 4.0
@@ -71,6 +72,8 @@ _SAME_M = 1.0
 _STANDS = 0.4
 """Distance within which a node before stands for a new one, in distances between lanes."""
 _STEPS = 5
+_ROUNDS = 4
+"""Most times that lanes are led to what crossings have taken theirs."""
 
 
 def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
@@ -142,60 +145,56 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     if spacing_m is not None:
         checked_between("spacing_m", spacing_m, 0.5, 100)
     checked_between("margin_m", margin_m, 0, 100)
-    grid, cell_m = topology.grid, topology.grid.resolution_m
-    space = FreeSpace.of(grid)
+    space = FreeSpace.of(topology.grid)
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
-    is_kept = np.append(space.kept(rooms), np.False_)
-    part_of = np.where(is_kept[space.component_of], space.component_of, np.int32(-1))
+    aims = Aims(space, space.kept(rooms), max(1, round(_STEP_M / space.grid.resolution_m)), rooms)
+    part_of = _part_of(aims)
+    named = _named(space, part_of, points or {})
+    progress(1, _STEPS)
+    layout = _layout(space.grid, part_of, spacing_m)
+    drawing = _drawn(aims, part_of, layout, margin_m / space.grid.resolution_m)
+    progress(2, _STEPS)
+    sketch = _straightened(drawing, layout, aims)
+    progress(3, _STEPS)
+    _completed(sketch, layout, aims)
+    if keep is not None:
+        _keep(sketch, keep, layout)
+    near = _near(layout, space.grid) / 2
+    sketch.add_points(np.array([*named.values()]).reshape(-1, 2), near)
+    _connect(sketch, space)
+    for _ in range(_ROUNDS):
+        sketch.make_plane()
+        if not complete(sketch, aims, near):
+            break
+        _connect(sketch, space)
+    _drop_single(sketch, named)
+    progress(4, _STEPS)
+    graph = _described(topology, space, sketch, named)
+    progress(_STEPS, _STEPS)
+    return graph if keep is None else _renamed(graph, keep, _same(sketch, keep))
+
+
+def _part_of(aims: Aims) -> IntArray:
+    """Return the connected part of each free cell that may get lanes, int32 (rows, cols), -1
+    elsewhere."""
+    of, grid = aims.space.component_of, aims.space.grid
+    part_of = np.where(np.append(aims.is_kept, np.False_)[of], of, np.int32(-1))
     if not (part_of >= 0).any():
         raise InvalidValueError(
             f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
             f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
         )
-    spacing_m = spacing_m or _spacing_m(int((part_of >= 0).sum()) * grid.cell_area_m2)
-    named = {name: _place_of(space, part_of, name, at) for name, at in (points or {}).items()}
+    return part_of
+
+
+def _named(
+    space: FreeSpace, part_of: IntArray, points: Mapping[str, tuple[float, float]]
+) -> dict[str, FloatArray]:
+    """Return the positions of named points."""
+    named = {name: _place_of(space, part_of, name, at) for name, at in points.items()}
     if len({tuple(at) for at in named.values()}) < len(named):
         raise InvalidValueError(f"points must lie apart, got two at one place: {brief(points)}")
-    progress(1, _STEPS)
-    directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
-    layout = Layout(
-        apart=spacing_m / cell_m,
-        speck=(_SPECK * spacing_m + 2 * grid.robot_radius_m) / cell_m,
-        least=_LEAST_M / cell_m,
-        angle_rad=directions[0][0] if directions else 0.0,
-    )
-    drawing = _drawn(topology, space, part_of, layout, margin_m / cell_m)
-    progress(2, _STEPS)
-    least, most = _SMALL_NARROW
-    drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
-    near = min(_MERGED * layout.apart, _MOST_MERGED_M / cell_m)
-    drawing.merge(near)
-    step = max(1, round(_STEP_M / cell_m))
-    sketch = drawing.straightened(step, _BEND_M / cell_m)
-    progress(3, _STEPS)
-    _set_edges(sketch, layout, near, cell_m)
-    _connect(sketch, space)
-    complete(sketch, rooms, is_kept, near / 2, step)
-    add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
-    sketch.split(_LONGEST * layout.apart)
-    _connect(sketch, space)
-    known = None if keep is None else grid.frame.positions_of(keep.points)
-    if keep is not None and known is not None:
-        same = _same(sketch, known, cell_m)
-        old = sketch.freed(settled(known), _SAME_M / cell_m)
-        sketch.keep(old, keep.edges, same, _STANDS * layout.apart)
-        _connect(sketch, space)
-    sketch.add_points(np.array([*named.values()]).reshape(-1, 2), near / 2)
-    _connect(sketch, space)
-    sketch.make_plane()
-    if len(sketch.edges) and not named:  # no route leads to or from a single node
-        sketch.keep_nodes(np.unique(sketch.edges))
-    progress(4, _STEPS)
-    graph = _described(topology, space, sketch, named)
-    progress(_STEPS, _STEPS)
-    if keep is None or known is None:
-        return graph
-    return _renamed(graph, keep, _same(sketch, known, cell_m))
+    return named
 
 
 def _place_of(
@@ -220,20 +219,32 @@ def _place_of(
     return settled(at)
 
 
-def _spacing_m(area_m2: float) -> float:
-    """Return the distance between lanes for an area, in steps of half a metre: graphs of a map that
-    changes a little keep theirs."""
-    return _APART_M if area_m2 >= _ARENA_M2 else max(round(math.sqrt(area_m2)) / 2, 1.0)
+def _layout(grid: OccupancyGrid, part_of: IntArray, spacing_m: float | None) -> Layout:
+    """Return what strands are to be like; see `build_lane_graph`."""
+    area_m2, cell_m = int((part_of >= 0).sum()) * grid.cell_area_m2, grid.resolution_m
+    if spacing_m is None:
+        # In steps of half a metre: graphs of a map that changes a little keep theirs.
+        small_m = max(round(math.sqrt(area_m2)) / 2, 1.0)
+        spacing_m = _APART_M if area_m2 >= _ARENA_M2 else small_m
+    directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
+    return Layout(
+        apart=spacing_m / cell_m,
+        speck=(_SPECK * spacing_m + 2 * grid.robot_radius_m) / cell_m,
+        least=_LEAST_M / cell_m,
+        angle_rad=directions[0][0] if directions else 0.0,
+    )
 
 
-def _drawn(
-    topology: TopologicalMap, space: FreeSpace, part_of: IntArray, layout: Layout, margin: float
-) -> ChainGraph:
+def _near(layout: Layout, grid: OccupancyGrid) -> float:
+    """Return the distance in cells below which nodes become one."""
+    return min(_MERGED * layout.apart, _MOST_MERGED_M / grid.resolution_m)
+
+
+def _drawn(aims: Aims, part_of: IntArray, layout: Layout, margin: float) -> ChainGraph:
     """Return the lines of lanes, with a node in each room and door that they pass."""
+    space, rooms, label_of = aims.space, aims.rooms, aims.label_of
     parts = np.pad(part_of, 1, constant_values=-1)
     clearance = clearance_cells(parts < 0)
-    rooms = topology.rooms if topology.pyramid.rooms is not None else None
-    label_of = np.full_like(part_of, -1) if rooms is None else rooms.labels.label_of
     cells = np.empty((0, 2), np.int64) if rooms is None else _room_cells(rooms, space, part_of)
     known = RoomAnchors(np.pad(label_of, 1, constant_values=-1), cells + 1)
     padded = lines_of(parts, clearance, known, layout)
@@ -280,14 +291,44 @@ def _mark_doors(kinds: LongArray, passed: LongArray, rooms: Rooms) -> None:
             kinds[tuple(cells[int(away.argmin())])] = DOOR - 1 + door.number
 
 
-def _set_edges(sketch: Sketch, layout: Layout, near: float, cell_m: float) -> None:
-    """Make edges free, few, and along walls, with few dead ends."""
+def _straightened(drawing: ChainGraph, layout: Layout, aims: Aims) -> Sketch:
+    """Return lines as straight edges: free, few, and along walls, with few dead ends."""
+    near, cell_m = _near(layout, aims.space.grid), aims.space.grid.resolution_m
+    least, most = _SMALL_NARROW
+    drawing.prune(_SMALL * layout.apart, (least * layout.apart, most * layout.apart))
+    drawing.merge(near)
+    sketch = drawing.straightened(aims.step, _BEND_M / cell_m)
     sketch.repair()
     for _ in range(2):
         sketch.simplify(near, 2 * layout.apart)
         sketch.snap(layout.angle_rad, _SNAP_M / cell_m)
-    step = max(1, round(_STEP_M / cell_m))
-    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, step)
+    drop_ends(sketch, COVER * layout.apart, _SEEN * layout.apart, aims.step)
+    _connect(sketch, aims.space)
+    return sketch
+
+
+def _completed(sketch: Sketch, layout: Layout, aims: Aims) -> None:
+    """Add what lanes have missed, and chords; divide long edges."""
+    complete(sketch, aims, _near(layout, aims.space.grid) / 2)
+    add_chords(sketch, _CHORD * layout.apart, _DETOUR, _CHORD_RAD)
+    sketch.split(_LONGEST * layout.apart)
+    _connect(sketch, aims.space)
+
+
+def _keep(sketch: Sketch, keep: RouteGraph | WaypointGraph, layout: Layout) -> None:
+    """Keep a graph before where the robot can follow it."""
+    space = sketch.passage.space
+    known = settled(space.grid.frame.positions_of(keep.points))
+    old = sketch.freed(known, _SAME_M / space.grid.resolution_m)
+    sketch.keep(old, keep.edges, _same(sketch, keep), _STANDS * layout.apart)
+    _connect(sketch, space)
+
+
+def _drop_single(sketch: Sketch, named: Mapping[str, FloatArray]) -> None:
+    """Drop nodes without an edge and a name, for no route leads there, unless there is no edge."""
+    is_named = (sketch.positions[:, None] == np.array([*named.values()]).reshape(-1, 2)).all(2)
+    if len(sketch.edges):
+        sketch.keep_nodes(np.union1d(sketch.edges, np.flatnonzero(is_named.any(axis=1))))
 
 
 def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
@@ -317,15 +358,17 @@ def _connect(sketch: Sketch, space: FreeSpace) -> None:
     sketch.set_edges(edges)
 
 
-def _same(sketch: Sketch, known: FloatArray, cell_m: float) -> LongArray:
+def _same(sketch: Sketch, keep: RouteGraph | WaypointGraph) -> LongArray:
     """Return which node of a graph before each node is, int64 (n,), -1 for none."""
     from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 
+    grid = sketch.passage.space.grid
+    known = grid.frame.positions_of(keep.points)
     to_known = np.asarray(KDTree(known).query(sketch.positions)[1], dtype=np.int64)
     to_own = np.asarray(KDTree(sketch.positions).query(known)[1], dtype=np.int64)
     steps = known[to_known] - sketch.positions
     is_same = to_own[to_known] == np.arange(len(to_known))
-    is_same &= hypots(steps[:, 0], steps[:, 1]) * cell_m <= _SAME_M
+    is_same &= hypots(steps[:, 0], steps[:, 1]) * grid.resolution_m <= _SAME_M
     return np.where(is_same, to_known, -1)
 
 

@@ -361,7 +361,8 @@ class Sketch:
             self._part(*found)
 
     def _part(self, which: list[int], at: FloatArray) -> None:
-        """Lead edges through a common node, or leave the longest out that is not needed."""
+        """Lead edges through a common node, or leave the longest out that is not needed; those of
+        doors come last."""
         space, there = self.passage.space, np.flatnonzero((self.positions == at).all(axis=1))
         ends = np.unique(self.edges[which]).tolist()
         rest = np.delete(self.edges, which, axis=0).tolist()
@@ -379,7 +380,8 @@ class Sketch:
                 self.set_edges([*rest, *((node, end) for end in ends)])
                 return
         lengths = np.diff(self.positions[self.edges[which]], axis=1)[:, 0]
-        for k in np.argsort(-hypots(*lengths.T), kind="stable").tolist():
+        is_door = self.kinds[self.edges[which]].max(axis=1) >= DOOR
+        for k in np.lexsort((-hypots(*lengths.T), is_door)).tolist():
             edges = np.delete(self.edges, which[k], axis=0).tolist()
             beside: list[dict[int, float]] = [{} for _ in self.positions]
             ways = [each.items() for each in beside]

@@ -25,6 +25,8 @@ _HALL = 1.5
 more."""
 _OFF = 0.6
 """Least clearance of a pillar, in distances between lanes."""
+_LEAST_OFF = 2.0
+"""The same in cells: nearer to what is not free, a pillar has no ring of free cells round it."""
 _STEP = 1.2
 """Length of a step of `spread` in cells, on average."""
 COVER = 1.1
@@ -151,7 +153,7 @@ def _pillars(clearance: FloatArray, layout: Layout) -> LongArray:
         lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2) @ turn
         at = np.round(lattice).astype(np.int64)
         at = at[((at > 0) & (at < np.array(halls.shape) - 1)).all(axis=1)]
-        is_off = clearance[tuple(at.T)] >= _OFF * layout.apart
+        is_off = clearance[tuple(at.T)] >= max(_OFF * layout.apart, _LEAST_OFF)
         found.append(at[is_off & (halls[tuple(at.T)] == hall)])
     return np.concatenate(found)
 

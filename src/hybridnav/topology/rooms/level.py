@@ -223,14 +223,20 @@ class Rooms:
     @property
     def is_listed(self) -> BoolArray:
         """bool (n_rooms,), rooms in lists and pictures. They are wider than 1 m in the mean, or the
-        map's robot can enter them from such a one or the largest. Or they have a name of their own.
-        A laser sees the others through glass."""
+        largest, or have a name of their own, or the map's robot can enter them from such a one. A
+        laser sees the others through glass."""
         return self._listing.is_listed[: len(self.names)]
 
     @cached_property
     def listed_cells(self) -> BoolArray:
         """bool (rows, cols), free cells as measured, of rooms and other spaces that are listed."""
         return np.append(self._listing.is_listed, np.False_)[self._listing.space_of]
+
+    @property
+    def begin_cells(self) -> BoolArray:
+        """bool (rows, cols), free cells as measured, of rooms and other spaces in which a robot may
+        begin: the free cells that they are joined with have a way in."""
+        return np.append(self._listing.begins, np.False_)[self._listing.space_of]
 
     @cached_property
     def listed_labels(self) -> RoomLabels:

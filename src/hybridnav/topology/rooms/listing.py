@@ -33,13 +33,16 @@ class Listing:
     `n_rooms` on for each connected set of cells in no room; -1 for other cells."""
     is_listed: BoolArray
     """bool (n_spaces,), spaces that are listed."""
+    begins: BoolArray
+    """bool (n_spaces,), spaces in which a robot may begin: wide ones, the largest, and rooms with a
+    name of their own. What free cells join with one has a way in."""
 
     @classmethod
     def of(cls, labels: RoomLabels, level: Level) -> Listing:
         """Find what is listed.
 
-        A room is left out if it is narrower than 1 m in the mean and the robot cannot enter it:
-        such rooms are rays of a laser through glass. One with a name of its own is always listed. A
+        A room is left out if it is narrower than 1 m in the mean and has no way in: such rooms are
+        rays of a laser through glass. One with a name of its own is always listed. A
         space without a name has to be wide enough and enterable, so that pockets between outlines
         make no doors.
 
@@ -56,15 +59,13 @@ class Listing:
         areas = np.bincount(space_of[is_free], minlength=n_spaces)
         is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
         begins = is_wide | (areas == areas.max(initial=0))
+        begins[:n_rooms] |= [FOUND_NAME.fullmatch(name) is None for name in labels.names]
         can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
         side_m = level.grid.resolution_m
         is_large = areas * (side_m * side_m) >= _LEAST_AREA_M2
         is_listed = is_wide & can_enter & is_large
-        is_own = np.array(
-            [FOUND_NAME.fullmatch(name) is None for name in labels.names], dtype=np.bool_
-        )
-        is_listed[:n_rooms] = (is_wide | can_enter)[:n_rooms] | is_own
-        return cls(space_of, is_listed)
+        is_listed[:n_rooms] = (begins | can_enter)[:n_rooms]
+        return cls(space_of, is_listed, begins)
 
 
 def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
@@ -84,8 +85,7 @@ def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
 def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
     """Return the spaces that free cells join with one in which a robot is, at the robot's radius.
 
-    `space_of`: int32 (n_vertices,), the space of each vertex; `begins`: bool (n_spaces,), spaces in
-    which a robot may begin: wide ones, and the largest.
+    `space_of`: int32 (n_vertices,), the space of each vertex; `begins`: as in `Listing`.
     """
     is_free = level.classes == CellClass.FREE
     parts = free_components(level)[is_free]

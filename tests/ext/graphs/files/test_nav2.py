@@ -161,10 +161,16 @@ def test_measures_beside_an_edge_are_those_of_the_walls(folder):
 
 
 def test_what_nav2_would_refuse_is_refused_in_one_line(folder):
-    grid = hn.OccupancyGrid(np.zeros((2, 2), np.float32), hn.Frame(0.5), robot_radius_m=0)
-    small = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    for build in (hn.ext.graphs.build_route_graph, hn.ext.graphs.build_lane_graph):
-        alone = build(small)
+    def square(cells, side_m):
+        grid = hn.OccupancyGrid(np.zeros(cells), hn.Frame(side_m), robot_radius_m=0)
+        return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+
+    small = square((2, 2), 0.5)
+    assert hn.ext.graphs.build_lane_graph(small).n_edges == 2
+    for alone in (
+        hn.ext.graphs.build_route_graph(small),
+        hn.ext.graphs.build_lane_graph(square((1, 1), 1.0)),
+    ):
         assert (alone.n_nodes, alone.n_edges) == (1, 0)
         with pytest.raises(hn.errors.InvalidValueError, match=r"no edge.*a smaller spacing_m"):
             hn.ext.graphs.export_nav2(alone, folder / "alone.geojson")
