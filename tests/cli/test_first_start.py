@@ -177,8 +177,10 @@ def test_the_small_map_compiles_what_one_of_a_building_needs(tmp_path: Path, pre
     if preset == warm.ROOMS:
         search, words = ["pyramid"], ["rooms", PLAN[1], "--find"]
     elif preset == warm.MODEL:
+        search = [warm.SEARCH + "shortest", "shortest", warm.ROOMS]
         words = ["build", PLAN[1], "--find-rooms", "-o", str(tmp_path / "office.hnm")]
     elif preset == warm.HARNESS:
+        search = [warm.SEARCH + "shortest", "grid-astar", "paper"]
         file, out = str(ROOT / "maps/figure1/figure1.yaml"), str(tmp_path / "run")
         more = "--baseline=weighted-astar", "--baseline=simple-graph", "--robot-radius=0"
         words = ["evaluate", file, "--preset=paper", *more, "--pairs=5", "-o", out]
