@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._base.typing import AnyArray, ByteArray, FloatArray
-    from hybridnav.topology.rooms import Transform
+    from hybridnav.rooms import Transform
 
 UNEXPLORED = 2
 CODES = {hn.CellClass.OCCUPIED: 0, hn.CellClass.FREE: 1, hn.CellClass.UNEXPLORED: UNEXPLORED}

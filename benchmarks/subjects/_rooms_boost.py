@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from hybridnav.topology.rooms.merging import Forest
+from hybridnav.rooms.merging import Forest
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray

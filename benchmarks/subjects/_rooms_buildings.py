@@ -11,8 +11,8 @@ from PIL import Image
 
 import hybridnav as hn
 from benchmarks.subjects._rooms_truth import FLOORS, Floor
-from hybridnav.topology.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
-from hybridnav.topology.rooms.kernels import segmentation as _segmentation_kernels
+from hybridnav.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
+from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,7 +14,7 @@ from benchmarks.common import print_head, print_row
 from benchmarks.subjects._rooms_buildings import SITES, Building
 from benchmarks.subjects.train_rooms import Training, of_generated
 from hybridnav.harness.judges import compare_rooms
-from hybridnav.topology.rooms.find import judged_rooms
+from hybridnav.rooms.find import judged_rooms
 
 if TYPE_CHECKING:
     from pathlib import Path

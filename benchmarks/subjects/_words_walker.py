@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 # Reading: from a sentence to what it asks for.
 

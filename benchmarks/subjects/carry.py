@@ -30,12 +30,12 @@ import numpy as np
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, OFFICE, maps_of, option, print_head, print_row
 from benchmarks.subjects._carry_pairs import Changes, Pair, changed, doors_to_carry, truth_of
-from hybridnav.topology.rooms import carry_names
+from hybridnav.rooms import carry_names
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from hybridnav.topology.rooms import CarriedNames, Transform
+    from hybridnav.rooms import CarriedNames, Transform
 
 KINDS = {
     "turned": Changes(),

@@ -40,7 +40,7 @@ from hybridnav.ext.graphs.judge import FreeSpace, excess_of
 from hybridnav.ext.graphs.kernels import least_along
 from hybridnav.ext.graphs.sketch import settled
 from hybridnav.harness.tables import to_markdown
-from hybridnav.topology.rooms.doors import measured_clearance_m
+from hybridnav.rooms.doors import measured_clearance_m
 
 if TYPE_CHECKING:
     from argparse import Namespace

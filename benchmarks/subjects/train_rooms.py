@@ -1,6 +1,6 @@
 """Train the judge of rooms on the reference data, and write its table.
 
-The table `src/hybridnav/topology/rooms/room_judge.npz` is made from all buildings; the figures of
+The table `src/hybridnav/rooms/room_judge.npz` is made from all buildings; the figures of
 the documentation are of forests that never saw the building's site (`without`). With `--generated`
 it is made from generated floors alone.
 """
@@ -22,10 +22,10 @@ from benchmarks.common import DATA, Refused, option
 from benchmarks.subjects._rooms_boost import Boosting, Examples, averaged, boost
 from benchmarks.subjects._rooms_buildings import SITES, Building
 from benchmarks.subjects._rooms_generated import generated
-from hybridnav.topology.rooms import merging
-from hybridnav.topology.rooms.cutting import Ground, fine_segments
-from hybridnav.topology.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
-from hybridnav.topology.rooms.merging import (
+from hybridnav.rooms import merging
+from hybridnav.rooms.cutting import Ground, fine_segments
+from hybridnav.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
+from hybridnav.rooms.merging import (
     EVIDENCE,
     Forest,
     JudgedSegments,

@@ -1,4 +1,10 @@
 from . import errors as errors, ext as ext, harness as harness, viz as viz
+from .closures import (
+    Blocked as Blocked,
+    Journal as Journal,
+    OutOfOrder as OutOfOrder,
+    load_blocked as load_blocked,
+)
 from .maps import (
     CellClass as CellClass,
     DroppedIslands as DroppedIslands,
@@ -19,13 +25,11 @@ from .maps.files import (
     write_movingai_map as write_movingai_map,
     write_ros_map as write_ros_map,
 )
+from .models import Model as Model, load as load, save as save
 from .planner import (
     Alternative as Alternative,
     Alternatives as Alternatives,
-    Blocked as Blocked,
     HybridPlanner as HybridPlanner,
-    Journal as Journal,
-    OutOfOrder as OutOfOrder,
     Path as Path,
     PlanBatch as PlanBatch,
     PlanResult as PlanResult,
@@ -36,17 +40,15 @@ from .planner import (
     export_path as export_path,
     export_places as export_places,
     export_rooms as export_rooms,
-    load_blocked as load_blocked,
     load_preset as load_preset,
     plan_alternatives as plan_alternatives,
     plan_tour as plan_tour,
     preset_names as preset_names,
 )
-from .planner.saved import Model as Model, load as load, save as save
 from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc
 from .topology import TopologicalMap as TopologicalMap
-from .topology.rooms import Door as Door, Rooms as Rooms, find_rooms as find_rooms
-from .topology.rooms.files import load_rooms as load_rooms, save_rooms as save_rooms
+from .rooms import Door as Door, Rooms as Rooms, find_rooms as find_rooms
+from .rooms.files import load_rooms as load_rooms, save_rooms as save_rooms
 
 from .route import Route as Route
 

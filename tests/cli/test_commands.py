@@ -402,7 +402,7 @@ def test_a_map_that_does_not_fit_into_memory(cli, rooms, monkeypatch):
     def exhaust(*_arguments, **_options):
         raise MemoryError
 
-    monkeypatch.setattr("hybridnav.planner.saved.model.load_map", exhaust)
+    monkeypatch.setattr("hybridnav.models.model.load_map", exhaust)
     assert cli("show", rooms).refuses(3, "out of memory")
 
 
@@ -425,7 +425,7 @@ def test_ctrl_c_ends_without_a_word(cli, rooms, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hybridnav.planner.saved.model.load_map", interrupt)
+    monkeypatch.setattr("hybridnav.models.model.load_map", interrupt)
     done = cli("show", rooms)
     assert (done.code, done.out, done.err) == (130, "", "")
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import hybridnav as hn
-from tests.topology.test_doors import flat, map_file  # noqa: F401 - the fixture
+from tests.rooms.test_doors import flat, map_file  # noqa: F401 - the fixture
 
 
 def test_names_are_checked_before_anything_is_built(cli, map_file, monkeypatch):  # noqa: F811

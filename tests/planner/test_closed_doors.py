@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.planner import Blocked
+from hybridnav.closures import Blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import distances, move_graph
 from tests.strategies import class_grids, drawn, examples, occupancy_grid

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.closures.blocked import Blocked
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.scenes import sample_pairs
-from hybridnav.planner.blocked import Blocked
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, recounted
 from tests.plans import (

@@ -96,9 +96,9 @@ OTHERS = [
     "maps.names.natural_key",
     "refine.curves.shortest_curve",
     "refine.footprint.Footprint",
-    "topology.rooms.choices.free_point",
-    "topology.rooms.choices.leading_doors",
-    "topology.rooms.choices.room_near",
+    "rooms.choices.free_point",
+    "rooms.choices.leading_doors",
+    "rooms.choices.room_near",
     "search.descent.Descent",
 ]
 """Names with examples that are not in the reference."""

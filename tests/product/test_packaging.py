@@ -299,7 +299,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
         for n in ("figure1", "office")
         for end in ("pgm", "yaml")
     }
-    others = {"hybridnav/py.typed", "hybridnav/topology/rooms/room_judge.npz", *pages}
+    others = {"hybridnav/py.typed", "hybridnav/rooms/room_judge.npz", *pages}
     assert "hybridnav/__init__.pyi" in stubs
     assert content == modules | stubs | presets | maps | others
     assert len(names) == len(set(names))

@@ -19,7 +19,7 @@ from hybridnav.cli.reading import MapOptions, grow_topology, load_model, with_ma
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from hybridnav.planner import OutOfOrder
+    from hybridnav.closures import OutOfOrder
 
 CloseOption = Annotated[
     list[str] | None,
@@ -84,7 +84,7 @@ def change_closed(
     `map_file`: a map or a building; `close`, `open_again`, `why`: as the options of
     `hybridnav closed`; `check`: refuses what is not there.
     """
-    from hybridnav.planner import Journal, OutOfOrder  # noqa: PLC0415 - loads shapely
+    from hybridnav.closures import Journal, OutOfOrder  # noqa: PLC0415 - loads shapely
 
     if why is not None and not close:
         raise UsageError("--why is for --close: add --close WHAT, or leave it out")
@@ -106,7 +106,7 @@ def change_closed(
 
 def list_closed(map_file: Path, *, as_json: bool) -> None:
     """Print what the journal of a file closes."""
-    from hybridnav.planner import Journal  # noqa: PLC0415 - loads shapely
+    from hybridnav.closures import Journal  # noqa: PLC0415 - loads shapely
 
     journal = Journal(map_file)
     items = journal.items()

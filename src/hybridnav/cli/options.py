@@ -247,7 +247,7 @@ def out_of_order(map_file: Path) -> list[str]:
     """
     if not map_file.with_name(f"{map_file.stem}.closed.yaml").exists():
         return []
-    from hybridnav.planner import Journal  # noqa: PLC0415 - loads shapely
+    from hybridnav.closures import Journal  # noqa: PLC0415 - loads shapely
 
     journal = Journal(map_file)
     for item in journal.items():
@@ -283,7 +283,7 @@ class Closing:
         if not self.given:
             return None
         # They load shapely.
-        from hybridnav.planner import Blocked, load_blocked  # noqa: PLC0415
+        from hybridnav.closures import Blocked, load_blocked  # noqa: PLC0415
 
         closed = Blocked(doors=self.doors, rooms=self.rooms)
         named = {printable(path): load_blocked(path, grid) for path in self.files}

@@ -177,7 +177,7 @@ def read_settings(
     An error in a preset file is the file's; one in an override is the caller's.
     """
     if map_file is not None and is_model_file(map_file):
-        from hybridnav.planner.saved import open_model  # noqa: PLC0415
+        from hybridnav.models.model import open_model  # noqa: PLC0415
 
         given = None if preset is None else read_preset(preset)
         plain = open_model(map_file, max_cells=MAX_CELLS).fitted(given)

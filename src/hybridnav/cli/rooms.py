@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.room_labels import Point
-    from hybridnav.topology.rooms import CarriedNames, Door, Rooms
-    from hybridnav.topology.rooms.files.text import RoomMeasures
+    from hybridnav.rooms import CarriedNames, Door, Rooms
+    from hybridnav.rooms.files.text import RoomMeasures
 
 LeastAreaOption = Annotated[
     float | None,
@@ -144,7 +144,7 @@ def rooms(
         answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))
         raise typer.Exit(EXIT_SOLVED if found["room"] is not None else EXIT_NOT_SOLVED)
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.topology.rooms.level import room_areas_m2  # noqa: PLC0415
+    from hybridnav.rooms.level import room_areas_m2  # noqa: PLC0415
 
     areas_m2 = room_areas_m2(labels, grid)
     if out is not None:
@@ -185,7 +185,7 @@ def _draw(plot: Path, topology: hn.TopologicalMap, old: Older | None, *, everyth
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
-    from hybridnav.topology.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
+    from hybridnav.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
 
@@ -389,7 +389,7 @@ class Older:
         new: tuple[hn.RoomLabels, hn.OccupancyGrid],
     ) -> Older:
         """Read a file of rooms and its map, and carry the names; refuse a map that does not fit."""
-        from hybridnav.topology.rooms import carry_names  # noqa: PLC0415 - loads numba
+        from hybridnav.rooms import carry_names  # noqa: PLC0415 - loads numba
 
         before = hn.load_map(
             files[1],

@@ -1,7 +1,4 @@
-"""The planner that the presets configure, and the closures for single queries.
-
-Names load on first use: alternatives and what is closed load shapely.
-"""
+"""The planner that the presets configure, its results, and words for people."""
 
 import lazy_loader
 

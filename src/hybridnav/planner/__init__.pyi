@@ -4,14 +4,11 @@ from .alternatives import (
     plan_alternatives as plan_alternatives,
 )
 from .batch import PlanBatch as PlanBatch
-from .blocked import Blocked as Blocked
-from .closures_file import load_blocked as load_blocked
 from .export import (
     export_path as export_path,
     export_places as export_places,
     export_rooms as export_rooms,
 )
-from .journal import Journal as Journal, OutOfOrder as OutOfOrder
 from .path import Path as Path
 from .planner import HybridPlanner as HybridPlanner
 from .preset import (

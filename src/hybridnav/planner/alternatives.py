@@ -16,8 +16,8 @@ from hybridnav.planner.tour import Tour, plan_tour
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from hybridnav.closures.blocked import Closable
     from hybridnav.planner import Path, PlanResult
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide.bends import Leg
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
+    from hybridnav.rooms import Door
     from hybridnav.route import DoorGraph, DoorRoute
-    from hybridnav.topology.rooms import Door
 
 
 def _least_bound(whole: PlanResult, cost_m: float) -> float:

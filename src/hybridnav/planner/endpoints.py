@@ -13,8 +13,6 @@ from hybridnav.maps.geometry import classes_at
 from hybridnav.planner import PlanStatus
 
 if TYPE_CHECKING:
-    from typing import NoReturn
-
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
@@ -55,14 +53,6 @@ class PlanRequest(NamedTuple):
     """The line to stay on; None for none."""
     began: float
     """The time at which reading began, of `clock`."""
-
-
-def no_places() -> NoReturn:
-    """Refuse what needs places, on a grid that changed after they were built."""
-    raise InvalidValueError(
-        "the map changed after its places were built, and places, rooms and doors belong to them: "
-        "call update with topology, the topological map of the grid now"
-    )
 
 
 def check_at(at: str) -> None:

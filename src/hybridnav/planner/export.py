@@ -20,14 +20,14 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.planner import PlanResult, Tour
+from hybridnav.rooms import Rooms
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.rooms import Rooms
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from hybridnav._base.typing import FloatArray, PathLike, SignArray
-    from hybridnav.topology.rooms import Door
+    from hybridnav.rooms import Door
 
 _DECIMALS = 6
 _TABLE, _FEATURES, _PLAIN = ".csv", (".geojson",), ".json"
@@ -157,9 +157,9 @@ def export_rooms(
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
     file = _checked(path, _MAP_ENDINGS, frame)
     # These load scipy and shapely.
-    from hybridnav.topology.rooms.files.entries import Read  # noqa: PLC0415
-    from hybridnav.topology.rooms.files.outlines import Outlines  # noqa: PLC0415
-    from hybridnav.topology.rooms.files.read import check_rooms  # noqa: PLC0415
+    from hybridnav.rooms.files.entries import Read  # noqa: PLC0415
+    from hybridnav.rooms.files.outlines import Outlines  # noqa: PLC0415
+    from hybridnav.rooms.files.read import check_rooms  # noqa: PLC0415
 
     read = Read(f"rooms {printable(file)}", list(rooms.names))
     check_rooms(read, rooms.labels.label_of, rooms.grid)

@@ -15,7 +15,7 @@ from hybridnav.maps.areas import box_of_area
 from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import PlannerCosts
-from hybridnav.planner.endpoints import no_places, read_points
+from hybridnav.planner.endpoints import read_points
 from hybridnav.planner.follow import begun, opened, update_of
 from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
@@ -23,6 +23,7 @@ from hybridnav.planner.planning import Planning
 from hybridnav.planner.preset import check_radius
 from hybridnav.planner.questions import Questions, explained, prepare
 from hybridnav.planner.settings import OmplPlannerSettings
+from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,10 +34,10 @@ if TYPE_CHECKING:
 
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanBatch, PlanResult
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.follow import PlannerUpdate
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At

@@ -22,7 +22,6 @@ from hybridnav.planner.costs import CostFinish
 from hybridnav.planner.endpoints import (
     PlanRequest,
     check_at,
-    no_places,
     places_of_endpoints,
     read_end,
     refusal,
@@ -33,6 +32,7 @@ from hybridnav.planner.result import PlanDraft
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
+from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planner import PlanBatch, Preset
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.costs import PlannerCosts
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.methods.ompl import OmplPlanner
@@ -168,7 +168,7 @@ class Planning:
                 known[blocked] = given  # the last one now
                 return given
         # Loads shapely, which most queries do not need.
-        from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
+        from hybridnav.closures.blocked import as_blocked  # noqa: PLC0415
 
         closure = as_blocked(blocked)
         # Without a lock: two threads may compute the same cells.

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybridnav.closures.blocked import Blocked
 from hybridnav.maps import NO_ROOM, CellClass
 from hybridnav.maps.clearance import within_radius
-from hybridnav.planner.blocked import Blocked
 from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way
 from hybridnav.search.found import ClosedCells
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.planner.blocked import Closable
+    from hybridnav.closures.blocked import Closable
     from hybridnav.planner.planning import Planning
     from hybridnav.planner.profile import Profile
     from hybridnav.planner.result import PlanResult

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanBatch
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planning import Planning
     from hybridnav.planner.private_rooms import Privacy
     from hybridnav.planner.why import Explanation

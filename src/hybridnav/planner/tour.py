@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from hybridnav.closures.blocked import Closable
     from hybridnav.planner import Metric, PlanResult
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.guide.bends import Leg
     from hybridnav.planner.named import At

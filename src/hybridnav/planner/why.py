@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.trig import dist
+from hybridnav.closures import Blocked
+from hybridnav.closures.blocked import Closable, as_blocked
 from hybridnav.maps import CellClass
 from hybridnav.maps.widest import Bottleneck, WidestPaths
-from hybridnav.planner import Blocked, PlanStatus
-from hybridnav.planner.blocked import Closable, as_blocked
+from hybridnav.planner import PlanStatus
 from hybridnav.planner.endpoints import places_of_endpoints
 from hybridnav.planner.fewest import OpenGround, fewest_to_open
 from hybridnav.planner.why_words import BlockedEnd, Closure, TightPlace, sentences
 from hybridnav.pyramid import LevelArc
+from hybridnav.rooms import Door
 from hybridnav.search.found import ClosedCells
-from hybridnav.topology.rooms import Door
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

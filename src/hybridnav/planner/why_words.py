@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.guide import check_language
-from hybridnav.topology.rooms.listing import FOUND_NAME
+from hybridnav.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav.topology.rooms import Door
+    from hybridnav.rooms import Door
 
 
 class Closure(NamedTuple):

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Rooms
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.rooms import Rooms
 
 
 class RoomFields:

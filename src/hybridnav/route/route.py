@@ -15,8 +15,8 @@ from hybridnav._base.copies import copies_alike, on_demand
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Rooms
 
 
 @dataclass(frozen=True)

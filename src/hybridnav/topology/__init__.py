@@ -1,7 +1,4 @@
-"""The topological map: places and boundaries, rooms and doors.
-
-Names load on first use: few maps have rooms, and to find them takes scipy.
-"""
+"""The topological map: places, boundaries, and what encloses what."""
 
 import lazy_loader
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.rooms.level import Rooms
     from hybridnav.topology.inclusion import Enclosed, Inclusion
-    from hybridnav.topology.rooms.level import Rooms
 
 Pose = tuple[float, float, float]
 """`(x, y, yaw)` of one frame in another, in metres and radians."""
@@ -142,7 +142,7 @@ class TopologicalMap:
         InvalidValueError
             When the pyramid was built without rooms.
         """
-        from hybridnav.topology.rooms.level import Rooms  # noqa: PLC0415 - most maps have none
+        from hybridnav.rooms.level import Rooms  # noqa: PLC0415 - most maps have none
 
         return Rooms(self.pyramid)
 
@@ -361,3 +361,11 @@ class TopologicalMap:
 def _check_index(what: str, index: int, count: int) -> None:
     if not 0 <= index < count:
         raise InvalidValueError(f"{what} must be from 0 to {count - 1}, got {index}")
+
+
+def no_places() -> NoReturn:
+    """Refuse what needs places, on a grid that changed after they were built."""
+    raise InvalidValueError(
+        "the map changed after its places were built, and places, rooms and doors belong to them: "
+        "call update with topology, the topological map of the grid now"
+    )

@@ -11,10 +11,10 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav.closures.blocked import as_blocked
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_points
-from hybridnav.planner.blocked import as_blocked
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import layout, style
 from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner.blocked import Closable
     from hybridnav.pyramid import Level
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes

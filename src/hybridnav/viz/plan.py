@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanResult
-    from hybridnav.planner.blocked import Closable
     from hybridnav.route import Route
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.style import Sizes

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import ByteArray, IntArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
 _AROUND, _PANEL = 0.1, 0.46

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Tour
     from hybridnav.planner.alternatives import Alternatives
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.guide.bends import Leg
+    from hybridnav.rooms import Door, Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.viz.layout import Entry
 
 _TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0

@@ -21,8 +21,8 @@ from benchmarks.subjects.online_identities import agreement
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlineRooms
 from hybridnav.maps import Frame, OccupancyGrid
-from hybridnav.topology.rooms.cutting import Ground
-from hybridnav.topology.rooms.find import outside_of, reaching
+from hybridnav.rooms.cutting import Ground
+from hybridnav.rooms.find import outside_of, reaching
 from tests.ext.live.identities import parts_of, run_machine
 from tests.strategies import examples
 

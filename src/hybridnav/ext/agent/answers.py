@@ -14,15 +14,16 @@ from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
-from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
+from hybridnav.planner import HybridPlanner, Tour, plan_tour
 from hybridnav.planner.why import explain_solved
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
+    from hybridnav.closures import Blocked
     from hybridnav.ext.page.session import Session
+    from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Rooms
 
 _MOST_PLANNERS = 3
 """Widths whose planners are kept."""

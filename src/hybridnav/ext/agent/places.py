@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from hybridnav._base.trig import dist, hypots
+from hybridnav.closures import Blocked
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.agent.questions import UnclearError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key, nearest
-from hybridnav.planner import Blocked, Explanation, HybridPlanner
+from hybridnav.planner import Explanation, HybridPlanner
 from hybridnav.planner.profile import rebuilt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from hybridnav.ext.agent.questions import ListRooms
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 Point = tuple[float, float]
 _ARTICLES = {"the", "a", "an", "der", "die", "das", "dem", "den", "ein", "eine", "einen", "einem"}

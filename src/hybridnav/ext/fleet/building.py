@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
@@ -17,7 +18,6 @@ from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner.blocked import Blocked, Closable, as_blocked
 from hybridnav.planner.private_rooms import Privacy
 from hybridnav.planner.profile import PROFILES, profile_of
 from hybridnav.planner.why import explain_solved
@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav.planner import HybridPlanner, Journal, Profile
+    from hybridnav.closures import Journal
+    from hybridnav.models.container import Part
+    from hybridnav.planner import HybridPlanner, Profile
     from hybridnav.planner.named import At
-    from hybridnav.planner.saved.container import Part
 
 FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
 """A floor and a point or name on it, or a name that only one floor has."""

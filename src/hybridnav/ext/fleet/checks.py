@@ -16,7 +16,7 @@ from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
-from hybridnav.planner import HybridPlanner, OutOfOrder, PlanStatus, Profile
+from hybridnav.planner import HybridPlanner, PlanStatus, Profile
 from hybridnav.planner.endpoints import places_of_endpoints, read_point, refusal
 from hybridnav.planner.named import check_names
 from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way, under_profile
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from hybridnav._base.typing import LongArray
+    from hybridnav.closures import OutOfOrder
     from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.search.found import ClosedCells
 

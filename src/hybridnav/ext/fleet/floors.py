@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
+from hybridnav.models.container import Part, buffers_of
+from hybridnav.models.parts import plain
+from hybridnav.models.structures import BUILDING, FLOOR
 from hybridnav.planner.profile import PROFILES, Profile
-from hybridnav.planner.saved.container import Part, buffers_of
-from hybridnav.planner.saved.parts import plain
-from hybridnav.planner.saved.structures import BUILDING, FLOOR
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -26,7 +26,7 @@ from hybridnav.ext.graphs.waypoint_graph import (
 )
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.planner.settings import ShortestSettings
-from hybridnav.topology.rooms.find import outside_of
+from hybridnav.rooms.find import outside_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

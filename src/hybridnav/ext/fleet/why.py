@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
+from hybridnav.closures.blocked import as_blocked
 from hybridnav.planner import PlanStatus
-from hybridnav.planner.blocked import as_blocked
 from hybridnav.planner.why import each_closure
 from hybridnav.planner.why_words import closure_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
+    from hybridnav.closures import Blocked
+    from hybridnav.closures.blocked import Closable
     from hybridnav.ext.fleet.floors import Floor
     from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
     from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.ext.fleet.search import Endpoint
-    from hybridnav.planner import Blocked
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.why import Explanation
     from hybridnav.planner.why_words import Closure
 

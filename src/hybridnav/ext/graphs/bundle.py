@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import AnyArray, FloatArray, PathLike
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 MOST_ROOMS = 100
 """Largest value that map_server's mode `raw` keeps; a larger one becomes unknown."""

@@ -18,13 +18,13 @@ from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.maps.islands import unique_rows
 from hybridnav.refine import Sight
+from hybridnav.rooms.listing import FOUND_NAME
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.rooms import Rooms
 
 _PAIRS = 2000
 """Random free points; the share that sees a node is counted."""

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from hybridnav.ext.graphs.sketch import Sketch
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph
     from hybridnav.refine import Sight
+    from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Rooms
 
 _NEAREST = (1, 4, 16, 64)
 """Nearest nodes by which points are looked for, one number after the other: most see the first."""

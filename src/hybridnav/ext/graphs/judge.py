@@ -13,15 +13,15 @@ from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.refine import Sight
+from hybridnav.rooms.find import outside_of
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.search import rounded_into
-from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.rooms import Rooms
     from hybridnav.search.mesh import MeshPaths
-    from hybridnav.topology.rooms import Rooms
 
 LEAST_AREA_M2 = 1.0
 """Area in square metres below which a part of free space gets no nodes: scans have many."""

@@ -26,8 +26,8 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.frame import FARTHEST_M
+from hybridnav.rooms.cutting import wall_directions
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.rooms.cutting import wall_directions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.rooms import Rooms
 
 _APART_M = 4.0
 """Distance between lanes in metres by default."""

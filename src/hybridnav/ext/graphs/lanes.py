@@ -19,14 +19,14 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line
 from hybridnav.maps.islands import unique_rows
+from hybridnav.rooms.doors import measured_clearance_m
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.rooms.doors import measured_clearance_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.rooms import Rooms
 
 
 def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:

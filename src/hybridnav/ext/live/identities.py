@@ -14,7 +14,7 @@ from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.islands import unique_rows
-from hybridnav.topology.rooms.carrying import Heirs, Overlap, heirs_of
+from hybridnav.rooms.carrying import Heirs, Overlap, heirs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

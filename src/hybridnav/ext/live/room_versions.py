@@ -16,8 +16,8 @@ from hybridnav.ext.live.identities import placed, shift_of
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names
-from hybridnav.topology.rooms.carrying import NUMBERED
-from hybridnav.topology.rooms.find import check_least_area, find_rooms, outside_of
+from hybridnav.rooms.carrying import NUMBERED
+from hybridnav.rooms.find import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

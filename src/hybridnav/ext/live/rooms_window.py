@@ -16,8 +16,8 @@ from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_mask
 from hybridnav.maps.clearance import within_radius
-from hybridnav.topology.rooms.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
-from hybridnav.topology.rooms.find import LEFT_OUT, WALL_REACH_M, reaching, renewed_rooms
+from hybridnav.rooms.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
+from hybridnav.rooms.find import LEFT_OUT, WALL_REACH_M, reaching, renewed_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping

@@ -253,7 +253,7 @@ class BuildingPage:
     def _entries(self) -> Entries | None:
         """Return what the file of the building describes; None for a model."""
         from hybridnav.ext.fleet.files.entries import read_building_entries  # noqa: PLC0415
-        from hybridnav.planner.saved import is_model  # noqa: PLC0415
+        from hybridnav.models.model import is_model  # noqa: PLC0415
 
         return None if is_model(self.file) else read_building_entries(self.file)
 

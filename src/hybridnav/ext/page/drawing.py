@@ -9,23 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from hybridnav.closures import Blocked
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import requests as ask
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.names import natural_key
-from hybridnav.planner import Blocked, PlanResult, load_preset, plan_alternatives, preset_names
+from hybridnav.planner import PlanResult, load_preset, plan_alternatives, preset_names
 from hybridnav.planner.tour import tour_of
-from hybridnav.topology.rooms.choices import leading_doors
+from hybridnav.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.closures import Journal
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import HybridPlanner, Journal, Preset, Tour
-    from hybridnav.planner.saved import Model
+    from hybridnav.models import Model
+    from hybridnav.planner import HybridPlanner, Preset, Tour
     from hybridnav.pyramid import Level
+    from hybridnav.rooms import Door, Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Door, Rooms
 
 MOST_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not sent: it would be one grey area."""

@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybridnav._base.files import printable, replace_file
+from hybridnav.closures import Journal, OutOfOrder
 from hybridnav.errors import InvalidValueError, RoomsError
 from hybridnav.maps.names import folded, matching
-from hybridnav.planner import Journal, OutOfOrder, Profile
-from hybridnav.topology.rooms.files import save_rooms
+from hybridnav.rooms.files import save_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.page.requests import ClosingChange, Favour, Find
     from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.planner import Profile
 
 # The profiles, and what is out of order until it is opened again.
 

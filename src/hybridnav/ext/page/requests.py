@@ -14,8 +14,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.planner import PlanResult
 from hybridnav.planner.guide import Instruction, sentences
-from hybridnav.topology.rooms.files.outlines import Outlines
-from hybridnav.topology.rooms.files.paint import cells_inside
+from hybridnav.rooms.files.outlines import Outlines
+from hybridnav.rooms.files.paint import cells_inside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,27 +7,28 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.trig import dist
+from hybridnav.closures import Blocked
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, room_facts
 from hybridnav.ext.page.requests import changed, checked_change, in_grid, in_metres, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps.names import natural_key
-from hybridnav.planner import Blocked
 from hybridnav.planner.named import check_names
-from hybridnav.topology.rooms.choices import free_point, room_near
+from hybridnav.rooms.choices import free_point, room_near
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from hybridnav.closures import Journal
     from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import At, Change, Edit, Save, Stand
     from hybridnav.ext.page.tiles import Layer
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Journal, Preset
-    from hybridnav.planner.saved import Model
+    from hybridnav.models import Model
+    from hybridnav.planner import Preset
+    from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.rooms import Rooms
 
 _MOST_LAYERS = 6
 """Layers that are kept, a byte for each cell."""

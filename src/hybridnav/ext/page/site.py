@@ -16,19 +16,20 @@ from hybridnav.ext.fleet.plan import GuidedRoute
 from hybridnav.ext.page.kept import Closings, Named, RoomsFile
 from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, lines_of
 from hybridnav.ext.page.session import Session
+from hybridnav.models import Model
 from hybridnav.planner import PROFILES, Tour, load_preset, preset_names
-from hybridnav.planner.saved import Model
-from hybridnav.topology.rooms import Rooms, find_rooms
+from hybridnav.rooms import Rooms, find_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from typing_extensions import Self
 
+    from hybridnav.closures import Blocked, OutOfOrder
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
     from hybridnav.ext.page.drawing import PagePlanning
     from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
-    from hybridnav.planner import Blocked, HybridPlanner, OutOfOrder
+    from hybridnav.planner import HybridPlanner
 
 _MOST_DIGITS = 3
 _NO_FILE = (

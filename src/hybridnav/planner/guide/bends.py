@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.planner import Path
-    from hybridnav.topology.rooms import Door
+    from hybridnav.rooms import Door
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.guide.glances import Glance
     from hybridnav.planner.guide.instruction import Kind
     from hybridnav.planner.guide.landmarks import Landmarks
-    from hybridnav.topology.rooms import Door
+    from hybridnav.rooms import Door
 
 _SLIVER_M = 1.0
 """Length of a leg outside rooms that is not mentioned, as across a gap between two outlines."""

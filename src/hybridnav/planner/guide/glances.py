@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridnav._base.trig import atan2, cos, dist, hypots, sin
 from hybridnav.maps import CellClass
-from hybridnav.topology.rooms.listing import FOUND_NAME
+from hybridnav.rooms.listing import FOUND_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.planner.guide.bends import Line
     from hybridnav.planner.guide.instruction import Hand, Side
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 _LATERAL_M = 3.5
 """Distance from the path at which a door counts as passed, at most."""

@@ -11,8 +11,8 @@ from hybridnav._base.trig import hypots
 from hybridnav.planner.guide.bends import Leg
 from hybridnav.planner.guide.instructions import instructions_of
 from hybridnav.planner.guide.landmarks import Landmarks
+from hybridnav.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 from hybridnav.route import RouteFinder
-from hybridnav.topology.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.planner import Path
     from hybridnav.planner.guide import Instruction
     from hybridnav.planner.guide.instruction import Shape
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.rooms import Rooms
 
 _SLIVER_M = 0.5
 _LEAST_ROOM_M2 = 6.0

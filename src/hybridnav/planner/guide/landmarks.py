@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from hybridnav.planner.guide.bends import Line
     from hybridnav.planner.guide.instruction import Hand, Side
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 _FARTHEST_M = 20.0
 """Distance at which a person recognises a door from the start, at most."""

@@ -28,14 +28,14 @@ from hybridnav.ext.graphs.files.rmf_read import is_rmf, read_rmf
 from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
 from hybridnav.refine import Sight
+from hybridnav.rooms.find import outside_of
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.rooms.find import outside_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav._base.typing import PathLike
-    from hybridnav.topology.rooms import Door, Rooms
+    from hybridnav.rooms import Door, Rooms
 
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""
@@ -367,9 +367,9 @@ def _areas(rooms: Rooms, tolerance_m: float) -> list[FloorArea]:
     """Return the outline of the largest part of each room."""
     import shapely  # noqa: PLC0415 - rooms alone need it
 
-    from hybridnav.topology.rooms.files.entries import Read  # noqa: PLC0415
-    from hybridnav.topology.rooms.files.outlines import Outlines  # noqa: PLC0415 - loads scipy
-    from hybridnav.topology.rooms.files.read import check_rooms  # noqa: PLC0415
+    from hybridnav.rooms.files.entries import Read  # noqa: PLC0415
+    from hybridnav.rooms.files.outlines import Outlines  # noqa: PLC0415 - loads scipy
+    from hybridnav.rooms.files.read import check_rooms  # noqa: PLC0415
 
     check_rooms(
         Read(f"map {rooms.grid.name}", list(rooms.names)), rooms.labels.label_of, rooms.grid

@@ -58,8 +58,8 @@ def is_building(path: PathLike) -> bool:
 
 def _is_building_model(path: Path) -> bool:
     """Return whether a file is the model of a building; False for one that cannot be read."""
-    from hybridnav.planner.saved.container import read_parts  # noqa: PLC0415 - on demand
-    from hybridnav.planner.saved.structures import BUILDING  # noqa: PLC0415
+    from hybridnav.models.container import read_parts  # noqa: PLC0415 - on demand
+    from hybridnav.models.structures import BUILDING  # noqa: PLC0415
 
     with suppress(MapError):
         filed = read_parts(path)

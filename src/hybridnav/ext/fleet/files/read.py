@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import hypots
+from hybridnav.closures import Journal
 from hybridnav.errors import (
     HybridNavError,
     InvalidValueError,
@@ -28,15 +29,15 @@ from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.checks import checked_radius
 from hybridnav.maps.files.movingai import check_max_cells
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner import HybridPlanner, Journal, Preset, load_preset
+from hybridnav.models import Model, load
+from hybridnav.models.container import FiledPart, parts_within, read_parts
+from hybridnav.models.model import is_model, model_of
+from hybridnav.models.parts import values_of
+from hybridnav.models.structures import BUILDING, FLOOR, refusal
+from hybridnav.planner import HybridPlanner, Preset, load_preset
 from hybridnav.planner.guide.landmarks import Landmarks
-from hybridnav.planner.saved import Model, is_model, load
-from hybridnav.planner.saved.container import FiledPart, parts_within, read_parts
-from hybridnav.planner.saved.model import model_of
-from hybridnav.planner.saved.parts import values_of
-from hybridnav.planner.saved.structures import BUILDING, FLOOR, refusal
-from hybridnav.topology.rooms import Rooms, find_rooms
-from hybridnav.topology.rooms.files.read import load_rooms
+from hybridnav.rooms import Rooms, find_rooms
+from hybridnav.rooms.files.read import load_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import LongArray, PathLike
-    from hybridnav.topology.rooms import Door
+    from hybridnav.rooms import Door
 
 Point = tuple[float, float]
 Line = list[Point]

@@ -1,0 +1,422 @@
+"""Segments of free space, and the forest that sees which of them are one room."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from itertools import count
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from scipy import ndimage
+
+from hybridnav.pyramid.darts import WORST_RANK, Darts
+from hybridnav.rooms.kernels import merging as _merging_kernels
+from hybridnav.rooms.kernels import segmentation as _evidence_kernels
+from hybridnav.rooms.kernels.merging import SegmentState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav.rooms.cutting import Ground
+
+    Judge = Callable[[LongArray, FloatArray], FloatArray]
+
+_ROUNDING = 1e-9
+
+
+def least_cells(least_m2: float, cell_m2: float) -> int:
+    """Return the fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not
+    201."""
+    return math.ceil(least_m2 / cell_m2 * (1 - _ROUNDING))
+
+
+def grown(label_of: IntArray, reach_cells: float) -> IntArray:
+    """Return labels spread to the unlabelled cells within reach, walls or not: each takes the
+    nearest one."""
+    if (label_of < 0).all():
+        return label_of.copy()
+    distance, nearest = ndimage.distance_transform_edt(label_of < 0, return_indices=True)
+    spread: IntArray = np.where(distance <= reach_cells, label_of[tuple(nearest)], -1)
+    return spread.astype(np.int32)
+
+
+EVIDENCE = (
+    *("open_m", "span_m", "covered", "deviation_m", "bent", "jamb_low", "jamb_high", "walled"),
+    *("passage_m", "mean_passage_m", "passage_of_lower", "passage_of_higher"),
+    *("open_share", "open_of_small_rim", "open_of_large_rim"),
+    *("opened_small", "opened_large", "opened_both"),
+    *("solid_small", "solid_large", "solid_both", "solid_gain"),
+    *("peak_small_m", "peak_large_m", "broad_small_m", "broad_large_m"),
+    *("long_small", "long_large", "long_both", "open_of_small_breadth", "open_of_large_breadth"),
+    *("axes_alike", "square_to_small", "square_to_large", "n_small", "n_large"),
+    *("open_of_passage", "n_openings", "longest_m", "flush_low", "flush_high", "flush_mean"),
+)
+"""What is measured of each boundary between a smaller segment and a larger one."""
+_EVIDENCE_REACH_M = 0.25
+"""How far segments reach into what is not free: walls between two segments are about half as
+thick."""
+_JAMB_M = 2.0
+"""Length of wall on either side of an opening that is looked at."""
+TABLE = "room_judge.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class Forest:
+    """Complete trees of one depth, level by level: right is what lies above a threshold."""
+
+    features: LongArray
+    """int64 (n_trees, 2^depth - 1), index into `EVIDENCE`."""
+    thresholds: FloatArray
+    """float64 (n_trees, 2^depth - 1), infinite where all goes left."""
+    leaves: FloatArray
+    """float64 (n_trees, 2^depth), added log odds."""
+    base: float
+    """Log odds without evidence."""
+
+    @classmethod
+    @cache
+    def shipped(cls) -> Forest:
+        """Read the forest of the package; `python -m benchmarks train_rooms` makes it."""
+        with (resources.files("hybridnav.rooms") / TABLE).open("rb") as file:
+            table = np.load(file)
+            return cls(
+                table["features"].astype(np.int64),
+                table["thresholds"].astype(np.float64),
+                table["leaves"].astype(np.float64),
+                float(table["base"]),
+            )
+
+    def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
+        """Return the probability that two segments belong to one room, float64 (n,)."""
+        return _evidence_kernels.probabilities(
+            evidence, self.features, self.thresholds, self.leaves, self.base
+        )
+
+
+class JudgedSegments:
+    """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
+
+    `label_of`: int32 (rows, cols), a segment for each free cell, -1 elsewhere; `ground`: what
+    counts as free and as wall.
+    """
+
+    def __init__(self, label_of: IntArray, ground: Ground) -> None:
+        is_used = np.bincount(label_of[label_of >= 0]) > 0
+        dense = np.append(np.cumsum(is_used) - 1, -1)  # sorting all cells would take longer
+        self._label_of: IntArray = dense[np.maximum(label_of, -1)].astype(np.int32)
+        self.n_segments = int(np.count_nonzero(is_used))
+        self._resolution_m = ground.resolution_m
+        self.state = _state(self._label_of, self.n_segments, ground)
+        self.owner_of = np.arange(self.n_segments)
+        """int64 (n_segments,), the segment that each one is part of by now."""
+
+    @property
+    def label_of(self) -> IntArray:
+        """int32 (rows, cols), the segments as they are now; numbers have gaps."""
+        return np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
+
+    def evidence(self, pairs: LongArray) -> FloatArray:
+        """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
+        found = np.zeros((len(pairs), len(EVIDENCE)))
+        _evidence_kernels.fill_evidence(
+            self.state,
+            pairs,
+            self._resolution_m,
+            _EVIDENCE_REACH_M / self._resolution_m,
+            max(1, round(_JAMB_M / self._resolution_m)),
+            found,
+        )
+        return found
+
+    def pair_of(self, segment: int, other: int) -> int:
+        """Return the pair of two segments, -1 if they do not touch."""
+        pairs = _merging_kernels.pairs_of(self.state, segment)
+        found = pairs[(self.state.endpoints[pairs] == other).any(axis=1)]
+        return int(found[0]) if len(found) else -1
+
+    def merge(self, pair: int) -> int:
+        """Merge the two segments of a pair, and return the one that is left."""
+        sizes = self.state.hull_sizes[self.state.endpoints[pair]].sum()
+        if self.state.hulls_used[0] + sizes > len(self.state.hulls):
+            hulls = np.concatenate([self.state.hulls, np.empty_like(self.state.hulls)])
+            self.state = self.state._replace(hulls=hulls)
+        kept, gone = _merging_kernels.merge_pair(self.state, pair)
+        self.owner_of[self.owner_of == gone] = kept
+        return int(kept)
+
+
+def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
+    """Measure segments and the pairs that touch."""
+    reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
+    free, peaks, moments, rims, begins, sizes, areas, diameters, corners = (
+        _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
+    )
+    pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
+    order, opened, run_begins, run_ends = _runs(pairs, n)
+    _, border, border_begins, border_ends = _runs(
+        _merging_kernels.sides_between(reaching, ground.clearance)[0], n
+    )
+    keys = np.union1d(opened, border)
+    at, count = np.searchsorted(keys, opened), len(keys)
+    endpoints = np.stack([keys // max(1, n), keys % max(1, n)], axis=1)
+    open_sides, border_sides, widest, clearances = (np.zeros(count) for _ in range(4))
+    head, begin, end = np.full(count, -1), np.zeros(count, np.int64), np.zeros(count, np.int64)
+    open_sides[at], head[at], begin[at], end[at] = run_ends - run_begins, at, run_begins, run_ends
+    border_sides[np.searchsorted(keys, border)] = border_ends - border_begins
+    if len(opened):
+        widest[at] = np.maximum.reduceat(clear[order], run_begins)
+        clearances[at] = np.add.reduceat(clear[order], run_begins)
+    hulls = np.empty((2 * len(corners) + 16, 2))
+    hulls[: len(corners)] = corners
+    first_half, next_half = _halves(endpoints, n)
+    return SegmentState(
+        free=free,
+        moments=moments,
+        rims=rims,
+        peaks=peaks,
+        opened=np.bincount(endpoints.ravel(), np.repeat(open_sides, 2), n),
+        hull_areas=areas,
+        diameters=diameters,
+        hull_begins=begins,
+        hull_sizes=sizes,
+        degrees=np.bincount(endpoints.ravel(), minlength=n),
+        first_half=first_half,
+        versions=np.zeros(n, np.int64),
+        endpoints=endpoints,
+        open_sides=open_sides,
+        border_sides=border_sides,
+        widest=widest,
+        clearances=clearances,
+        head=head,
+        tail=head.copy(),
+        next_half=next_half,
+        next_run=np.full(count, -1),
+        run_begins=begin,
+        run_ends=end,
+        sides=sides[order],
+        wall=ndimage.binary_dilation(ground.wall, np.ones((3, 3), dtype=np.bool_)),
+        hulls=hulls,
+        hulls_used=np.array([len(corners)]),
+        mark=np.full(n, -1),
+    )
+
+
+def _runs(pairs: LongArray, n: int) -> tuple[LongArray, LongArray, LongArray, LongArray]:
+    """Return the order of sides by pair, each pair's key, and where its sides begin and end."""
+    keys = pairs[:, 0] * n + pairs[:, 1]
+    order = np.argsort(keys, kind="stable")
+    found, begins, counts = np.unique(keys[order], return_index=True, return_counts=True)
+    return order, found, begins, begins + counts
+
+
+def _halves(endpoints: LongArray, n: int) -> tuple[LongArray, LongArray]:
+    """Return linked lists of the half pairs of each segment."""
+    first, following = np.full(n, -1), np.full(2 * len(endpoints), -1)
+    order = np.argsort(endpoints.ravel(), kind="stable")
+    of = endpoints.ravel()[order]
+    last = np.append(of[1:] != of[:-1], True) if len(of) else np.zeros(0, bool)
+    following[order[:-1][~last[:-1]]] = order[1:][~last[:-1]]
+    begins = np.flatnonzero(np.diff(of, prepend=-1))
+    first[of[begins]] = order[begins]
+    return first, following
+
+
+# Rooms that grow out of segments: levels of a pyramid in which boundaries resist.
+
+
+_PATIENCE = 48
+"""Levels at which an arc waits for better ones at its endpoints; a pyramid has 126 at most."""
+
+
+class Rule(Protocol):
+    """What decides which pairs of segments may merge."""
+
+    def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
+        """Return the rating of each pair, float64 (n_pairs,), above 0 where it may merge.
+
+        `segments`: the segments as they are now; `grown`: int64 (n,), segments that have grown
+        since the last call.
+        """
+
+
+class Likely:
+    """The rule that two segments merge where a judge finds it likely that both are one room.
+
+    `judge`: returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
+    (n, len(EVIDENCE)); `least`: probability from which on a pair may merge, in (0, 1].
+    """
+
+    def __init__(self, judge: Judge, least: float) -> None:
+        self._judge, self._least = judge, least
+        self._likely = np.empty(0)
+
+    def ratings(self, segments: JudgedSegments, grown: LongArray) -> FloatArray:
+        """Return the probability of each pair, 0 below the least; see `Rule`."""
+        state = segments.state
+        if len(self._likely):
+            beside = [_merging_kernels.pairs_of(state, int(segment)) for segment in grown]
+            pairs = np.unique(np.concatenate([np.empty(0, np.int64), *beside]))
+        else:
+            self._likely = np.zeros(len(state.endpoints))
+            pairs = np.flatnonzero(state.endpoints[:, 0] >= 0)
+        pairs = pairs[state.open_sides[pairs] > 0]
+        if len(pairs):
+            self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
+        return np.where(self._likely >= self._least, self._likely, 0.0)
+
+
+class Small:
+    """The rule that a small segment merges with the neighbour of the longest open border.
+
+    `least_cells`: free cells from which on a segment is not small. Those without a neighbour stay.
+    """
+
+    def __init__(self, least_cells: float) -> None:
+        self._least = least_cells
+
+    def ratings(self, segments: JudgedSegments, _grown: LongArray) -> FloatArray:
+        """Return a rating that is the higher, the smaller the segment; see `Rule`."""
+        state = segments.state
+        pairs = np.flatnonzero((state.endpoints[:, 0] >= 0) & (state.open_sides > 0)).repeat(2)
+        ends = state.endpoints[pairs[::2]].ravel()
+        small = state.free[ends] < self._least
+        pairs, ends = pairs[small], ends[small]
+        order = np.lexsort((pairs, -state.open_sides[pairs], ends))
+        _, first = np.unique(ends[order], return_index=True)
+        widest = order[first]
+        ratings = np.zeros(len(state.endpoints))
+        np.maximum.at(ratings, pairs[widest], 1.0 - state.free[ends[widest]] / self._least)
+        return ratings
+
+
+class Growth:
+    """The resistance of boundaries between segments by rules, one after the other; see `Resists`.
+
+    `segments`: the segments; they merge as the fields do; `rules`: when no arc may be contracted by
+    one of them, the next one decides.
+    """
+
+    def __init__(self, segments: JudgedSegments, rules: Sequence[Rule]) -> None:
+        self._segments, self._rules = segments, rules
+        self._label_of = segments.label_of
+        self.kept_apart: IntArray = _colours(segments)[self._label_of]
+        self.shape = self._label_of.shape
+
+    def steering(self, field_of: IntArray, n_vertices: int) -> GrowingSegments:
+        """Return the steering from a level on whose fields are the segments."""
+        inside = field_of >= 0
+        segment_of = np.full(n_vertices, -1, dtype=np.int64)
+        segment_of[field_of[inside]] = self._label_of.ravel()[inside]
+        return GrowingSegments(self._segments, self._rules, segment_of)
+
+
+class GrowingSegments:
+    """A steering by the boundaries of segments; see `Steering`.
+
+    An arc waits while a better one meets one of its endpoints, so that segments merge nearly in the
+    order of one contraction at a time, and boundaries of a merged segment are rated anew before the
+    next level.
+
+    `segments`, `rules`: see `Growth`; `segment_of`: int64 (n_vertices,), the segment of each vertex
+    of the level to start from, -1 for none.
+    """
+
+    def __init__(
+        self, segments: JudgedSegments, rules: Sequence[Rule], segment_of: LongArray
+    ) -> None:
+        self._segments, self._segment_of = segments, segment_of
+        self._rules = list(rules)
+        self._grown = np.empty(0, dtype=np.int64)
+        self._levels = 0
+        self._of_arc = np.empty(0)
+
+    def candidates(
+        self, field_of: Callable[[], IntArray], darts: Darts, vertices: object
+    ) -> tuple[LongArray, LongArray]:
+        """Return the arcs that may be contracted, and that no better one keeps waiting."""
+        u, v = self._segment_of[darts.origin.reshape(-1, 2).T]
+        loops = darts.origin[::2] == darts.origin[1::2]
+        ratings = self._rated(u, v)
+        ratings[(u == v) & (u >= 0) & ~loops] = 1.0  # parts of one segment that have met
+        may = ratings > 0
+        if not may.any() and len(self._rules) > 1:
+            self._rules.pop(0)
+            return self.candidates(field_of, darts, vertices)
+        self._of_arc = ratings
+        self._levels += 1
+        if self._waits:
+            best = np.zeros(self._segments.n_segments)
+            np.maximum.at(best, u[may], ratings[may])
+            np.maximum.at(best, v[may], ratings[may])
+            may[may] = ratings[may] >= np.maximum(best[u[may]], best[v[may]])
+        arcs = np.flatnonzero(may)
+        return arcs, (WORST_RANK * (1.0 - ratings[arcs])).astype(np.int64)
+
+    def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
+        """Undo all joins of a star but the best: the others are rated again without it."""
+        if not self._waits:
+            return
+        leaves = np.flatnonzero(kernel_dart >= 0)
+        leaves = leaves[np.argsort(-self._of_arc[kernel_dart[leaves] >> 1], kind="stable")]
+        _, first = np.unique(parent[leaves], return_index=True)
+        undone = np.delete(leaves, first)
+        parent[undone], kernel_dart[undone] = undone, -1
+
+    def merge(self, merged_into: IntArray, n_vertices: int) -> None:
+        """Merge the segments as their vertices do."""
+        before, segments = self._segment_of, self._segments
+        segment_of = np.full(n_vertices, -1, dtype=np.int64)
+        segment_of[merged_into] = before
+        stars = np.bincount(merged_into)[merged_into] > 1
+        joins = np.stack([segment_of[merged_into[stars]], before[stars]], axis=1)
+        grown: list[int] = []
+        while len(joins):
+            apart = []
+            for one, other in joins.tolist():
+                u, v = (int(segments.owner_of[segment]) for segment in (one, other))
+                if u == v:
+                    continue
+                pair = segments.pair_of(u, v)
+                if pair < 0:  # two leaves of a star: once its centre has joined, they touch
+                    apart.append((one, other))
+                else:
+                    grown.append(segments.merge(pair))
+            joins = np.array(apart)
+        self._grown = np.unique(segments.owner_of[grown])
+        self._segment_of = segments.owner_of[segment_of]
+
+    @property
+    def _waits(self) -> bool:
+        return self._levels <= _PATIENCE
+
+    def _rated(self, u: LongArray, v: LongArray) -> FloatArray:
+        """Return the rating of the arcs between segments, 0 for the others."""
+        of_pair = self._rules[0].ratings(self._segments, self._grown)
+        endpoints, n = self._segments.state.endpoints, self._segments.n_segments
+        alive = np.flatnonzero(endpoints[:, 0] >= 0)
+        low, high = np.sort(endpoints[alive], axis=1).T
+        keys = low * n + high
+        order = np.argsort(keys, kind="stable")
+        between = (u != v) & (u >= 0) & (v >= 0)
+        wanted = (np.minimum(u, v) * n + np.maximum(u, v))[between]
+        ratings = np.zeros(len(u))
+        ratings[between] = of_pair[alive[order[np.searchsorted(keys, wanted, sorter=order)]]]
+        return ratings
+
+
+def _colours(segments: JudgedSegments) -> IntArray:
+    """Return a number for each segment that none beside it has: a pyramid has few kinds of cells.
+
+    The last one, for no segment, is -1.
+    """
+    colour_of = np.full(segments.n_segments + 1, -1, dtype=np.int32)
+    for segment in np.flatnonzero(segments.state.versions >= 0).tolist():
+        pairs = _merging_kernels.pairs_of(segments.state, segment)
+        beside = segments.state.endpoints[pairs].sum(axis=1) - segment
+        taken = set(colour_of[beside].tolist())
+        colour_of[segment] = next(colour for colour in count() if colour not in taken)
+    return colour_of

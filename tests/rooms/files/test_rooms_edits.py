@@ -1,0 +1,329 @@
+"""What a person does to a file of rooms with a text editor, and what writing it again keeps."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.maps import RoomLabels
+from hybridnav.rooms.files.outlines import Outlines
+from tests.drawn_rooms import write_ros
+from tests.strategies import drawn, examples, occupancy_grid
+
+FLOOR = drawn(
+    "#############################",
+    "#.........#........#........#",
+    "#.........#........#........#",
+    "#..................#........#",
+    "#..................#........#",
+    "#..................#........#",
+    "#.........#.................#",
+    "#.........#.................#",
+    "#.........#.................#",
+    "#############################",
+)
+SIDE = 0.25
+
+
+@pytest.fixture
+def floor():
+    """Three rooms in a row, walls of one cell, doors of three."""
+    label_of = np.full(FLOOR.shape, -1, dtype=np.int32)
+    label_of[:, :11], label_of[:, 11:20], label_of[:, 20:] = 0, 1, 2
+    names = ("room-1", "room-2", "room-3")
+    return occupancy_grid(FLOOR, resolution_m=SIDE), RoomLabels(names, label_of)
+
+
+@pytest.fixture
+def path(floor, tmp_path):
+    grid, rooms = floor
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    return tmp_path / "rooms.yaml"
+
+
+def free_rooms(rooms, grid):
+    """The name of the room of each free cell."""
+    names = np.array([*rooms.names, None], dtype=object)
+    return names[rooms.label_of][grid.measured == 1].tolist()
+
+
+@st.composite
+def layouts(draw):
+    """Rooms on a map with obstacles, cut by random lines and blocks."""
+    rows, cols = draw(st.integers(4, 12)), draw(st.integers(4, 12))
+    seed = draw(st.integers(0, 2**16))
+    rng = np.random.default_rng(seed)
+    classes = (rng.random((rows, cols)) > draw(st.sampled_from([0.0, 0.1, 0.4]))).astype(np.uint8)
+    label_of = np.zeros((rows, cols), dtype=np.int32)
+    for label in range(1, draw(st.integers(1, 5))):
+        row, col = rng.integers(0, rows), rng.integers(0, cols)
+        height, width = rng.integers(1, rows), rng.integers(1, cols)
+        label_of[row : row + height, col : col + width] = label
+    named = [n for n in range(6) if (classes[label_of == n] == 1).any()]
+    dense = np.full(7, -1)
+    dense[named] = np.arange(len(named))
+    names = tuple(f"r{n}" for n in range(len(named)))
+    resolution_m = draw(st.sampled_from([0.05, 0.3, 1.0]))
+    return occupancy_grid(classes, resolution_m=resolution_m), RoomLabels(names, dense[label_of])
+
+
+@given(layout=layouts())
+@settings(max_examples=examples(20))
+def test_every_free_cell_is_read_with_the_room_that_it_had(tmp_path_factory, layout):
+    grid, rooms = layout
+    path = tmp_path_factory.mktemp("any") / "rooms.yaml"
+    hn.save_rooms(path, rooms, grid)
+    again = hn.load_rooms(path, grid)
+    assert again.names == rooms.names
+    assert free_rooms(again, grid) == free_rooms(rooms, grid)
+    hn.save_rooms(path, again, grid)  # over itself
+    assert free_rooms(hn.load_rooms(path, grid), grid) == free_rooms(rooms, grid)
+
+
+def test_outlines_are_few_corners_on_walls_which_neighbours_share():
+    """A ragged wall: the outline of each room is a rectangle, and both share its side."""
+    rng = np.random.default_rng(3)
+    classes = np.ones((80, 160), dtype=np.uint8)
+    classes[[0, 1, 2, -3, -2, -1]], classes[:, [0, 1, 2, -3, -2, -1]], classes[:, 78:82] = 0, 0, 0
+    classes[30:50, 78:82] = 1
+    for row in range(80):  # scan noise on both faces of the wall
+        if not 28 <= row < 52:
+            classes[row, 78 - rng.integers(0, 2) : 82 + rng.integers(0, 2)] = 0
+    label_of = np.full(classes.shape, 0, dtype=np.int32)
+    label_of[:, 80:] = 1
+    grid = occupancy_grid(classes, resolution_m=0.05)
+    rings = Outlines(label_of, 2, grid).within(0.1)
+    assert [len(room) for room in rings] == [1, 1]
+    west, east = (shapely.Polygon(room[0]) for room in rings)
+    assert shapely.coverage_is_valid([west, east])
+    assert shapely.intersection(west, east).length == pytest.approx(4.0, abs=0.05)
+    assert len(rings[0][0]) <= 5
+    assert west.hausdorff_distance(shapely.box(0, 0, 4, 4)) <= 0.05 + 1e-9
+
+
+@pytest.mark.parametrize(("degrees", "tolerance_m"), [(0, 0.05), (7, 0.05), (30, 0.1)])
+def test_outlines_lie_within_their_tolerance_along_walls_of_any_direction(degrees, tolerance_m):
+    """Two wings, one turned: no step of a cell is left, and no corner lies far from the walls."""
+    side_m, wing = 0.05, shapely.box(2, 2, 12, 7)
+    other = shapely.affinity.rotate(shapely.box(16, 3, 26, 8), degrees)
+    rows, cols = 220, 560
+    x, y = np.meshgrid((np.arange(cols) + 0.5) * side_m, (np.arange(rows) + 0.5) * side_m)
+    label_of = np.full((rows, cols), -1, dtype=np.int32)
+    for room, shape in enumerate((wing, other)):
+        label_of[shapely.contains_xy(shape, x, y)] = room
+    grid = occupancy_grid((label_of >= 0).astype(np.uint8), resolution_m=side_m)
+    rings = Outlines(label_of, 2, grid).within(tolerance_m)
+    for (ring,), shape in zip(rings, (wing, other), strict=True):
+        assert len(ring) <= 5
+        assert shapely.Polygon(ring).hausdorff_distance(shape) < tolerance_m + 0.05 * 2**0.5
+        ((east, north),) = np.diff(ring[:2], axis=0)
+        turned = np.degrees(np.arctan2(north, east)) - (0 if shape is wing else degrees)
+        assert abs((turned + 45) % 90 - 45) < 0.6
+
+
+def test_the_tolerance_may_be_chosen(tmp_path):
+    rng = np.random.default_rng(5)
+    label_of = np.full((120, 160), -1, dtype=np.int32)
+    label_of[20:100, 20:140] = 0
+    for row in range(20, 100):
+        label_of[row, 80 + rng.integers(-4, 5) : 140] = 1
+    grid = occupancy_grid((label_of >= 0).astype(np.uint8), resolution_m=0.05)
+    rooms = RoomLabels(("west", "east"), label_of)
+    sizes = {}
+    for tolerance_m in (0.06, 0.2, 0.5, None):
+        path = tmp_path / f"{tolerance_m}.yaml"
+        hn.save_rooms(path, rooms, grid, tolerance_m=tolerance_m)
+        assert free_rooms(hn.load_rooms(path, grid), grid) == free_rooms(rooms, grid)
+        sizes[tolerance_m] = sum(line.count("[") for line in path.read_text().splitlines())
+    assert sizes[None] >= sizes[0.06] > sizes[0.2] > sizes[0.5]
+    for wrong in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match="tolerance_m must be positive and finite"
+        ):
+            hn.save_rooms(tmp_path / "x.yaml", rooms, grid, tolerance_m=wrong)
+    given: Any
+    for given in ((rooms.label_of, grid), (rooms, grid.classes)):
+        with pytest.raises(
+            hn.errors.InvalidValueError, match=r"expected an? (RoomLabels|OccupancyGrid)"
+        ):
+            hn.save_rooms(tmp_path / "x.yaml", *given)
+
+
+def test_names_may_be_changed(floor, path):
+    grid, rooms = floor
+    path.write_text(path.read_text().replace("name: room-2", "name: lab  # since May"))
+    again = hn.load_rooms(path, grid)
+    assert again.names == ("room-1", "lab", "room-3")
+    assert (again.label_of == rooms.label_of)[grid.measured == 1].all()
+
+
+def test_two_entries_of_one_name_are_one_room(floor, path):
+    grid, _ = floor
+    path.write_text(re.sub("name: room-[12]", "name: suite", path.read_text()))
+    again = hn.load_rooms(path, grid)
+    assert again.names == ("suite", "room-3")
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=again))
+    assert [door.rooms for door in topology.rooms.doors] == [("suite", "room-3")]
+    hn.save_rooms(path, again, grid)
+    assert free_rooms(hn.load_rooms(path, grid), grid) == free_rooms(again, grid)
+
+
+def test_rooms_far_apart_are_not_joined_by_a_name(floor, path):
+    grid, _ = floor
+    path.write_text(re.sub("name: room-[13]", "name: office", path.read_text()))
+    with pytest.raises(
+        hn.errors.RoomsError, match=r"line \d+: room 'office': .* first in line \d+"
+    ):
+        hn.load_rooms(path, grid)
+
+
+def test_a_room_drawn_over_another_takes_its_cells_wherever_it_stands(floor, path):
+    grid, rooms = floor
+    nook = "- name: nook\n  polygon: [[0.2, 0.2], [1.3, 0.2], [1.3, 1.2], [0.2, 1.2]]\n"
+    centres = grid.frame.points_of(np.argwhere(grid.measured == 1))
+    inside = shapely.contains_xy(shapely.box(0.2, 0.2, 1.3, 1.2), centres)
+    expected = np.where(inside, "nook", free_rooms(rooms, grid)).tolist()
+    text = path.read_text()
+    for place in ("rooms:\n", "- name: room-3\n"):
+        at = text.index(place) + (len(place) if place == "rooms:\n" else 0)
+        path.write_text(text[:at] + nook + text[at:])
+        again = hn.load_rooms(path, grid)
+        assert free_rooms(again, grid) == expected
+        assert again.at((0.5, 0.5), grid) == "nook"
+
+
+def test_moving_a_corner_changes_no_room_but_those_beside_it(floor, path):
+    grid, rooms = floor
+    first = yaml.safe_load(path.read_text())["rooms"][0]
+    right = max(x for x, _ in first["polygon"]) + 0.5
+    wider = f"[[0, 0], [{right}, 0], [{right}, 2.5], [0, 2.5]]"
+    text = re.sub(r"(name: room-1\n  polygon: ).*", rf"\g<1>{wider}", path.read_text())
+    path.write_text(text)
+    again = hn.load_rooms(path, grid)
+    was, is_now = free_rooms(rooms, grid), free_rooms(again, grid)
+    changed = {pair for pair in zip(was, is_now, strict=True) if pair[0] != pair[1]}
+    assert changed == {("room-2", "room-1")}
+
+
+def test_a_room_that_others_cover_is_refused_with_both_lines(floor, path):
+    grid, _ = floor
+    big = "- name: all\n  polygon: [[0, 0], [7, 0], [7, 2.5], [0, 2.5]]\n"
+    path.write_text(path.read_text().replace("- name: room-3", f"{big}- name: room-3"))
+    with pytest.raises(hn.errors.RoomsError) as error:
+        hn.load_rooms(path, grid)
+    assert re.search(
+        r"line \d+: room 'room-1': holds no free cell.*line \d+: room 'all'", str(error.value)
+    )
+
+
+def test_comments_and_drawn_outlines_survive_writing_again(floor, tmp_path):
+    grid, _ = floor
+    path = tmp_path / "rooms.yaml"
+    path.write_text(
+        "# measured by Ann\nrooms:\n# the kitchen\n- name: 'kit#chen'  # with a stove\n"
+        "  polygon: [[0, 0], [2.6, 0], [2.6, 2.5], [0, 2.5]]  # by tape\n"
+        "- name: lab\n  polygon:\n  - [2.6, 0]  # post\n  - [4.9, 0]\n  - [4.9, 2.5]\n"
+        "  - [2.6, 2.5]\n"
+        "points:  # of interest\n- name: sink\n  point: [1, 1]\n"
+    )
+    rooms = hn.load_rooms(path, grid)
+    hn.save_rooms(path, rooms, grid)
+    text = path.read_text()
+    for words in ("# measured by Ann", "# the kitchen", "# with a stove", "# by tape", "# post"):
+        assert text.count(words) == 1
+    assert "[[0, 0], [2.6, 0], [2.6, 2.5], [0, 2.5]]  # by tape" in text
+    again = hn.load_rooms(path, grid)
+    assert again.names == ("kit#chen", "lab")
+    assert dict(again.points) == {"sink": (1.0, 1.0)}
+    assert (again.label_of == rooms.label_of).all()
+    hn.save_rooms(path, again, grid)
+    assert path.read_text() == text
+    other = RoomLabels(("hall",), np.zeros(FLOOR.shape, dtype=np.int32))
+    hn.save_rooms(path, other, grid)
+    for words in ("# measured by Ann", "# with a stove", "# by tape", "# post", "# of interest"):
+        assert words in path.read_text()
+    assert re.search(r"# Formerly 'kit#chen', round \[1\.\d+, 1\.\d+\]", path.read_text())
+    assert hn.load_rooms(path, grid).names == ("hall",)
+
+
+@pytest.mark.parametrize("lines", ["[eJw]", "['!']", "[7]", "[AAAA, AAAA]", "['']"])
+def test_damaged_cells_end_in_one_line(floor, path, lines):
+    grid, _ = floor
+    text = path.read_text()
+    path.write_text(text[: text.index("cells:")] + f"cells: {lines}\n")
+    with pytest.raises(hn.errors.RoomsError, match="cells: damaged, delete the list") as error:
+        hn.load_rooms(path, grid)
+    assert str(error.value).isprintable()
+
+
+def test_without_its_cells_and_on_another_map_the_outlines_count(floor, path):
+    grid, rooms = floor
+    text = path.read_text()
+    larger = occupancy_grid(np.pad(FLOOR, ((0, 1), (0, 0))), resolution_m=SIDE)
+    assert hn.load_rooms(path, larger).names == rooms.names
+    path.write_text(text[: text.index("cells:")])
+    assert hn.load_rooms(path, grid).names == rooms.names
+
+
+def test_a_point_is_looked_up_in_one_call(floor):
+    grid, rooms = floor
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    assert topology.rooms.at((0.5, 0.5)) == rooms.at((0.5, 0.5), grid) == "room-1"
+    assert topology.rooms.at((6.0, 1.0)) == "room-3"
+    assert topology.rooms.at((99.0, 1.0)) is None
+    with pytest.raises(hn.errors.InvalidValueError, match="finite"):
+        topology.rooms.at((float("nan"), 1.0))
+
+
+@pytest.mark.parametrize("floor_name", ["2", "3", "3ne"])
+@pytest.mark.full
+def test_a_real_floor_is_a_small_file_and_read_exactly(data, tmp_path, floor_name):
+    grid = hn.load_map(data / "bwi_gdc" / floor_name / f"{floor_name}.yaml", robot_radius_m=0.25)
+    rooms = hn.find_rooms(grid)
+    path = tmp_path / "rooms.yaml"
+    hn.save_rooms(path, rooms, grid)
+    again = hn.load_rooms(path, grid)
+    assert path.stat().st_size <= 20_000
+    named = (rooms.label_of >= 0) & (grid.measured == 1)
+    assert (again.label_of == rooms.label_of)[named].all()
+
+
+@pytest.fixture
+def map_file(floor, tmp_path):
+    """The floor as a ROS map, with its rooms beside it."""
+    grid, rooms = floor
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    return write_ros(tmp_path, "f", np.where(FLOOR == 0, 0, 254), SIDE)
+
+
+def test_the_command_names_the_room_of_a_point(cli, map_file):
+    query = ("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml")
+    done = cli(*query, "--at", "6,1")
+    assert (done.code, done.out, done.err) == (0, "room-3\n", "")
+    done = cli(*query, "--at", "-9,1")
+    assert (done.code, done.out) == (1, "no room at (-9, 1), outside the map\n")
+    told = cli(*query, "--at", "0.5,0.5", "--json").answer
+    assert told == {"at_m": [0.5, 0.5], "room": "room-1", "cell": "free"}
+    for wrong in ("1", "a,b", "nan,1", "1,2,3"):
+        assert cli(*query, "--at", wrong).refuses(2, "--at must be two finite numbers", wrong)
+    assert cli(*query, "--at", "1,1", "-o", "x.yaml").refuses(2, "--at prints one room")
+
+
+def test_the_list_has_numbers_sizes_and_neighbours(cli, map_file):
+    query = ("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", "--robot-radius", "0")
+    done = cli(*query)
+    (line,) = (line for line in done.out.splitlines() if line.startswith("room-2"))
+    # 8 x 8 cells, and three in the doorway of the wall.
+    assert re.match(r"room-2 2 +4\.19 m²  2\.2 x 2\.0 m +\(", line)
+    first, second, third = cli(*query, "--json").answer["rooms"]
+    assert [room["number"] for room in (first, second, third)] == [1, 2, 3]
+    assert {beside["room"] for beside in second["neighbours"]} == {"room-1", "room-3"}
+    assert [beside["room"] for beside in first["neighbours"]] == ["room-2"]
+    assert first["extent_m"] == [[0.25, 0.25], [2.75, 2.25]]
+    assert third["centre_m"] == pytest.approx([6.0, 1.25], abs=0.2)
