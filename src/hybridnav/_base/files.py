@@ -115,8 +115,10 @@ def without_controls(text: str) -> str:
 
 
 def printable(path: str | os.PathLike[str]) -> str:
-    """Return the text of a path for a message, escaped if it would break the line, and cut if it is
-    longer, or has a longer name, than file systems and people use.
+    """Return the text of a path for a message.
+
+    It is escaped if it would break the line, and cut if it is longer than file systems and people
+    use.
 
     Returns one line.
     """

@@ -271,9 +271,11 @@ def grow_topology(
     waypoints: Sequence[str | tuple[float, ...]] = (),
     closing: Closing | None = None,
 ) -> hn.TopologicalMap:
-    """Build the pyramid of a map with the settings of a preset, unless the model has it, and the
-    rooms of a file, of the model or, if asked for, those that are found. Refuse names of waypoints
-    and closed rooms that these lack before, and numbers of closed doors after."""
+    """Build the pyramid of a map with the settings of a preset, unless the model has it.
+
+    Its rooms are those of a file, those of the model or, if asked for, found. Refuse names of
+    waypoints and closed rooms that these lack before, and numbers of closed doors after.
+    """
     grid, rooms = model.grid, model.rooms
     if rooms_file is not None:
         with stage(f"reading {rooms_file}", seconds, "rooms"):

@@ -224,8 +224,10 @@ def _measured(figures: dict[str, Any]) -> list[str]:
 
 
 def rounded_bound(bound: float, cost: float) -> tuple[str, str]:
-    """Return a bound and how far from the optimum a path of a cost is at most, rounded to the safe
-    side; the bound of an optimal path is its cost, and rounded like that."""
+    """Return a bound, and how far a path is at most from the optimum, rounded to the safe side.
+
+    The bound of an optimal path is its length, and rounded like that.
+    """
     if cost <= bound * (1 + _OPTIMAL):
         return f"{cost:.2f}", "optimal"
     if bound <= 0:

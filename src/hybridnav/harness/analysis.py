@@ -305,8 +305,10 @@ def _columns(outcome: Outcome) -> dict[str, object]:
 def _latest(
     preparations: dict[tuple[str, str], Record], folder: Path
 ) -> dict[tuple[str, str], Record]:
-    """Return the preparations without those of a class before it was mended, on any map: its last
-    version with records is the one of the last run, else the one whose records came last."""
+    """Return the preparations without those of a class before it was mended, on any map.
+
+    Its last version is the one of the last run, else the one whose records came last.
+    """
     sources = latest_sources(folder)
     shown: dict[str, str | None] = {}
     for record in preparations.values():

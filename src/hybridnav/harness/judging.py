@@ -183,7 +183,8 @@ class Judge:
 
     def in_order_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length of the shortest path of cells through the regions of the plan in their
-        order; None by costs, for no plan, and for one that is read off a path."""
+        order. None by costs, for no plan, and for one that is read off a path.
+        """
         checks = None if self._costs is not None else self._consistency
         was_searched = answer.expanded_nodes if answer.is_path else not answer.gave_up
         if checks is None or not answer.nodes or not was_searched:

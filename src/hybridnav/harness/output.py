@@ -166,8 +166,10 @@ def report_of(
 
 
 def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[tables.Row]:
-    """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
-    for each method on a map, over the pairs that all methods solved."""
+    """Return the mean loss over an optimum in per cent by the length of the octile optimum.
+
+    Each method on a map has a row, over the pairs that all methods solved.
+    """
     outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
     common = pairs_in_common(outcomes)
     rows = []

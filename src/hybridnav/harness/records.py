@@ -294,8 +294,9 @@ def _lay_names(records: list[Record]) -> None:
 
 
 def _lay_contradiction(record: Record, reference: Record | None) -> None:
-    """Add the contradiction by the reference to the faults of a record, unless there is one of that
-    kind; records of older versions have several texts of a kind, or no kinds."""
+    """Add the contradiction by the reference to the faults of a record, unless it has one of that
+    kind. Records of older versions have several texts of a kind, or no kinds.
+    """
     texts = record.get("faults", ())
     usual: Kind = "regions" if record["type"] == "preparation" else "paths"
     found = list(map(Fault, record.get("fault_kinds") or [usual] * len(texts), texts))

@@ -286,9 +286,11 @@ def counter_examples(study: Study, drawn: dict[CaseKey, str]) -> list[CounterExa
 
 
 def command_of(outcome: Outcome, record: Record) -> str:
-    """Return the command that plans the pair of a record, in metres, by the preset, or by the
-    reference for other methods; empty for other records, and for those of older versions, which
-    hold no frame."""
+    """Return the command that plans the pair of a record, in metres.
+
+    It plans by the preset, or by the reference for other methods. Other records, and those of older
+    versions without a frame, have an empty one.
+    """
     about = outcome.preparation
     if record["type"] != "pair" or "origin" not in about:
         return ""

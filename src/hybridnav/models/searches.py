@@ -247,8 +247,11 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
-    """Refuse arcs to corners, and references to arcs, that do not exist, and shortcuts that do not
-    cost what their two arcs cost: as each of these costs less, unpacking ends."""
+    """Refuse arcs to corners, and references to arcs, that do not exist.
+
+    Refuse also shortcuts that do not cost what their two arcs cost: as each of these costs less,
+    unpacking ends.
+    """
     from hybridnav._base.moves import FAR  # noqa: PLC0415 - loads numba
     from hybridnav.search.contraction import HEAD_SHIFT  # noqa: PLC0415 - loads numba
 

@@ -60,8 +60,10 @@ class PlannerCosts:
         return PlannerCosts(grid, self._preset, self.given)
 
     def changed(self, given: CostLayer, box: Box) -> tuple[PlannerCosts, Box]:
-        """Return the costs with the cells in a box as another given layer has them, and the box of
-        all cells that this changes: closed ones reach as far as the robot's radius.
+        """Return the costs with the cells in a box as another given layer has them.
+
+        Return also the box of all cells that this changes: closed ones reach as far as the robot's
+        radius.
 
         `given`: a layer of the map; it is read inside the box only; `box`: first row, last row + 1,
         first column, last column + 1 of its cells. Raises `InvalidValueError` as for the first one.
@@ -189,8 +191,11 @@ class CostFinish:
         return path, max(found.cost_m, found.length_m)
 
     def bound(self, query: Query, cost_m: float) -> float:
-        """Return a lower bound on the cost of all any-angle paths of a query, in metres, at most
-        the cost of a path that is known; where corners may be cut, the distance."""
+        """Return a lower bound on the cost of all any-angle paths of a query, in metres.
+
+        It is at most the cost of a path that is known; where corners may be cut, it is the
+        distance.
+        """
         if self._grid.corner_cutting:
             return min(query.straight_m, cost_m)
         # Loads modules that plans whose bound nobody reads do not need.

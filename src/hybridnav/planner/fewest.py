@@ -163,8 +163,11 @@ class _Sets:
 def _neighbours(
     cells: LongArray, shape: tuple[int, int], *, diagonal: bool
 ) -> tuple[LongArray, LongArray]:
-    """Return the pairs of neighbours among sorted flat cells, as their places in the array, and the
-    pairs of one of them, by its place, and a neighbour on the map, by its flat cell."""
+    """Return the pairs of neighbours among sorted flat cells, as their places in the array.
+
+    Return also the pairs of one of them, by its place, and a neighbour on the map, by its flat
+    cell.
+    """
     rows, cols = np.divmod(cells, shape[1])
     inner, outer = [], []
     for down in (-1, 0, 1):

@@ -254,9 +254,10 @@ class Planning:
     def leaving(
         self, request: PlanRequest, within_m: float | None
     ) -> tuple[PlanRequest, float | None, list[int]]:
-        """Return a request whose closed start may leave the closed cells, how long the way out is,
-        and its flat cells where the costs close the start; as it is, None, and none of them, where
-        nothing closes the start alone, or no way leads out of what does."""
+        """Return a request whose closed start may leave the closed cells, and how long the way out
+        is. The request is as it was, and the length None, where nothing closes the start alone, or
+        no way leads out.
+        """
         if self.ompl is not None or within_m is not None:
             given = (
                 "within_m" if self.ompl is None else f"OMPL, which preset {self.preset.name} has"

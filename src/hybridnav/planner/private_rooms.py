@@ -200,8 +200,10 @@ class Privacy:
         shut: Mapping[int, ClosedCells],
         links: Sequence[Sequence[tuple[int, ArrayLike]]] = (),
     ) -> dict[int, Blocked]:
-        """Return what a profile closes on each floor for a query: private rooms but those of its
-        ends and the ones that must be crossed from there, and where it cannot turn at the goal.
+        """Return what a profile closes on each floor for a query.
+
+        It closes private rooms but those of its ends and the ones that must be crossed from there,
+        and where it cannot turn at the goal.
 
         `ends`: start and goal, and what lies between: floors with points or names; `shut`: cells
         that are closed besides, by floor; `links`: the ends of each link that may be used.

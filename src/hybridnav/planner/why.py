@@ -211,8 +211,11 @@ class Case:
 
     @cached_property
     def _shut(self) -> BoolArray:
-        """All cells that are closed: for this robot as its planner closes them, for smaller ones
-        also those in closed doors that the planner spares, since this one cannot enter them."""
+        """All cells that are closed, as bool.
+
+        They are closed for this robot as its planner closes them. For smaller robots also those in
+        closed doors are that the planner spares, since this one cannot enter them.
+        """
         shut = np.zeros(self.grid.shape, np.bool_)
         for cells in self._closures.values():
             if cells.ndim == 1:

@@ -255,8 +255,11 @@ def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> Lon
 def _jambs(
     edges: LongArray, boundary_of: LongArray, free: BoolArray, is_near: BoolArray
 ) -> LongArray:
-    """Return how many ends of each boundary have a jamb: a cell that is not free, or the rim, at
-    the end of the last crack, or an occupied cell near that crack."""
+    """Return how many ends of each boundary have a jamb.
+
+    A jamb is a cell that is not free, or the rim, at the end of the last crack, or an occupied cell
+    near that crack.
+    """
     around = np.pad(free, 1)
     blocks = around[:-1, :-1] & around[:-1, 1:] & around[1:, :-1] & around[1:, 1:]
     corners = _corners(edges, free.shape[1])

@@ -153,8 +153,10 @@ def draw_markers(
 
 
 def _along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
-    """Return points along lines, a spacing apart, but not more than a line may have: a straight
-    path has points at its bends alone, and a label between two of them would hide it."""
+    """Return points along lines, a spacing apart, but not more than a line may have.
+
+    A straight path has points at its bends alone, and a label between two of them would hide it.
+    """
     found = [np.empty((0, 2))]
     for line in lines:
         where = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])[: len(line)]

@@ -342,9 +342,11 @@ class GuidedRoute:
         return tuple(found)
 
     def _joined(self, found: list[Instruction], here: list[Instruction]) -> list[Instruction]:
-        """Return the instructions on a floor behind a ride, the last one of `found`: the turn of
-        the first step belongs to the sentence of the ride, and a start that shows no direction
-        needs none."""
+        """Return the instructions on a floor behind a ride, the last one of `found`.
+
+        The turn of the first step belongs to the sentence of the ride, and a start that shows no
+        direction needs none.
+        """
         change, start = found[-1].change, here[0]
         if change is not None and change.has_exit:
             found[-1] = replace(found[-1], turn=start.turn)

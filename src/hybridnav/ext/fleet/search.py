@@ -202,8 +202,10 @@ class LinkSearch:
         return self._start.floor if part[0] == START else self._network.ends[part[0]].floor
 
     def _divide(self, floor: int) -> None:
-        """Rule out all paths between connected parts of a floor, once one path was not found: the
-        search would ask for each, and behind a shut door there are as many as ends."""
+        """Rule out all paths between connected parts of a floor, once one path was not found.
+
+        The search would ask for each, and behind a shut door there are as many as ends.
+        """
         if floor in self._divided:
             return
         self._divided.add(floor)

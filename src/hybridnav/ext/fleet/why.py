@@ -181,8 +181,10 @@ def _enclosed(
     network: LinkNetwork,
     blocked: Mapping[str, Blocked],
 ) -> Explanation | None:
-    """Return why no end of a link, nor the goal on the same floor, can be reached from the start,
-    number 0, or from the goal; None where one can, or there is none."""
+    """Return why no end of a link, nor the goal on the same floor, can be reached.
+
+    The search begins at the start, number 0, or at the goal. None where one can, or there is none.
+    """
     floor = floors[endpoints[number].floor]
     here, other = (_point_of(endpoints[which], floors) for which in (number, 1 - number))
     ways: list[tuple[float, ...]] = [

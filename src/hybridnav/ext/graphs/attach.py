@@ -128,8 +128,11 @@ class Attached:
         return self.network.sight.clear(self.starts, self.goals)
 
     def best(self) -> FloatArray:
-        """Return the length of the best route over any nodes in sight of the ends, or of the
-        segment between ends that see each other; float64 (p,) in cells, infinite for none."""
+        """Return the length of the best route over any nodes in sight of the ends.
+
+        Ends that see each other have the segment between them. Float64 (p,) in cells, infinite for
+        none.
+        """
         lengths, _, _ = shortest_routes(self.network.graph, self.from_start, self.from_goal)
         steps = self.goals - self.starts
         straight = np.where(self.direct, hypots(steps[:, 0], steps[:, 1]), np.inf)

@@ -137,8 +137,10 @@ class ChainGraph:
             self._add(ends[0], ends[1], np.concatenate([first, second[1:]]))
 
     def merge(self, near: float) -> None:
-        """Make one node of two that are nearer than a distance along a line, if only one is a room
-        or a door; doors stay apart from what lies beyond half of it."""
+        """Make one node of two that are near along a line, if only one is a room or a door.
+
+        Doors stay apart from what lies beyond half of the distance.
+        """
         heap = [(line.length, key) for key, line in self._lines.items()]
         heapq.heapify(heap)
         while heap and heap[0][0] < near:

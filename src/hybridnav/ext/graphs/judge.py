@@ -76,8 +76,10 @@ class FreeSpace:
         return outside & (self._is_large & ~outside).any()
 
     def kept(self, rooms: Rooms | None = None) -> BoolArray:
-        """Return which parts of free space get nodes, bool (n_components,): those of 1 m² or more
-        that do not lie outside the building and have a way in, as rooms in lists.
+        """Return which parts of free space get nodes, bool (n_components,).
+
+        They have 1 m² or more, and lie neither outside the building nor in rooms alone that lists
+        leave out.
 
         `rooms`: the rooms, if there are some.
         """

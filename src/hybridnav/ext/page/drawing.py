@@ -140,8 +140,10 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
 
 
 def _spots(rooms: Rooms) -> list[list[int]]:
-    """Return where the name of each room is written, its first and last column and row: the
-    rectangle of its free cells that has most room for a line of text."""
+    """Return where the name of each room is written, its first and last column and row.
+
+    It is the rectangle of its free cells that has most room for a line of text.
+    """
     free: BoolArray = rooms.grid.measured == CellClass.FREE
     inside = np.where(free, rooms.labels.label_of, -1)
     # Loads scipy's filters, which the rest of the page does not need.
@@ -159,8 +161,10 @@ def _spots(rooms: Rooms) -> list[list[int]]:
 
 
 def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
-    """Return the first and last row and column of the widest rectangle of true cells, which is at
-    least a third as high, in blocks of cells: specks of noise do not count."""
+    """Return the first and last row and column of the widest rectangle of true cells.
+
+    It is at least a third as high as wide, in blocks of cells: specks of noise do not count.
+    """
     step = -(-max(inside.shape) // _MOST_BLOCKS)
     rows, cols = (-(-n // step) for n in inside.shape)
     padded = np.zeros((rows * step, cols * step), dtype=np.bool_)

@@ -174,7 +174,8 @@ def crossed_joints(classes, free_of, positions):
 @njit(cache=True, nogil=True)
 def octile_lengths(classes, free_of, start_row, start_col, goal_row, goal_col):
     """Return the lengths of octile paths from each corner of the lattice to a goal, and from a
-    start; infinite where there is no path, and at corners too far away for a shortest path.
+    start. They are infinite where there is no path, and at corners too far away for a shortest
+    path.
 
     Such a path runs along sides and diagonals of free cells, and turns at corners where no two
     blocked cells meet alone: it is legal at any angle. A legal segment between two corners has an

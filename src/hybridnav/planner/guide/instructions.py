@@ -261,8 +261,10 @@ def _heading(line: Line, at_m: float, length_m: float) -> float:
 
 
 def _is_undone(event: Event, since: _Since) -> bool:
-    """Return whether a slight bend leads back into the direction of a person who went straight on
-    out of the door before, for the path left it by less than anyone tells."""
+    """Return whether a slight bend leads back into the direction straight out of the door before.
+
+    A person went straight on there, for the path left that direction by less than anyone tells.
+    """
     bend = event.turn
     is_slight = event.kind == "turn" and bend is not None and Turn(bend.angle_rad).is_slight
     if bend is None or not is_slight or event.at_m - since.at_m > _KEPT_M:

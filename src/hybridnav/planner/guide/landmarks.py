@@ -194,8 +194,10 @@ class Landmarks(DoorsInSight):
                 yield hit[0], room, came_by, hit[1] * frame.resolution_m, hit[2]
 
     def _is_clear(self, door: Door) -> bool:
-        """Return whether a person sees a door or an opening where a boundary lies: not where a gap
-        between two outlines has one at one side and the other at the other."""
+        """Return whether a person sees a door or an opening where a boundary lies.
+
+        A gap between two outlines that has one at one side and the other at the other shows none.
+        """
         if None not in door.rooms:
             return True
         near = [

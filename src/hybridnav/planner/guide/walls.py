@@ -141,8 +141,10 @@ class RoomWalls:
 
 
 def _sides_of(inside: BoolArray) -> tuple[LongArray, LongArray]:
-    """Return the sides of cells at which a region ends, ascending, and the index of the side that
-    follows each for a person who has the rim at the right hand.
+    """Return the sides of cells at which a region ends, ascending.
+
+    Return also the index of the side that follows each for a person who has the rim at the right
+    hand.
 
     A side is four times its flat cell, plus the number of the step over it.
     """

@@ -1,5 +1,6 @@
-"""Kernels of the base: from the cells of a grid to the darts round its blocks (see `blocks`), and
-the levels at which their cells join as they do elsewhere, or survive.
+"""Kernels of the base: from the cells of a grid to the darts round its blocks (see `blocks`).
+
+They find also the levels at which its cells join as they do elsewhere, or survive.
 """
 
 import numpy as np

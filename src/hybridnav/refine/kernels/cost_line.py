@@ -116,8 +116,11 @@ def _is_legal(free, factors, a, c):
 
 @njit(cache=True, nogil=True)
 def _spread(free, factors, line, spacing):
-    """Return a line with its points evenly spaced along it, and points of its own only where a
-    shortcut past them is not legal; the line itself if rounding makes that illegal."""
+    """Return a line with its points evenly spaced along it.
+
+    It has points of its own only where a shortcut past them is not legal, and is the line itself if
+    rounding makes that illegal.
+    """
     n = line.shape[0]
     whole = 0.0
     for i in range(1, n):

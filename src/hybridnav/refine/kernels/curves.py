@@ -67,8 +67,9 @@ def _take(kinds, lengths, best, mirror, flip, back, word, segments):
 
 @njit(cache=True, nogil=True)
 def _two_segments(x, y, phi, reverses, kinds, lengths):
-    """Try the words of at most two segments, which meet few poses, but these by rounding only:
-    return the least length, infinity where none ends within the rounding of the goal.
+    """Try the words of at most two segments, which meet few poses, but these by rounding only.
+
+    Return the least length, infinity where none ends within the rounding of the goal.
 
     A word of three segments has an empty one there. Its length may come out a little below 0, which
     forwards is a full circle. So each word here is found from the heading, and its end compared.

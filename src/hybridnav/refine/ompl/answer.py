@@ -1,5 +1,6 @@
-"""The answer to one query: corridor after corridor, until a path is found or time is up; a winding
-corridor as a chain of small problems, field by field along the coarse path.
+"""The answer to one query: corridor after corridor, until a path is found or time is up.
+
+A winding corridor is a chain of small problems, field by field along the coarse path.
 
 OMPL's bindings let no Python code draw the states of tree planners, and most states in the box
 round a winding corridor lie outside the corridor. The box round one field holds few others.

@@ -35,8 +35,10 @@ def _cost_of(costs, row, col, k):
 @guarded
 @njit(cache=True, nogil=True)
 def tree_of(costs, start, goal, limit, moves):
-    """Return the tree of cheapest paths from a node of a grid, over the nodes over which a path to
-    the goal may be cheaper than a limit, as far as the way on an empty grid tells.
+    """Return the tree of cheapest paths from a node of a grid.
+
+    It covers the nodes over which a path to the goal may be cheaper than a limit, as far as the way
+    on an empty grid tells.
 
     `costs`: int64 (4, rows, cols), the costs of moves in the first four directions, 0 where there
     is none. Moves stay in the grid. `start`, `goal`: (row, col); `limit`: cost of a path that is
@@ -132,8 +134,10 @@ def walls_round(area, row, col):
 
 @njit(cache=True, nogil=True)
 def _bend(walls, row, col, up):
-    """Return on which side strings go round the wall at a corner and on above it, or below: 1 to
-    the right, -1 to the left, and whether the wall lies there; 0 where there is no corner."""
+    """Return on which side strings go round the wall at a corner and on above it, or below.
+
+    1 to the right, -1 to the left, and whether the wall lies there; 0 where there is no corner.
+    """
     left, right = walls[row - 1, col - 1], walls[row - 1, col]
     over_left, over_right = walls[row, col - 1], walls[row, col]
     if int(left) + int(right) + int(over_left) + int(over_right) != 1:
@@ -189,8 +193,10 @@ def _runs_of(walls):
 @guarded
 @njit(cache=True, nogil=True)
 def strings_of(walls, grain, ends, points, limit):
-    """Return the lengths of taut strings from a point to all corners over which a path to another
-    point may be shorter than a limit, as far as the straight way on tells.
+    """Return the lengths of taut strings from a point to all corners that a short path may pass.
+
+    These are corners over which a path to another point may be shorter than a limit, as far as the
+    straight way on tells.
 
     The search is A*. What a corner sees is swept row by row of cells: shafts of light, each with
     two directions, fall through runs of free cells.

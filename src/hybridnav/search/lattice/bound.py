@@ -90,8 +90,11 @@ def slopes_of(
     cells: tuple[Cell, Cell],
     known: float,
 ) -> tuple[LongArray, FloatArray]:
-    """Return the slopes of the potential that `cost_bound` finds: int64 (n, 2), the cells (row,
-    col) that it covers, and float64 (n, 2), by how much it rises up and to the right in them."""
+    """Return the slopes of the potential that `cost_bound` finds.
+
+    Int64 (n, 2), the cells (row, col) that it covers, and float64 (n, 2), by how much it rises up
+    and to the right in them.
+    """
     return _bound_of(free, factors, ends, cells, known)[1:]
 
 

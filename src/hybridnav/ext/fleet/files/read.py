@@ -236,9 +236,11 @@ def _check_in_room(point: tuple[float, float], room: str, floor: Floor) -> None:
 def _at_door(
     rooms: Rooms, number: int, room: str | None, max_radius_m: float
 ) -> tuple[tuple[float, float], float | None]:
-    """Return the free point nearest to the middle of a door, on the side of a room if one is named,
-    and the direction in which one enters that room; the middle where the robot does not fit in the
-    link, and finds no free point."""
+    """Return the free point nearest to the middle of a door, and the direction in which one enters.
+
+    The point is on the side of a room if one is named. It is the middle where the robot does not
+    fit in the link, and finds no free point.
+    """
     door, grid = rooms.door(number), rooms.grid
     rows, cols = np.divmod(rooms.cells_beside(number), grid.shape[1])
     kept = grid.enterable()[rows, cols]

@@ -280,9 +280,12 @@ class _Links:
             self.findings.add("link-unread", f"stairs, way {line.id}: no level, beside {levels}")
 
     def _served_levels(self, line: osm.OsmWay) -> list[tuple[float, Point]]:
-        """Return where a link stops: at nodes that state one level, or that a foot way of the level
-        passes; else an area in its middle, and a line of two levels at its other end, or by its
-        incline."""
+        """Return where a link stops.
+
+        That is at nodes that state one level, or that a foot way of the level passes. Without such
+        nodes it is an area in its middle, and a line of two levels at its other end, or by its
+        incline.
+        """
         levels = osm.levels_of(line.tags)
         known = [(node, at) for node in line.refs if (at := self._points.get(node)) is not None]
         stops: dict[float, Point] = {}

@@ -135,8 +135,9 @@ class Mapper:
         return bool((self._seen_at > 0).any())
 
     def _grown(self, box: tuple[int, int, int, int]) -> Area | None:
-        """Make the arrays hold the first and last row and column of a box of cells that a scan may
-        meet, and return the box in metres; None if they cannot."""
+        """Make the arrays hold a box of cells that a scan may meet, by its first and last row and
+        column. Return the box in metres; None if they cannot hold it.
+        """
         if not self._grow(*box):
             if self._n_met != 1:
                 return None

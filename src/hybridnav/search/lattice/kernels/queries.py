@@ -28,7 +28,7 @@ FULL = -1
 @njit(cache=True, nogil=True)
 def _nodes_near(lattice, at, cell, nodes, costs):
     """Find the nodes in and round the block of a position that it sees, and what it costs to reach
-    each; with the node of its own part in any case.
+    each. The node of its own part is among them in any case.
 
     Return how many there are, and whether the only one is not seen.
 
@@ -65,8 +65,10 @@ def _nodes_near(lattice, at, cell, nodes, costs):
 
 @njit(cache=True, nogil=True)
 def _costs_towards(landmarks, starts):
-    """Return between what costs from each landmark a node must lie to be near the start: the lower
-    and the upper end, by the nodes from which it is reached, float64 (2, k)."""
+    """Return between what costs from each landmark a node must lie to be near the start.
+
+    These are the lower and the upper end, by the nodes from which it is reached, float64 (2, k).
+    """
     k = landmarks.shape[1]
     towards = np.empty((2, k))
     towards[0], towards[1] = np.inf, -np.inf
