@@ -61,7 +61,7 @@ _ASKS = {
     ),
     "where_am_i": _over_floors(ask.WhereAmI, ""),
     "route": _over_floors(
-        ask.Route,
+        ask.RouteAsked,
         "The cheapest route between two places of any floors, with a proof: the parts on each "
         "floor, the rides between them, and words.",
         via=(_VIA, []),

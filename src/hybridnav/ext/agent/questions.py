@@ -124,7 +124,7 @@ class Journey(Asked):
     width: Width | None = None
 
 
-class Route(Journey):
+class RouteAsked(Journey):
     """A route, and what is wanted of it."""
 
     words: bool = True
@@ -135,7 +135,7 @@ class Route(Journey):
     language: Language = "en"
 
 
-class RouteBetween(Route):
+class RouteBetween(RouteAsked):
     """The shortest path between two places, with a proof, the rooms and doors passed, and words."""
 
     within: Annotated[float, NUMBER, Field(ge=0, le=_FAR_M)] | None = None
@@ -277,7 +277,7 @@ class Facts(BaseModel):
     doors: int
 
 
-class Link(BaseModel):
+class LinkFacts(BaseModel):
     """A lift, stairs or a ramp, and the floors where it stops."""
 
     name: str
@@ -285,7 +285,7 @@ class Link(BaseModel):
     floors: list[str]
 
 
-class Part(BaseModel):
+class RoutePart(BaseModel):
     """The way on one floor, and the ride that it ends with."""
 
     floor: str
@@ -307,7 +307,7 @@ class MapAnswer(Answer):
     robot_radius_m: float | None = None
     floors: list[Facts] | None = None
     """The floors of a building, from the lowest, in place of the figures of a map."""
-    links: list[Link] | None = None
+    links: list[LinkFacts] | None = None
     closed: ClosedNow | None = None
     edits_allowed: bool | None = None
 
@@ -353,7 +353,7 @@ class RouteAnswer(WhyAnswer):
     cost_m: float | None = None
     """In a building: the length, and what rides are charged."""
     travel_s: float | None = None
-    parts: list[Part] | None = None
+    parts: list[RoutePart] | None = None
     """In a building: the way on each floor, in order."""
     short_m: float | None = None
     """Metres from the end of the path to the goal, if it cannot be reached."""

@@ -523,13 +523,13 @@ class Building:
 
 
 def legs_of(
-    building: Building, stops: Sequence[FloorWaypoint], how: Mapping[str, Any]
+    building: Building, waypoints: Sequence[FloorWaypoint], how: Mapping[str, Any]
 ) -> list[BuildingPlan]:
-    """Plan from each stop to the next, up to a leg without a route; `how` are conditions as `plan`
+    """Plan from each waypoint to the next, up to a leg without a route; `how` are conditions as `plan`
     takes them. A leg begins where the one before it ended, also in a named room."""
     legs: list[BuildingPlan] = []
-    start = stops[0]
-    for goal in stops[1:]:
+    start = waypoints[0]
+    for goal in waypoints[1:]:
         legs.append(building.plan(start, goal, **how))
         if not legs[-1].solved:
             break

@@ -149,10 +149,10 @@ def _add(sketch: Sketch, points: list[FloatArray], kind: int, near: float) -> No
         (node,) = sketch.add_nodes(point[None])
         sketch.kinds[node] = max(sketch.kinds[node], kind)
         if not (sketch.edges == node).any():
-            _lead(sketch, node, _way(sketch, point, at), near)
+            _lead(sketch, node, _line_to_next(sketch, point, at), near)
 
 
-def _way(
+def _line_to_next(
     sketch: Sketch, start: FloatArray, at: FloatArray, within: BoolArray | None = None
 ) -> FloatArray:
     """Return the way to the next of some nodes, float64 (k, 2), without its start; empty where
@@ -207,7 +207,7 @@ def _join(sketch: Sketch, node: int, at: FloatArray, within: BoolArray, near: fl
     count = len(sketch.edges)
     sketch.add_points(sketch.positions[[node]], near, within)
     if len(sketch.edges) == count:
-        _lead(sketch, node, _way(sketch, sketch.positions[node], at, within), near, within)
+        _lead(sketch, node, _line_to_next(sketch, sketch.positions[node], at, within), near, within)
 
 
 def _lead(
