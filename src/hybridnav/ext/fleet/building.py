@@ -525,8 +525,11 @@ class Building:
 def legs_of(
     building: Building, waypoints: Sequence[FloorWaypoint], how: Mapping[str, Any]
 ) -> list[BuildingPlan]:
-    """Plan from each waypoint to the next, up to a leg without a route; `how` are conditions as `plan`
-    takes them. A leg begins where the one before it ended, also in a named room."""
+    """Plan from each waypoint to the next, up to a leg without a route.
+
+    `how`: conditions as `plan` takes them. A leg begins where the one before it ended, also in a
+    named room.
+    """
     legs: list[BuildingPlan] = []
     start = waypoints[0]
     for goal in waypoints[1:]:
