@@ -56,7 +56,8 @@ def test_no_path_costs_less(field: Field, seed: int) -> None:
     loose = cost_bound(free, factors, (start, goal), own)
     bound = cost_bound(free, factors, (start, goal), own, known)
     assert max(bound, loose) <= least * (1 + 1e-9) + 1e-6
-    assert bound >= min(math.dist(*ends), known)
+    # Lengths of the own hypot may differ from these in the last bit.
+    assert bound >= min(math.dist(*ends), known) * (1 - 1e-15)
     if math.isfinite(bound):
         half = cost_bound(free, factors, (start, goal), own, loose / 2)
         assert half == pytest.approx(loose / 2, abs=1e-9)
