@@ -348,3 +348,10 @@ def test_a_map_without_doors_between_walls_says_that_it_is_no_building(cli, tmp_
     write_ros_map(grid, tmp_path / "track.yaml")
     told = cli("rooms", tmp_path / "track.yaml").out
     assert "building   no door between walls: these rooms are parts of open space" in told
+
+
+def test_a_room_without_a_free_cell_has_a_point_and_the_largest_of_none_is_not_listed():
+    grid = occupancy_grid(np.full((1, 2), CellClass.UNEXPLORED))
+    rooms = rooms_of(grid, RoomLabels(("attic", "room-1"), np.array([[0, 1]], np.int32)))
+    assert rooms.point_of("attic") == tuple(grid.frame.points_of(np.array([[0, 0]]))[0])
+    assert rooms.is_listed.tolist() == [True, False]

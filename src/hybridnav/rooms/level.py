@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.pyramid.level import LevelArc
@@ -222,9 +222,11 @@ class Rooms:
 
     @property
     def is_listed(self) -> BoolArray:
-        """bool (n_rooms,), rooms in lists and pictures. They are wider than 1 m in the mean, or the
-        largest, or have a name of their own, or the map's robot can enter them from such a one. A
-        laser sees the others through glass."""
+        """bool (n_rooms,), rooms in lists and pictures.
+
+        They are wider than 1 m in the mean, or have a name of their own, or the map's robot can
+        enter them from such a one or the largest. A laser sees the others through glass.
+        """
         return self._listing.is_listed[: len(self.names)]
 
     @cached_property
@@ -417,14 +419,17 @@ class Rooms:
             return self.labels.points[name]
         parts = self.vertices_of(name)
         cells = self.level.receptive_field(int(parts[0])) if len(parts) else self._measured(name)
+        if not len(cells):
+            raise InvalidValueError(f"room {brief(name)} has no cell, so no point stands for it")
         clear = self.clearance_m[tuple(cells.T)]
         x, y = self.grid.frame.points_of(cells[int(np.argmax(clear))])
         return float(x), float(y)
 
     def _measured(self, name: str) -> LongArray:
-        """Return the cells (row, col) of a room that were measured as free."""
+        """Return the cells (row, col) of a room that were measured as free, all if none was."""
         inside = self.labels.label_of == self.labels.index(name)
-        return np.argwhere(inside & (self.grid.measured == CellClass.FREE))
+        free = inside & (self.grid.measured == CellClass.FREE)
+        return np.argwhere(free if free.any() else inside)
 
 
 def _counted(things: str, usable: list[bool], why_not: str) -> str:

@@ -58,13 +58,14 @@ class Listing:
         n_spaces = n_rooms + n_nameless
         areas = np.bincount(space_of[is_free], minlength=n_spaces)
         is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
-        begins = is_wide | (areas == areas.max(initial=0))
-        begins[:n_rooms] |= [FOUND_NAME.fullmatch(name) is None for name in labels.names]
+        begins = is_wide | (areas == areas.max(initial=1))
+        is_own = [FOUND_NAME.fullmatch(name) is None for name in labels.names]
+        begins[:n_rooms] |= is_own
         can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
         side_m = level.grid.resolution_m
         is_large = areas * (side_m * side_m) >= _LEAST_AREA_M2
         is_listed = is_wide & can_enter & is_large
-        is_listed[:n_rooms] = (begins | can_enter)[:n_rooms]
+        is_listed[:n_rooms] = (is_wide | can_enter)[:n_rooms] | is_own
         return cls(space_of, is_listed, begins)
 
 

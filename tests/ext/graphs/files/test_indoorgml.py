@@ -312,6 +312,13 @@ def test_what_is_no_indoorgml_ends_in_one_line(tmp_path, change, words):
     assert words in reader(hn.ext.graphs.load_indoorgml, tmp_path)("a.json", content)
 
 
+@pytest.mark.parametrize("number", ["Infinity", "NaN", "-1e999"])
+def test_a_number_that_json_cannot_hold_is_refused(tmp_path, number):
+    content = json.dumps(OF_OTHERS | {"level": 7}).replace('"level": 7', f'"level": {number}')
+    words = reader(hn.ext.graphs.load_indoorgml, tmp_path)("a.json", content)
+    assert f"{number} is no number of JSON" in words
+
+
 def _places(value, path=()):
     """All places in a nested value."""
     items = value.items() if isinstance(value, dict) else enumerate(value)

@@ -438,10 +438,18 @@ def is_indoorgml(text: str) -> bool:
     return '"IndoorFeatures"' in text and '"layers"' in text
 
 
+def _finite(text: str) -> float:
+    """Return a number that JSON can hold, which Infinity, NaN and 1e999 are not."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise OverflowError(f"{text[:20]} is no number of JSON")
+    return number
+
+
 def read_indoorgml(text: str, where: str) -> IndoorModel:
     """Read a text; see `load_indoorgml`. `where`: what messages begin with."""
     with json_errors(text, where, _MOST_VALUES):
-        data = json.loads(text)
+        data = json.loads(text, parse_float=_finite, parse_constant=_finite)
     if not isinstance(data, dict) or data.get("featureType") != "IndoorFeatures":
         raise MapError(f"{where}: expected IndoorGML 2.0 in JSON, featureType IndoorFeatures")
     layers: dict[str, nx.MultiGraph[str]] = {}

@@ -250,6 +250,8 @@ def json_errors(text: str, where: str, most_values: int) -> Iterator[None]:
     except json.JSONDecodeError as failure:
         at = f"line {failure.lineno}, column {failure.colno}"
         raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None
+    except OverflowError as failure:
+        raise MapError(f"{where}: {failure}") from None
     except RecursionError:
         raise MapError(f"{where}: JSON nested deeper than anything meant") from None
     except ValueError:  # an integer of more than 4300 digits
