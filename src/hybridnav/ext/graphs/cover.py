@@ -49,43 +49,53 @@ class Aims:
     def label_of(self) -> IntArray:
         """int32 (rows, cols), the room of each cell, -1 for none."""
         none = np.full(self.space.free.shape, -1, dtype=np.int32)
-        return none if self.rooms is None else self.rooms.labels.label_of
+        return none if self.rooms is None else self.space.turn.turned(self.rooms.labels.label_of)
 
-    def _keeps(self, at: FloatArray | LongArray) -> bool:
-        return bool(self.is_kept[self.space.component_of[tuple(at.astype(np.int64))]])
+    @cached_property
+    def kept_cells(self) -> BoolArray:
+        """bool (rows, cols), the cells of these parts."""
+        kept: BoolArray = np.append(self.is_kept, np.False_)[self.space.component_of]
+        return kept
 
     @cached_property
     def rooms_to_reach(self) -> list[tuple[int, FloatArray]]:
-        """Each listed room that the robot can be in, and the position of its point, or of its cell
-        with most room if no node may lie there."""
+        """Each listed room that the robot can be in, and the position of its named point, or amid
+        its cells with most room if no node may lie there."""
         if (rooms := self.rooms) is None:
             return []
-        kept = self.space.free & np.append(self.is_kept, np.False_)[self.space.component_of]
+        clearance_m = self.space.turn.turned(rooms.clearance_m)
         found = []
         for room in np.flatnonzero(rooms.is_listed & rooms.fits).tolist():
-            at = checked_position(self.space, rooms.point_of(rooms.names[room]))
-            if at is None or not self._keeps(at):
-                cells = np.argwhere(kept & (self.label_of == room))
-                deepest = np.argsort(-rooms.clearance_m[tuple(cells.T)], kind="stable")[:1]
-                at = cells[deepest[0]] + 0.5 if len(cells) else None
+            point = rooms.labels.points.get(rooms.names[room])
+            at = None if point is None else checked_position(self.space, point)
+            if at is None or not self.kept_cells[tuple(at.astype(np.int64))]:
+                cells = np.argwhere(self.kept_cells & (self.label_of == room))
+                clear = clearance_m[tuple(cells.T)]
+                deepest = cells[clear == clear.max(initial=0.0)] + 0.5
+                at = deepest[_away(deepest).argmin()] if len(cells) else None
             if at is not None:
                 found.append((room, at))
-        return found
+        return sorted(found, key=lambda each: each[1].tolist())
 
     @cached_property
-    def doors_to_pass(self) -> list[tuple[int, LongArray]]:
+    def doors_to_pass(self) -> list[tuple[int, list[LongArray]]]:
         """The number of each listed door that the robot passes, and the moves through it between
-        free cells, int64 (n, 2, 2), the nearest to its middle first."""
+        free cells: for each arc, the longest first, int64 (n, 2, 2), those in its middle first."""
         if (rooms := self.rooms) is None:
             return []
         found = []
         for door in rooms.listed_doors:
-            moves = free_moves(rooms, door.number, self.space.free)
-            if door.passable and len(moves) and self._keeps(moves[0, 0]):
-                middle = rooms.grid.frame.positions_of(np.array([door.position]))
-                away = ((moves.mean(axis=1) + 0.5 - middle) ** 2).sum(axis=1)
-                found.append((door.number, moves[np.argsort(away, kind="stable")]))
-        return found
+            arcs = [self._moves(rooms.level.boundary(arc.index)) for arc in door.arcs]
+            arcs = sorted(filter(len, arcs), key=lambda moves: (-len(moves), moves[0].tolist()))
+            found += [(door.number, arcs)] if arcs else []
+        return sorted(found, key=lambda each: each[1][0][0].tolist())
+
+    def _moves(self, pairs: LongArray) -> LongArray:
+        """Return pairs of neighbours, int64 (n, 2, 2) cells of the map, as the turn has them."""
+        sides = np.sort(self.space.turn.there(pairs + 0.5), axis=1)  # they differ in row or col
+        sides = sides[np.lexsort(sides.reshape(-1, 4).T)]
+        moves = sides[np.argsort(_away(sides.mean(axis=1)), kind="stable")].astype(np.int64)
+        return moves[self.kept_cells[moves[..., 0], moves[..., 1]].all(axis=1)]
 
     @cached_property
     def _passes(self) -> DoorsPassed | None:
@@ -95,8 +105,9 @@ class Aims:
         """Return the doors that edges pass, float64 (m, 2, 2) positions of their ends."""
         if self._passes is None:
             return set()
-        lines = (cells_of_line(self.space.free, line) for line in ends)
-        return {number for line in lines for number in self._passes.passed(line)}
+        lines = (cells_of_line(self.space.free, line) + 0.5 for line in ends)
+        cells = (self.space.turn.back(line).astype(np.int64) for line in lines)
+        return {number for line in cells for number in self._passes.passed(line)}
 
     @cached_property
     def looked(self) -> tuple[LongArray, FloatArray]:
@@ -105,9 +116,14 @@ class Aims:
         free, step = self.space.free, self.step
         first = [(side - 1) % step // 2 for side in free.shape]
         lattice = tuple(slice(start, None, step) for start in first)
-        part_of = self.space.component_of[lattice]
-        spots = np.argwhere(free[lattice] & np.append(self.is_kept, np.False_)[part_of])
+        spots = np.argwhere(self.kept_cells[lattice])
         return spots, np.asarray(spots * step + first + 0.5, dtype=np.float64)
+
+
+def _away(positions: FloatArray) -> FloatArray:
+    """Return the square of the distance of each position from their mean, float64 (n,)."""
+    found: FloatArray = ((positions - positions.mean(axis=0)) ** 2).sum(axis=1)
+    return found
 
 
 def free_moves(rooms: Rooms, number: int, free: BoolArray) -> LongArray:
@@ -126,8 +142,8 @@ def complete(sketch: Sketch, aims: Aims, near: float) -> bool:
     passed = aims.passed(sketch.positions[sketch.edges])
     kinds = set(sketch.kinds.tolist())
     bare = [
-        (number, moves)
-        for number, moves in aims.doors_to_pass
+        (number, np.concatenate(arcs))
+        for number, arcs in aims.doors_to_pass
         if number not in passed or DOOR - 1 + number not in kinds
     ]
     for number, moves in bare:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.attach import MANY_CANDIDATES, Network
+from hybridnav.ext.graphs.orientation import Orientation
 from hybridnav.ext.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
@@ -42,6 +43,8 @@ class FreeSpace:
     """int32 (rows, cols), the connected part of each free cell, -1 elsewhere."""
     sight: Sight
     search: MeshSearch
+    turn: Orientation
+    """How the cells are turned; the grid is not."""
 
     @classmethod
     def of(cls, grid: OccupancyGrid) -> FreeSpace:
@@ -58,7 +61,14 @@ class FreeSpace:
         mesh = build_mesh(free)
         component_of = np.full(free.shape, -1, dtype=np.int32)
         component_of[free] = mesh.component[mesh.polygon_at[free]]
-        return cls(grid, free, component_of, Sight(free), MeshSearch(mesh))
+        return cls(grid, free, component_of, Sight(free), MeshSearch(mesh), Orientation(free.shape))
+
+    def turned(self, turn: Orientation) -> FreeSpace:
+        """Return this free space turned, with the same numbers of its parts."""
+        free, component_of = turn.turned(self.free), turn.turned(self.component_of)
+        return FreeSpace(
+            self.grid, free, component_of, Sight(free), MeshSearch(build_mesh(free)), turn
+        )
 
     def outside(self, rooms: RoomLabels | None = None) -> BoolArray:
         """Return which parts of free space lie outside the building, bool (n_components,).
@@ -185,11 +195,11 @@ class FreeSpace:
 def checked_position(space: FreeSpace, point: tuple[float, float]) -> FloatArray | None:
     """Return the position of a point in metres in grid units, moved off the sides of its cell, None
     where it is not free."""
-    cell = np.array(space.grid.frame.cell_of(*point))
-    rows, cols = space.free.shape
-    if not (0 <= cell[0] < rows and 0 <= cell[1] < cols and space.free[tuple(cell)]):
+    cell = np.floor(space.turn.there(np.array(space.grid.frame.cell_of(*point)) + 0.5))
+    cell = cell.astype(np.int64)
+    if not ((cell >= 0) & (cell < space.free.shape)).all() or not space.free[tuple(cell)]:
         return None
-    at = np.array([space.grid.frame.position_of(*point)])
+    at = space.turn.there(np.array([space.grid.frame.position_of(*point)]))
     at = np.clip(at, cell + RIM_CELLS, cell + 1 - RIM_CELLS)
     found: FloatArray = rounded_into(cell[None], at)[0]
     return found

@@ -19,6 +19,7 @@ from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.nav2_rules import MOST_ID
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
+from hybridnav.ext.graphs.orientation import Orientation
 from hybridnav.ext.graphs.route_messages import ids_of
 from hybridnav.ext.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
 from hybridnav.ext.graphs.strands import COVER, Layout, Passage, RoomAnchors, lines_of, strands_of
@@ -32,7 +33,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.waypoint_graph import RouteGraph, WaypointGraph
     from hybridnav.maps import OccupancyGrid
     from hybridnav.rooms import Rooms
@@ -90,7 +91,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     One lane runs in the middle of each corridor and aisle; wide halls have a net of lanes. Nodes
     lie at crossings, doors, rooms and ends of lanes, and where lanes bend. Edges run along the
     main directions of walls where there is room for it. Each is tested exactly, as in
-    `build_route_graph`. Nodes are connected exactly where free space connects them.
+    `build_route_graph`. Nodes are connected exactly where free space connects them. Turned and
+    mirrored maps have turned and mirrored lanes.
 
     Parameters
     ----------
@@ -147,11 +149,11 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     checked_between("margin_m", margin_m, 0, 100)
     space = FreeSpace.of(topology.grid)
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
-    aims = Aims(space, space.kept(rooms), max(1, round(_STEP_M / space.grid.resolution_m)), rooms)
-    part_of = _part_of(aims)
+    aims = _aims(space, space.kept(rooms), rooms)
+    space, part_of = aims.space, np.where(aims.kept_cells, aims.space.component_of, np.int32(-1))
     named = _named(space, part_of, points or {})
     progress(1, _STEPS)
-    layout = _layout(space.grid, part_of, spacing_m)
+    layout = _layout(space, part_of, spacing_m)
     drawing = _drawn(aims, part_of, layout, margin_m / space.grid.resolution_m)
     progress(2, _STEPS)
     sketch = _straightened(drawing, layout, aims)
@@ -174,17 +176,17 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
     return graph if keep is None else _renamed(graph, keep, _same(sketch, keep))
 
 
-def _part_of(aims: Aims) -> IntArray:
-    """Return the connected part of each free cell that may get lanes, int32 (rows, cols), -1
-    elsewhere."""
-    of, grid = aims.space.component_of, aims.space.grid
-    part_of = np.where(np.append(aims.is_kept, np.False_)[of], of, np.int32(-1))
-    if not (part_of >= 0).any():
+def _aims(space: FreeSpace, is_kept: BoolArray, rooms: Rooms | None) -> Aims:
+    """Return what lanes are to reach, on the map as its turn has it."""
+    grid = space.grid
+    kept = np.append(is_kept, np.False_)[space.component_of]
+    if not kept.any():
         raise InvalidValueError(
             f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
             f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
         )
-    return part_of
+    step = max(1, round(_STEP_M / grid.resolution_m))
+    return Aims(space.turned(Orientation.of(kept)), is_kept, step, rooms)
 
 
 def _named(
@@ -219,14 +221,15 @@ def _place_of(
     return settled(at)
 
 
-def _layout(grid: OccupancyGrid, part_of: IntArray, spacing_m: float | None) -> Layout:
+def _layout(space: FreeSpace, part_of: IntArray, spacing_m: float | None) -> Layout:
     """Return what strands are to be like; see `build_lane_graph`."""
+    grid = space.grid
     area_m2, cell_m = int((part_of >= 0).sum()) * grid.cell_area_m2, grid.resolution_m
     if spacing_m is None:
         # In steps of half a metre: graphs of a map that changes a little keep theirs.
         small_m = max(round(math.sqrt(area_m2)) / 2, 1.0)
         spacing_m = _APART_M if area_m2 >= _ARENA_M2 else small_m
-    directions = wall_directions(grid.measured == CellClass.OCCUPIED, cell_m)
+    directions = wall_directions(space.turn.turned(grid.measured == CellClass.OCCUPIED), cell_m)
     return Layout(
         apart=spacing_m / cell_m,
         speck=(_SPECK * spacing_m + 2 * grid.robot_radius_m) / cell_m,
@@ -242,53 +245,39 @@ def _near(layout: Layout, grid: OccupancyGrid) -> float:
 
 def _drawn(aims: Aims, part_of: IntArray, layout: Layout, margin: float) -> ChainGraph:
     """Return the lines of lanes, with a node in each room and door that they pass."""
-    space, rooms, label_of = aims.space, aims.rooms, aims.label_of
     parts = np.pad(part_of, 1, constant_values=-1)
     clearance = clearance_cells(parts < 0)
-    cells = np.empty((0, 2), np.int64) if rooms is None else _room_cells(rooms, space, part_of)
-    known = RoomAnchors(np.pad(label_of, 1, constant_values=-1), cells + 1)
+    points = [at for _, at in aims.rooms_to_reach]
+    cells = np.array(points, dtype=np.int64).reshape(-1, 2)
+    known = RoomAnchors(np.pad(aims.label_of, 1, constant_values=-1), cells + 1)
     padded = lines_of(parts, clearance, known, layout)
     lines, ends = (np.ascontiguousarray(each[1:-1, 1:-1]) for each in padded)
     kinds = np.where(ends, END, NOTHING)
-    if rooms is not None:
-        passed = np.argwhere(lines & (part_of >= 0))
-        _mark_doors(kinds, passed, rooms)
-        _mark_rooms(kinds, passed[kinds[tuple(passed.T)] < DOOR], label_of, cells)
+    _mark(kinds, lines & (part_of >= 0), aims)
     at, strands = strands_of(lines, kinds != NOTHING)
-    passage = Passage(space, clearance[1:-1, 1:-1], margin)
+    passage = Passage(aims.space, clearance[1:-1, 1:-1], margin)
     middles = np.asarray(_freed(at, part_of) + 0.5, dtype=np.float64)
     return ChainGraph(middles, kinds[tuple(at.T)], strands, passage)
 
 
-def _room_cells(rooms: Rooms, space: FreeSpace, part_of: IntArray) -> LongArray:
-    """Return a cell of each room that the robot fits into, int64 (k, 2)."""
-    named = [name for name, fits in zip(rooms.names, rooms.fits.tolist(), strict=True) if fits]
-    found = [checked_position(space, rooms.point_of(name)) for name in named]
-    cells = np.array([np.floor(at) for at in found if at is not None], dtype=np.int64)
-    cells = cells.reshape(-1, 2)
-    return cells[part_of[tuple(cells.T)] >= 0]
+def _mark(kinds: LongArray, lines: BoolArray, aims: Aims) -> None:
+    """Make a node of the passed cell of each door that is nearest to its middle, and of each room
+    that is nearest to its point."""
 
-
-def _mark_rooms(kinds: LongArray, passed: LongArray, label_of: IntArray, points: LongArray) -> None:
-    """Make a node of the passed cell of each room that is nearest to its point."""
-    label = label_of[tuple(passed.T)]
-    for point in points:
-        cells = passed[label == label_of[tuple(point)]]
+    def mark(cells: LongArray, point: FloatArray, kind: int) -> None:
         if len(cells):
-            away = ((cells - point) ** 2).sum(axis=1)
-            kinds[tuple(cells[int(away.argmin())])] = ROOM
+            away = ((cells + 0.5 - point) ** 2).sum(axis=1)
+            kinds[tuple(cells[int(away.argmin())])] = kind
 
-
-def _mark_doors(kinds: LongArray, passed: LongArray, rooms: Rooms) -> None:
-    """Make a node of the passed cell of each door that is nearest to its middle."""
-    middles, frame = rooms.level.boundary_middles, rooms.grid.frame
-    flat = passed @ np.array([kinds.shape[1], 1])
-    for door in rooms.listed_doors:
-        cells = passed[np.isin(flat, rooms.cells_beside(door.number))]
-        for arc in door.arcs if len(cells) else ():
-            middle = frame.position_of(*middles[arc.index])
-            away = ((cells + 0.5 - middle) ** 2).sum(axis=1)
-            kinds[tuple(cells[int(away.argmin())])] = DOOR - 1 + door.number
+    for number, arcs in aims.doors_to_pass:
+        for moves in arcs:
+            cells = np.unique(moves.reshape(-1, 2), axis=0)
+            middle = cells.mean(axis=0) + 0.5
+            mark(cells[lines[tuple(cells.T)]], middle, DOOR - 1 + number)
+    passed = np.argwhere(lines & (kinds < DOOR))
+    label = aims.label_of[tuple(passed.T)]
+    for room, at in aims.rooms_to_reach:
+        mark(passed[label == room], at, ROOM)
 
 
 def _straightened(drawing: ChainGraph, layout: Layout, aims: Aims) -> Sketch:
@@ -318,7 +307,7 @@ def _completed(sketch: Sketch, layout: Layout, aims: Aims) -> None:
 def _keep(sketch: Sketch, keep: RouteGraph | WaypointGraph, layout: Layout) -> None:
     """Keep a graph before where the robot can follow it."""
     space = sketch.passage.space
-    known = settled(space.grid.frame.positions_of(keep.points))
+    known = settled(space.turn.there(space.grid.frame.positions_of(keep.points)))
     old = sketch.freed(known, _SAME_M / space.grid.resolution_m)
     sketch.keep(old, keep.edges, _same(sketch, keep), _STANDS * layout.apart)
     _connect(sketch, space)
@@ -362,8 +351,8 @@ def _same(sketch: Sketch, keep: RouteGraph | WaypointGraph) -> LongArray:
     """Return which node of a graph before each node is, int64 (n,), -1 for none."""
     from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
 
-    grid = sketch.passage.space.grid
-    known = grid.frame.positions_of(keep.points)
+    grid, turn = sketch.passage.space.grid, sketch.passage.space.turn
+    known = turn.there(grid.frame.positions_of(keep.points))
     to_known = np.asarray(KDTree(known).query(sketch.positions)[1], dtype=np.int64)
     to_own = np.asarray(KDTree(sketch.positions).query(known)[1], dtype=np.int64)
     steps = known[to_known] - sketch.positions
@@ -385,7 +374,7 @@ def _described(
         for kind, known, name in zip(sketch.kinds.tolist(), by_degree, names, strict=True)
     ]
     doors = np.maximum(sketch.kinds - (DOOR - 1), 0).tolist()
-    nodes = Nodes(space, len(kinds), sketch.positions, kinds, doors)
+    nodes = Nodes(space, len(kinds), space.turn.back(sketch.positions), kinds, doors)
     both = np.concatenate([sketch.edges, sketch.edges[:, ::-1]])
     return replace(described(topology, nodes, both), names=tuple(names))
 

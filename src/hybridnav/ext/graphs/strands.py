@@ -17,7 +17,7 @@ from hybridnav.maps.clearance import clearance_cells
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.ext.graphs.judge import FreeSpace
 
 _HALL = 1.5
@@ -32,10 +32,10 @@ _STEP = 1.2
 COVER = 1.1
 """Distance from strands from which on free space gets one of its own, in distances between
 lanes."""
-_ROOM = 0.75
-"""The same for the point of a room that a strand passes already."""
 _MIDDLE_CELLS = 0.6
 """How much less clearance an end may have than any cell of its part, in cells."""
+_FARTHEST = 0.125
+"""How much nearer an end may lie than any cell of its part, in distances between lanes."""
 _ROUNDS = 12
 
 
@@ -103,7 +103,6 @@ def lines_of(
         if not tries:
             at = tuple(rooms.cells.T)
             is_bare = ~np.isin(rooms.label_of[at], rooms.label_of[lines])
-            is_bare |= (away[at] > _ROOM * layout.apart) & (clearance[at] >= layout.least)
             new = rooms.cells[is_bare] @ np.array([free.shape[1], 1])
         if not len(new):
             new = _uncovered(away, clearance, layout)
@@ -159,20 +158,30 @@ def _pillars(clearance: FloatArray, layout: Layout) -> LongArray:
 
 
 def _uncovered(away: FloatArray, clearance: FloatArray, layout: Layout) -> LongArray:
-    """Return a cell of each part that lies far from strands, flat."""
+    """Return a cell of each part that lies far from strands, flat.
+
+    It is one in the middle, so that the line there is straight, and one of the farthest; of these
+    the one amid the others.
+    """
     cover = COVER * layout.apart
     far = (away > cover) & (clearance >= layout.least)
     parts, count = ndimage.label(far)
-    flat = np.flatnonzero(far)
-    part = parts.ravel()[flat]
-    # The farthest cell of those in the middle, so that the line there is straight.
-    room = np.minimum(clearance.ravel()[flat], cover / 3)
-    most = np.zeros(count + 1)
-    np.maximum.at(most, part, room)
-    score = np.where(room >= most[part] - _MIDDLE_CELLS, away.ravel()[flat], 0.0)
-    order = np.lexsort((flat, -score, part))
-    found: LongArray = flat[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
+    room = np.minimum(clearance, cover / 3)
+    far &= room >= _most(room[far], parts[far], count)[parts] - _MIDDLE_CELLS
+    far &= away >= _most(away[far], parts[far], count)[parts] - _FARTHEST * layout.apart
+    part = parts[far]
+    n_cells = np.bincount(part, minlength=count + 1)[part]
+    off = [n_cells * x - np.bincount(part, weights=x)[part] for x in np.nonzero(far)]
+    order = np.lexsort((off[0] ** 2 + off[1] ** 2, part))
+    found: LongArray = np.flatnonzero(far)[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
     return found
+
+
+def _most(values: FloatArray, part: AnyArray, count: int) -> FloatArray:
+    """Return the greatest value of each part, from 1 to a number of them."""
+    most = np.zeros(count + 1)
+    np.maximum.at(most, part, values)
+    return most
 
 
 _SIDES = ((0, 1), (-1, 0), (0, -1), (1, 0))
