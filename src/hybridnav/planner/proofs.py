@@ -64,8 +64,8 @@ def proof_of(
     proof = problem.stated | make(problem)
     if proof.get("bound", 0.0) > proof.get("cost", 0.0) * (1 + 1e-9):
         raise PlanError(
-            f"a proof has the bound {proof['bound']!r} m, expected at most the path's cost, "
-            f"{proof['cost']!r} m: no path is cheaper than the cheapest, so please report this"
+            f"a proof has the bound {proof['bound']!r:.30} m, expected at most the path's cost, "
+            f"{proof['cost']!r:.30} m: no path is cheaper than the cheapest, so please report this"
         )
     return proof
 
