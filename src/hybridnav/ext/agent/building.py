@@ -373,8 +373,8 @@ class FloorNames:
             return self.named(on, rest, points=True)
         if on is None or len(point) != 2:  # noqa: PLR2004
             raise InvalidValueError(
-                f"a point of a building is [floor, x, y], as [{next(iter(self.on))!r:.40}, 1.5, 2.0], "
-                f"got {given!r:.80}"
+                f"a point of a building is [floor, x, y], as [{next(iter(self.on))!r:.40}, 1.5, "
+                f"2.0], got {given!r:.80}"
             )
         return on, (point[0], point[1])
 
