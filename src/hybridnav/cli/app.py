@@ -1,5 +1,7 @@
 """The command line: thin commands over the library, results on stdout, all else on stderr."""
 
+from __future__ import annotations
+
 import inspect
 import sys
 import warnings

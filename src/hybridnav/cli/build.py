@@ -1,5 +1,7 @@
 """`hybridnav build`: from a map file to a model."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated
 

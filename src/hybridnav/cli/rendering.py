@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav._base.trig import dist
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
 from hybridnav.cli.options import closing_lines, profile_lines
 
@@ -98,6 +97,8 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     """Describe one plan: its length and bound, places and arcs, what was expanded."""
     lines = []
     if figures["length_m"] is not None and figures["lower_bound"] is None:
+        from hybridnav._base.trig import dist  # noqa: PLC0415 - help does without numpy
+
         short_m = dist(figures["points"][-1], figures["goal"][:2])
         stated = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
         lines.append(f"path       {stated}")

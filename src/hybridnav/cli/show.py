@@ -1,5 +1,7 @@
 """Commands that print what there is: the parts of a map and of its pyramid, and presets."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 from typing import Annotated
