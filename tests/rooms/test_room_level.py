@@ -355,3 +355,10 @@ def test_a_room_without_a_free_cell_has_a_point_and_the_largest_of_none_is_not_l
     rooms = rooms_of(grid, RoomLabels(("attic", "room-1"), np.array([[0, 1]], np.int32)))
     assert rooms.point_of("attic") == tuple(grid.frame.points_of(np.array([[0, 0]]))[0])
     assert rooms.is_listed.tolist() == [True, False]
+
+
+def test_a_map_without_rooms_lists_none():
+    grid = occupancy_grid(np.full((1, 1), CellClass.FREE))
+    rooms = rooms_of(grid, RoomLabels((), np.full((1, 1), -1, np.int32)))
+    assert rooms.is_listed.tolist() == []
+    assert rooms.listed_doors == ()

@@ -59,7 +59,8 @@ class Listing:
         areas = np.bincount(space_of[is_free], minlength=n_spaces)
         is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
         begins = is_wide | (areas == areas.max(initial=1))
-        is_own = [FOUND_NAME.fullmatch(name) is None for name in labels.names]
+        own = [FOUND_NAME.fullmatch(name) is None for name in labels.names]
+        is_own = np.array(own, np.bool_)
         begins[:n_rooms] |= is_own
         can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
         side_m = level.grid.resolution_m

@@ -21,7 +21,7 @@ from hybridnav._base.yaml_file import read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.fleet import Building, BuildingGraph, FloorGraph
 from hybridnav.ext.graphs import WaypointGraph
-from hybridnav.ext.graphs.files.json_graphs import json_errors
+from hybridnav.ext.graphs.files.json_graphs import finite, json_errors
 from hybridnav.ext.graphs.files.lif import links_between
 from hybridnav.ext.graphs.files.rmf_read import list_of, mapping_of
 from hybridnav.ext.graphs.gather import Gathered, number_of, pair_of, shown
@@ -438,18 +438,10 @@ def is_indoorgml(text: str) -> bool:
     return '"IndoorFeatures"' in text and '"layers"' in text
 
 
-def _finite(text: str) -> float:
-    """Return a number that JSON can hold, which Infinity, NaN and 1e999 are not."""
-    number = float(text)
-    if not math.isfinite(number):
-        raise OverflowError(f"{text[:20]} is no number of JSON")
-    return number
-
-
 def read_indoorgml(text: str, where: str) -> IndoorModel:
     """Read a text; see `load_indoorgml`. `where`: what messages begin with."""
     with json_errors(text, where, _MOST_VALUES):
-        data = json.loads(text, parse_float=_finite, parse_constant=_finite)
+        data = json.loads(text, parse_float=finite, parse_constant=finite)
     if not isinstance(data, dict) or data.get("featureType") != "IndoorFeatures":
         raise MapError(f"{where}: expected IndoorGML 2.0 in JSON, featureType IndoorFeatures")
     layers: dict[str, nx.MultiGraph[str]] = {}

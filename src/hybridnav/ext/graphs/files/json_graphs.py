@@ -258,6 +258,14 @@ def json_errors(text: str, where: str, most_values: int) -> Iterator[None]:
         raise MapError(f"{where}: no JSON: a number has too many digits") from None
 
 
+def finite(text: str) -> float:
+    """Return a number that JSON can hold, which Infinity, NaN and 1e999 are not."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise OverflowError(f"{text[:20]} is no number of JSON")
+    return number
+
+
 class _Scanner:
     """A place in a text, from which value after value is read."""
 
