@@ -27,6 +27,7 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.frame import FARTHEST_M
+from hybridnav.maps.islands import unique_rows
 from hybridnav.rooms.cutting import wall_directions
 from hybridnav.topology import TopologicalMap
 
@@ -271,7 +272,7 @@ def _mark(kinds: LongArray, lines: BoolArray, aims: Aims) -> None:
 
     for number, arcs in aims.doors_to_pass:
         for moves in arcs:
-            cells = np.unique(moves.reshape(-1, 2), axis=0)
+            cells = unique_rows(moves.reshape(-1, 2)).rows
             middle = cells.mean(axis=0) + 0.5
             mark(cells[lines[tuple(cells.T)]], middle, DOOR - 1 + number)
     passed = np.argwhere(lines & (kinds < DOOR))
