@@ -124,8 +124,8 @@ def pose_of(message: Any, path: str, what: str) -> tuple[float, float, float]:
     --------
     >>> from hybridnav.messages import pose_message, pose_of
     >>> goal = {"header": {"frame_id": "map"}, "pose": pose_message((1.0, 2.0, 0.5))}
-    >>> pose_of(goal, "pose", "goal")
-    (1.0, 2.0, 0.5)
+    >>> [round(value, 9) for value in pose_of(goal, "pose", "goal")]
+    [1.0, 2.0, 0.5]
     """
     return _in_plane(message, (f"{path}.position", f"{path}.orientation"), what)
 
@@ -148,8 +148,8 @@ def transform_of(message: Any, path: str, what: str) -> tuple[float, float, floa
     >>> from hybridnav.messages import pose_message, transform_of
     >>> pose = pose_message((1.0, 2.0, 0.5))
     >>> found = {"translation": pose["position"], "rotation": pose["orientation"]}
-    >>> transform_of({"transform": found}, "transform", "robot")
-    (1.0, 2.0, 0.5)
+    >>> [round(value, 9) for value in transform_of({"transform": found}, "transform", "robot")]
+    [1.0, 2.0, 0.5]
     """
     return _in_plane(message, (f"{path}.translation", f"{path}.rotation"), what)
 
