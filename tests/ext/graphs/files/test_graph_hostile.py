@@ -132,6 +132,10 @@ def test_files_with_bytes_changed_and_cut(read, tmp_path, name, data):
     assert isinstance(found, str) or found.n_nodes >= 1
 
 
+def test_a_control_character_does_not_break_the_line_about_gml(read):
+    assert "cannot tokenize" in read("a.gml", b"\0")
+
+
 def test_no_file_and_a_folder(tmp_path):
     with pytest.raises(hn.errors.MapNotFoundError, match="no such file"):
         hn.ext.graphs.load_graph(tmp_path / "none.geojson")

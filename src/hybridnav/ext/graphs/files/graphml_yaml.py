@@ -243,7 +243,8 @@ def read_gml(text: str, where: str, name: str) -> WaypointGraph:
         read = nx.parse_gml(plain.replace("\r", "\n"), label="id")
     except (nx.NetworkXError, ValueError, TypeError, LookupError, AttributeError) as error:
         cause = " ".join(str(error).split())
-        raise MapError(f"{where}: no GML that networkx can read: {cause:.200}") from None
+        said = cause if cause.isprintable() else repr(cause)
+        raise MapError(f"{where}: no GML that networkx can read: {said:.200}") from None
     except RecursionError:
         raise MapError(f"{where}: GML nested deeper than anything meant") from None
     labels = {node: facts.get("label") for node, facts in read.nodes(data=True)}
