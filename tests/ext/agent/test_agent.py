@@ -113,19 +113,24 @@ def test_a_hundred_questions_a_map_through_the_protocol(seed, tmp_path):
     assert min(asyncio.run(main()).values()) == 13
 
 
+async def check_listed(editor: Any, reader: Any, tools: Any) -> None:
+    """Check that one client sees all functions, described, and another those that only read."""
+    listed = (await editor.list_tools()).tools
+    assert [tool.name for tool in listed] == [tool.name for tool in tools]
+    reading = [tool.name for tool in tools if not tool.edits]
+    assert [tool.name for tool in (await reader.list_tools()).tools] == reading
+    for tool in listed:
+        assert tool.description
+        assert tool.input_schema["type"] == "object"
+
+
 def test_two_clients_errors_and_a_call_that_is_cancelled(tmp_path):
     floor = PaintedFloor(0)
     path = write_floor(floor, tmp_path)
 
     async def main() -> None:
         async with connected(path, "--allow-edits") as one, connected(path) as other:
-            listed = (await one.list_tools()).tools
-            assert [tool.name for tool in listed] == [tool.name for tool in TOOLS]
-            reading = [tool.name for tool in TOOLS if not tool.edits]
-            assert [tool.name for tool in (await other.list_tools()).tools] == reading
-            for tool in listed:
-                assert tool.description
-                assert tool.input_schema["type"] == "object"
+            await check_listed(one, other, TOOLS)
             assert (await asked(one, "close", rooms=[floor.names[0]]))["ok"]
             refused = await asked(other, "close", rooms=[floor.names[0]])
             assert "--allow-edits" in refused["text"]

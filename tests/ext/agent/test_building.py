@@ -22,7 +22,7 @@ from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
 from hybridnav.ext.page import Site
 from hybridnav.ext.page.command import BuildingPage
 from tests.drawn_rooms import HOUSE, topology_of
-from tests.ext.agent.test_agent import asked, connected
+from tests.ext.agent.test_agent import asked, check_listed, connected
 from tests.ext.fleet.scenes import random_building
 from tests.strategies import examples
 
@@ -376,13 +376,7 @@ def test_a_client_asks_a_building(tmp_path):
 
     async def main() -> None:
         async with connected(file, "--allow-edits") as one, connected(file) as other:
-            listed = (await one.list_tools()).tools
-            assert [tool.name for tool in listed] == [tool.name for tool in TOOLS]
-            reading = [tool.name for tool in TOOLS if not tool.edits]
-            assert [tool.name for tool in (await other.list_tools()).tools] == reading
-            for tool in listed:
-                assert tool.description
-                assert tool.input_schema["type"] == "object"
+            await check_listed(one, other, TOOLS)
             rooms = await asked(other, "list_rooms", name="lobby")
             assert [room["floor"] for room in rooms["rooms"]] == ["1", "2"]
             found = await asked(one, "route", start="office 5", goal="2.04")
