@@ -325,12 +325,17 @@ LINES = {
 
 
 def read_by_both(folder, text, thresholds=(0.25, 0.65)):
-    """Return what the package and the checker read of a file, None where they refuse it."""
+    """Return what the package and the checker read of a file, None where they refuse it.
+
+    The checker is told the thresholds that the package read, as a proof states them; these if it
+    read none.
+    """
     (folder / "m.yaml").write_text(text)
     answers: list[object] = []
     try:
         grid = hn.load_map(folder / "m.yaml")
         answers.append((grid.measured.tolist(), frame_of(grid)))
+        thresholds = grid.free_threshold, grid.occupied_threshold
     except HybridNavError:
         answers.append(None)
     try:
