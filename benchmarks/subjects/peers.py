@@ -59,27 +59,22 @@ OPTIONS = (
     option("--repeats", type=int, default=5),
     option("--patience", type=float, default=60.0, help="seconds a planner has for the pairs"),
     option("--cells", type=int, default=1_000_000, help="free cells up to which graphs are made"),
-    option("--labels", type=float, default=100.0, help="MB that labels may take"),
     SEED,
 )
 _OPTIMA = {"cells": "octile", "any angle": "shortest"}
 
 
 class _Ours:
-    """A preset, asked for plans or for distances alone."""
+    """A preset of this package."""
 
-    def __init__(self, grid: OccupancyGrid, preset: str, *, labels: float | None = None) -> None:
+    def __init__(self, grid: OccupancyGrid, preset: str) -> None:
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
         self.planner = hn.HybridPlanner(topology, preset=preset)
-        self.planner.prepare(labels=labels)
+        self.planner.prepare()
 
     def solve(self, start: Any, goal: Any) -> float:
         """Plan; return the length in metres."""
         return float(self.planner.plan(start, goal).cost)
-
-    def distance(self, start: Any, goal: Any) -> float:
-        """Return the length in metres alone."""
-        return float(self.planner.distance(start, goal))
 
 
 def lineup(given: Namespace) -> dict[str, tuple[str, Callable[[OccupancyGrid], Any]]]:
@@ -88,10 +83,6 @@ def lineup(given: Namespace) -> dict[str, tuple[str, Callable[[OccupancyGrid], A
     return {
         "shortest": ("any angle", lambda grid: _Ours(grid, "shortest")),
         "octile": ("cells", lambda grid: _Ours(grid, "octile")),
-        "`shortest` with labels": (
-            "any angle",
-            lambda grid: _Ours(grid, "shortest", labels=given.labels),
-        ),
         "extremitypathfinder": ("any angle", ExtremityPathfinder),
         "nano-astar": ("cells", NanoAstar),
         "pyastar2d": ("cells", Pyastar2d),
@@ -148,32 +139,28 @@ def measure(path: Any, given: Namespace) -> None:
             print_row(path.stem, name, kind, "", "not asked", "", "", "")
             continue
         ready = time.process_time() - began
-        asked = {name: planner.solve}
-        if isinstance(planner, _Ours):
-            asked |= {f"{name}, `distance`": planner.distance}
-        for label, solve in asked.items():
-            ends = as_points if isinstance(planner, _Ours) else as_cells
-            solve(*ends[0])
-            seconds, answers = ask(solve, ends, given)
-            us = np.array(seconds) * 1e6
-            lengths = np.array([length_of(one, grid.resolution_m) for one in answers])
-            best.setdefault(name, lengths)
-            optimum = best[_OPTIMA[kind]][: len(lengths)]
-            solved = np.isfinite(lengths)
-            longer = (lengths[solved] / optimum[solved] - 1).mean() * 100
-            median = float(np.median(us)) if label == "shortest" else median
-            few = f", {len(us)} pairs" if len(us) < len(ends) else ""
-            missed = f", {len(solved) - solved.sum()} unsolved" if not solved.all() else ""
-            print_row(
-                path.stem,
-                label,
-                kind,
-                f"{ready:.2f}",
-                f"{np.median(us):,.3g}{few}",
-                f"{np.percentile(us, 95):,.3g}",
-                f"{np.median(us) / median:,.3g}",
-                f"{round(longer, 6) + 0.0:.2g}{missed}",
-            )
+        ends = as_points if isinstance(planner, _Ours) else as_cells
+        planner.solve(*ends[0])
+        seconds, answers = ask(planner.solve, ends, given)
+        us = np.array(seconds) * 1e6
+        lengths = np.array([length_of(one, grid.resolution_m) for one in answers])
+        best.setdefault(name, lengths)
+        optimum = best[_OPTIMA[kind]][: len(lengths)]
+        solved = np.isfinite(lengths)
+        longer = (lengths[solved] / optimum[solved] - 1).mean() * 100
+        median = float(np.median(us)) if name == "shortest" else median
+        few = f", {len(us)} pairs" if len(us) < len(ends) else ""
+        missed = f", {len(solved) - solved.sum()} unsolved" if not solved.all() else ""
+        print_row(
+            path.stem,
+            name,
+            kind,
+            f"{ready:.2f}",
+            f"{np.median(us):,.3g}{few}",
+            f"{np.percentile(us, 95):,.3g}",
+            f"{np.median(us) / median:,.3g}",
+            f"{round(longer, 6) + 0.0:.2g}{missed}",
+        )
 
 
 def main(given: Namespace) -> None:

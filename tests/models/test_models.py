@@ -20,7 +20,6 @@ from hybridnav.search.mesh import (
     ConvexMesh,
     CornerGraph,
     CornerHierarchy,
-    HubLabels,
     MeshSearch,
 )
 from hybridnav.search.octile.jumps import JumpGraph
@@ -299,7 +298,6 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.MESH, ConvexMesh, ()),
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
-        (structures.HUB_LABELS, HubLabels, ()),
         (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses")),
     ],

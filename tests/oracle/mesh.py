@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from hybridnav.search.mesh import ConvexMesh, MeshSearch
 from hybridnav.search.mesh.build import find_edges
 
-SEARCHED = "intervals", "landmarks", "hierarchy"
-"""What a search of a mesh may search, also of one that was cut."""
-KINDS = *SEARCHED, "labels"
-"""The same of a mesh as it was built."""
+KINDS = "intervals", "landmarks", "hierarchy"
+"""What a search of a mesh may search."""
 
 
 def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
@@ -25,8 +23,6 @@ def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
             "hybridnav.search.mesh.build._MOST_LOOKED", 0 if kind == "landmarks" else 10**6
         )
         search.prepare()
-    if kind == "labels":
-        assert search.label(100.0)
     return search
 
 

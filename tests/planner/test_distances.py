@@ -20,7 +20,7 @@ from hybridnav.planner import questions
 from hybridnav.search import distance_table
 from hybridnav.search.distance_table import distance_blocks
 from hybridnav.search.mesh import CornerHierarchy, MeshSearch, build_mesh
-from hybridnav.search.mesh.labels import HubTables, MeshLabels, ViewLabels
+from hybridnav.search.mesh.labels import MeshLabels, ViewLabels
 from tests.oracle.any_angle import some_positions
 from tests.oracle.grid import distances, move_graph
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -129,14 +129,6 @@ def test_every_preset_answers_with_and_without_closures(preset, monkeypatch):
     assert (table <= over * (1 + 1e-9) + 1e-8).all() == (preset in PRESETS[:3])
 
 
-def hub_tables(search: MeshSearch) -> HubTables:
-    """Tables by hub labels, from a search that has none itself."""
-    other = MeshSearch(search.mesh)
-    assert other.label(20.0)
-    assert other.labels is not None
-    return HubTables(other, other.labels)
-
-
 @PLAIN
 @given(class_grids(), st.integers(0, 99))
 def test_labels_without_a_hierarchy_agree_with_those_of_one(classes, seed):
@@ -150,11 +142,7 @@ def test_labels_without_a_hierarchy_agree_with_those_of_one(classes, seed):
     picked = some_positions(free, seed)[:8]
     cells = np.array([cell for cell, _ in picked])
     ends = cells, np.array([position for _, position in picked], np.float64)
-    for source in (
-        MeshLabels(search, search.graph),
-        ViewLabels(search, search.edges),
-        hub_tables(search),
-    ):
+    for source in (MeshLabels(search, search.graph), ViewLabels(search, search.edges)):
         for rows, columns, lengths in distance_blocks(source, ends, ends):
             for i, j in itertools.product(range(rows.start, rows.stop), range(columns.stop)):
                 (one, at), (other, to) = picked[i], picked[j]

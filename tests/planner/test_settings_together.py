@@ -34,6 +34,7 @@ import hybridnav as hn
         ("octile", "planner.method=[1]", "planner.method: should be one of 'shortest', "),
         ("octile", "planner.coarse=fast", "coarse is gone: write method, one of shortest, "),
         ("octile", "planner.coarse=[]", "coarse is gone: write method, one of shortest, "),
+        ("shortest", "planner.labels_mb=100", "labels_mb is gone: leave it out"),
         ("octile", "planner.smooth=arcs", "planner.smooth: "),
         *itertools.product(["paper", "octile"], ["planner.smooth=los"], ["planner.smooth: "]),
         ("octile", "planner.smooth=true", "planner.smooth: "),

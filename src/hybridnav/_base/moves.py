@@ -38,7 +38,6 @@ __all__ = [
     "cost_of",
     "legal_moves",
     "length_in_cells",
-    "length_of_cost",
     "moves_along",
     "octile_cost",
     "octile_distance_in_cells",
@@ -76,12 +75,6 @@ def length_in_cells(cost: ArrayLike) -> FloatArray:
     diagonal = total % STRAIGHT * _INVERSE % STRAIGHT
     straight = (total - diagonal * DIAGONAL) // STRAIGHT
     return straight + diagonal * math.sqrt(2.0)
-
-
-def length_of_cost(cost: int) -> float:
-    """Return the length of one cost, like `length_in_cells` without numpy."""
-    diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
-    return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal * math.sqrt(2.0)
 
 
 def path_length_in_cells(cells: LongArray) -> float:

@@ -12,9 +12,7 @@ from hybridnav.models.structures import (
     CORNER_EDGES,
     CORNER_GRAPH,
     CORNER_HIERARCHY,
-    HUB_LABELS,
     JUMP_GRAPH,
-    JUMP_LABELS,
     MESH,
     refusal,
 )
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
         ConvexMesh,
         CornerGraph,
         CornerHierarchy,
-        HubLabels,
         MeshSearch,
     )
     from hybridnav.search.octile import JumpSearch
@@ -102,16 +99,6 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
     parts = [MESH.part(mesh, sizes, values)]
     if search.edges is None or graph is None:
         return parts
-    labels = search.labels
-    if labels is not None:
-        of_labels = {
-            "corners": len(mesh.corners),
-            "parts": len(labels.heads),
-            "entries": len(labels.entries),
-            "squares": len(labels.begin) - 1,
-            "views": len(labels.views),
-        }
-        parts.append(HUB_LABELS.part(labels, of_labels, key))
     sizes = {"corners": len(mesh.corners), "edges": len(search.edges[1])}
     if isinstance(graph, meshes.CornerGraph):
         sizes["landmarks"] = graph.landmark_distances.shape[1]
@@ -133,18 +120,7 @@ def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch
     search.expanded = values.expanded
     if values.is_prepared:
         search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
-    if HUB_LABELS.kind in fitting:
-        search.labels = _labels_of(fitting[HUB_LABELS.kind], known, len(mesh.corners))
     return search
-
-
-def _labels_of(filed: FiledPart, known: dict[str, int], n_corners: int) -> HubLabels:
-    """Read hub labels; refuse what would lead a query out of their arrays."""
-    _check_same(filed, "corners", n_corners)
-    labels = meshes.HubLabels(**HUB_LABELS.read(filed, known))
-    if fault := labels.fault((known["rows"], known["cols"]), n_corners):
-        raise refusal(filed, fault)
-    return labels
 
 
 def _check_mesh(filed: FiledPart, mesh: ConvexMesh) -> None:
@@ -209,16 +185,7 @@ def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
         "middles": len(graph.middles),
     }
     values = key | {"origin": list(graph.origin), "shape": list(graph.shape)}
-    parts, labels = [JUMP_GRAPH.part(graph, sizes, values)], search.labels
-    if labels is not None:
-        of_labels = {
-            "corners": graph.n_corners,
-            "entries": len(labels.entries),
-            "squares": len(labels.begin) - 1,
-            "views": len(labels.views),
-        }
-        parts.append(JUMP_LABELS.part(labels, of_labels, key))
-    return parts
+    return [JUMP_GRAPH.part(graph, sizes, values)]
 
 
 def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearch:
@@ -235,15 +202,7 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
         raise refusal(filed, f"{sizes['middles']} middles for {sizes['arcs']} arcs")
     _check_index(filed, arrays["index"])
     _check_arcs(filed, arrays)
-    search = jumps.JumpSearch(jumps.JumpGraph(values.origin, values.shape, **arrays))
-    if JUMP_LABELS.kind in fitting:
-        of_labels = fitting[JUMP_LABELS.kind]
-        _check_same(of_labels, "corners", search.graph.n_corners)
-        labels = jumps.JumpHubs(**JUMP_LABELS.read(of_labels, known))
-        if fault := labels.fault(values.shape, search.graph.n_corners):
-            raise refusal(of_labels, fault)
-        search.adopt(labels)
-    return search
+    return jumps.JumpSearch(jumps.JumpGraph(values.origin, values.shape, **arrays))
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:

@@ -247,27 +247,6 @@ CORNER_HIERARCHY = Structure(
     {"corners": "4*cells", "arcs": "2000*corners"},
 )
 
-HUB_LABELS = Structure(
-    "hub labels",
-    2,
-    (
-        ArraySpec("entries", "int64", ("entries",), least=0),
-        ArraySpec("layout", "float64", (4,), least=0),
-        ArraySpec("begin", "int32", ("squares+1",), below="views", is_offsets=True),
-        ArraySpec("views", "int32", ("views", 3), least=0),
-        ArraySpec("first", "int32", ("2*corners+1",), below="parts", is_offsets=True),
-        ArraySpec("offset", "int32", ("parts+1",), below="entries", is_offsets=True),
-        ArraySpec("heads", "int32", ("parts",), least=0, below="corners"),
-    ),
-    {
-        "corners": "4*cells",
-        "parts": "400*corners",
-        "entries": "10000*corners",
-        "squares": "cells+100",
-        "views": "4096*squares",
-    },
-)
-
 JUMP_GRAPH = Structure(
     "jump graph",
     2,
@@ -287,23 +266,6 @@ JUMP_GRAPH = Structure(
         "corners": "cells",
         "arcs": "2000*corners",
         "middles": "arcs",
-    },
-)
-
-JUMP_LABELS = Structure(
-    "jump labels",
-    1,
-    (
-        ArraySpec("entries", "int64", ("entries",), least=0),
-        ArraySpec("offset", "int32", ("17*corners+1",), below="entries", is_offsets=True),
-        ArraySpec("begin", "int32", ("squares+1",), below="views", is_offsets=True),
-        ArraySpec("views", "int32", ("views", 2), least=0),
-    ),
-    {
-        "corners": "cells",
-        "entries": "10000*corners",
-        "squares": "cells+100",
-        "views": "10000*squares",
     },
 )
 
@@ -332,12 +294,10 @@ KINDS = frozenset(
         CORNER_GRAPH,
         CORNER_EDGES,
         CORNER_HIERARCHY,
-        HUB_LABELS,
         JUMP_GRAPH,
-        JUMP_LABELS,
     )
 )
 """The kinds of all parts of a model."""
 
-GONE = frozenset({"key", "portals", "portal tables"})
+GONE = frozenset({"key", "portals", "portal tables", "hub labels", "jump labels"})
 """Kinds of parts that models of earlier versions have."""

@@ -21,7 +21,7 @@ from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
 from hybridnav.planner.preset import check_radius
-from hybridnav.planner.questions import Questions, explained, prepare
+from hybridnav.planner.questions import Questions, explained
 from hybridnav.planner.settings import OmplPlannerSettings
 from hybridnav.topology.map import no_places
 
@@ -354,22 +354,15 @@ class HybridPlanner(Questions):
         with self._query():
             return self._now.plan_many((first, last), smooth, blocked)
 
-    def prepare(self, *, labels: float | None = None, progress: Progress = no_progress) -> None:
+    def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build all structures, each once, and renew stale ones; threads may plan meanwhile.
 
         Parameters
         ----------
-        labels
-            Most MB of hub labels (`shortest`, distances of `octile`), until the map changes.
         progress
             Called after each step with the number of steps done and of all steps.
-
-        Raises
-        ------
-        InvalidValueError
-            When the labels need more memory, or the preset has none; all else is prepared.
         """
-        self._preparing.alone(lambda: prepare(self._now.method, labels, progress))
+        self._preparing.alone(lambda: self._now.method.prepare(progress))
 
     def update(
         self,

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.planning import Planning
     from hybridnav.planner.private_rooms import Privacy
     from hybridnav.planner.why import Explanation
-    from hybridnav.search.found import ClosedCells, Method
+    from hybridnav.search.found import ClosedCells
 
     Block = tuple[slice, slice, FloatArray]
     Planned = Callable[[tuple[FloatArray, FloatArray]], PlanBatch]
@@ -186,7 +186,7 @@ def _distance(now: Planning, request: Any) -> float:
         return math.nan
     if not now.is_plain:
         return now.plan(request).cost
-    return now.method.cost_of(query)
+    return now.method.find(query).cost_m
 
 
 def _distances(
@@ -299,24 +299,6 @@ class _Nearest:
         kept = np.isfinite(self._cost)
         begin = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
         return sparse.csr_array((self._cost[kept], self._to[kept], begin), shape=self._shape)
-
-
-def prepare(method: Method, labels: float | None, progress: Progress) -> None:
-    """Build the structures for queries; see `HybridPlanner.prepare`."""
-    method.prepare(progress)
-    if labels is None:
-        return
-    if isinstance(labels, bool) or not 0 < labels < math.inf:
-        raise InvalidValueError(f"labels must be a number of MB > 0, got {labels!r:.40}")
-    is_made = method.label(labels, progress)
-    if is_made is None:
-        raise InvalidValueError(
-            "this preset has no hub labels: take shortest or octile, or leave labels out"
-        )
-    if not is_made:
-        raise InvalidValueError(
-            f"hub labels of this map need more than {labels:g} MB: allow more, or leave labels out"
-        )
 
 
 def explained(now: Planning, ends: Any, blocked: Any, radius_m: float | None = None) -> Explanation:

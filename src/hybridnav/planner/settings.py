@@ -179,9 +179,6 @@ class ShortestSettings(PlannerSettings):
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
     """Seconds after which a query returns the best path so far, with its proved bound; null for no
     limit. Until the planner is prepared, such queries shorten a path of cells by line of sight."""
-    labels_mb: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] | None = None
-    """Most MB of hub labels. They are built in the background once queries have had the graph of
-    corners built, and anew after a change of the map; null for none but those of `prepare`."""
 
 
 class OctileSettings(PlannerSettings):
@@ -389,12 +386,18 @@ def method_of(given: Any) -> str:
     return "own" if ":" in method else method
 
 
-def _without_coarse(given: Any) -> Any:
-    """Refuse the key by which files once chose the method: its place in the message is a method's,
-    so that of an unknown key says too little."""
-    if isinstance(given, dict) and "coarse" in given:
-        known = {"of": ", ".join(METHODS)}
-        raise PydanticCustomError("gone", "coarse is gone: write method, one of {of}", known)
+_GONE = {
+    "coarse": f"write method, one of {', '.join(METHODS)}",
+    "labels_mb": "leave it out, hub labels of single queries went; tables of distances need none",
+}
+"""Keys of former files, and what to do instead."""
+
+
+def _without_gone(given: Any) -> Any:
+    """Refuse keys of former files: the message about an unknown key says too little."""
+    for key in _GONE.keys() & given if isinstance(given, dict) else ():
+        known = {"key": key, "instead": _GONE[key]}
+        raise PydanticCustomError("gone", "{key} is gone: {instead}", known)
     return given
 
 
@@ -407,5 +410,5 @@ AnyMethod = Annotated[
     | Annotated[OmplPlannerSettings, Tag("ompl")]
     | Annotated[OwnSettings, Tag("own")],
     Discriminator(method_of),
-    BeforeValidator(_without_coarse),
+    BeforeValidator(_without_gone),
 ]

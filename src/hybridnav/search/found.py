@@ -227,17 +227,9 @@ class Method(Protocol):
         """
         return None
 
-    def cost_of(self, query: Query) -> float:
-        """Return the cost of the path that `find` finds, metres; infinite without a path."""
-        return self.find(query).cost_m
-
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:  # noqa: ARG002
         """Return what makes labels for tables of distances round closed cells; None for plans of
         each pair."""
-        return None
-
-    def label(self, most_mb: float, progress: Progress) -> bool | None:  # noqa: ARG002
-        """Build hub labels in so much memory; False if they need more, None without any."""
         return None
 
     @property

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hybridnav.harness.judges import segment_faults
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshPath, MeshSearch, SearchTrace, build_mesh, trace_search
-from tests.oracle.mesh import KINDS, SEARCHED, search_of
+from tests.oracle.mesh import KINDS, search_of
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
@@ -158,7 +158,7 @@ def test_epsilon_bounds_the_ratio_of_length_and_bound(
         assert found.length_cells <= (1 + epsilon) * found.lower_bound_cells + SLACK
 
 
-@pytest.mark.parametrize("kind", SEARCHED)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_search_out_of_time_without_a_path_still_bounds(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:

@@ -29,7 +29,7 @@ from hybridnav.search.mesh import search as searches
 from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
-    SEARCHED,
+    KINDS,
     assert_sides_agree,
     corners_in_use,
     edges_between_corners,
@@ -82,7 +82,7 @@ def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     assert twice_the_area(mesh) == 2 * left.sum()
     assert_as_fresh(mesh, left)
     assume(left.any())
-    assert_shortest([search_of(mesh, kind) for kind in SEARCHED], left, seed)
+    assert_shortest([search_of(mesh, kind) for kind in KINDS], left, seed)
 
 
 def test_a_mesh_without_a_change_is_the_same() -> None:
@@ -159,7 +159,7 @@ def test_a_renewed_mesh_is_as_good_as_a_fresh_one(maps: list[Any], seed: int) ->
         assert twice_the_area(mesh) == 2 * free.sum()
         assert_as_fresh(mesh, free)
         if free.any():
-            searches = [search_of(mesh, kind) for kind in SEARCHED]
+            searches = [search_of(mesh, kind) for kind in KINDS]
             assert_shortest([*searches, prepared_by_queries(mesh, free)], free, seed)
 
 
@@ -178,7 +178,7 @@ def test_a_door_that_opens_and_closes_leaves_the_other_polygons_as_they_are() ->
         mesh = renewed
 
 
-@pytest.mark.parametrize("kind", SEARCHED)
+@pytest.mark.parametrize("kind", KINDS)
 def test_corners_at_which_walls_run_straight_on_are_left_out(kind: str) -> None:
     old = drawn("#..", "#.#", "...", "#..", "#..", "##.", "#..") == CellClass.FREE
     free = drawn("#.#", "#..", "#.#", "#..", ".#.", "##.", "#..") == CellClass.FREE
@@ -214,7 +214,7 @@ def detour_of(
 
 
 @settings(max_examples=examples(120), deadline=None)
-@given(closures(), seeds, st.sampled_from(SEARCHED))
+@given(closures(), seeds, st.sampled_from(KINDS))
 def test_a_detour_is_the_shortest_path_of_a_mesh_without(
     case: tuple[Any, Any], seed: int, kind: str
 ) -> None:
@@ -309,7 +309,7 @@ def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
         assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
 
 
-@pytest.mark.parametrize("kind", SEARCHED[1:])
+@pytest.mark.parametrize("kind", KINDS[1:])
 def test_a_graph_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell(kind: str) -> None:
     free = np.ones((6, 9), np.bool_)
     free[2, 4] = False
@@ -393,7 +393,7 @@ def steps(
 
 
 @settings(max_examples=examples(25), deadline=None)
-@given(closures(), seeds, st.sampled_from(SEARCHED[1:]))
+@given(closures(), seeds, st.sampled_from(KINDS[1:]))
 def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
     case: tuple[Any, Any], seed: int, kind: str
 ) -> None:

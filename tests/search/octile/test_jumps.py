@@ -13,9 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.errors import ModelError
 from hybridnav.maps import CellClass
 from hybridnav.search.octile import (
     JumpPath,
@@ -25,9 +23,8 @@ from hybridnav.search.octile import (
     contract_graph,
 )
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
-from tests.search.mesh.test_hubs import planner_of, rooms
 from tests.search.test_grid_search import problem_set, scenario_files
-from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples
 
 Cell = tuple[int, int]
 
@@ -231,83 +228,3 @@ def test_lengths_are_those_that_scenarios_state(data: Path, name: str, step: int
         assert found.cells is not None
         assert_legal(found.cells, free)
         assert problem.states(found.cells), scenario
-
-
-@settings(max_examples=examples(80), deadline=None)
-@given(class_grids(max_side=14))
-def test_hub_labels_hold_the_lengths_of_shortest_paths(classes: NDArray[np.uint8]) -> None:
-    free = classes == CellClass.FREE
-    moves = move_graph(free)
-    both = searches(free)
-    assert all(search.label(free, 5.0) for search in both)
-    cells = [(row, col) for row, col in np.argwhere(free).tolist()]
-    for start in cells:
-        optima = distances(moves, free.shape, start)
-        for search, goal in itertools.product(both, cells):
-            assert search.length(start, goal) == search.path(start, goal).length_cells
-            assert search.length(start, goal) == pytest.approx(optima[goal], abs=1e-9)
-
-
-def test_hub_labels_of_a_building_are_exact_and_keep_to_their_memory() -> None:
-    free = rooms(90, 140) == CellClass.FREE
-    rng = np.random.default_rng(1)
-    pairs = rng.choice(np.argwhere(free), (400, 2))
-    for search in searches(free):
-        assert search.label(free, 20.0)
-        assert search.labels is not None
-        most_mb = search.labels.n_bytes / 1e6
-        for start, goal in pairs.tolist():
-            length = search.path(tuple(start), tuple(goal)).length_cells
-            assert search.length(tuple(start), tuple(goal)) == length
-        assert search.label(free, most_mb)
-        for share in (0.99, 0.3, 0.01):
-            assert not search.label(free, share * most_mb)
-            start, goal = pairs[0].tolist()
-            length = search.path(tuple(start), tuple(goal)).length_cells
-            assert search.length(tuple(start), tuple(goal)) == length
-
-
-def test_models_hold_hub_labels_and_a_change_of_the_map_drops_them(tmp_path: Path) -> None:
-    grid = occupancy_grid(rooms(60, 80))
-    planner = planner_of(grid, "octile")
-    planner.prepare(labels=20)
-    hn.save(planner, tmp_path / "office.hnm")
-    loaded = hn.load(tmp_path / "office.hnm").planner()
-    assert isinstance(loaded.prepared, JumpSearch)
-    assert loaded.prepared.labels is not None
-    changed = occupancy_grid(rooms(60, 80, 5))
-    rng = np.random.default_rng(2)
-    cells = rng.choice(np.argwhere(grid.enterable() & changed.enterable()), (60, 2))
-    asked = [grid.frame.points_of_grid(pair + 0.5) for pair in cells]
-    for one in (planner, loaded):
-        for pair in asked:
-            assert one.distance(*pair) == one.plan(*pair).cost
-    planner.update(grid=changed)
-    assert planner.prepared is None
-    planner.prepare(labels=20)
-    for pair in asked:
-        assert planner.distance(*pair) == planner.plan(*pair).cost
-
-
-@pytest.mark.parametrize(
-    ("name", "at", "value"),
-    [
-        ("views", (0, 0), 10**6),
-        ("entries", 0, 1 << 61),
-        ("offset", 1, 10**8),
-        ("begin", -1, 3),
-        ("begin", 2, -1),
-    ],
-)
-def test_hub_labels_that_lead_out_of_their_arrays_are_refused(
-    tmp_path: Path, name: str, at: Any, value: int
-) -> None:
-    planner = planner_of(occupancy_grid(rooms(60, 80)), "octile")
-    planner.prepare(labels=20)
-    assert isinstance(planner.prepared, JumpSearch)
-    array = getattr(planner.prepared.labels, name)
-    array.flags.writeable = True
-    array[at] = value
-    hn.save(planner, tmp_path / "office.hnm")
-    with pytest.raises(ModelError, match="jump labels"):
-        hn.load(tmp_path / "office.hnm").planner()

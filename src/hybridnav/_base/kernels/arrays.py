@@ -1,41 +1,8 @@
-"""Kernels of arrays: loading them ahead, growing them, and a heap of four branches in them."""
+"""Kernels of arrays: growing them, and a heap of four branches in them."""
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, overload
 
 from hybridnav._base.jit import njit
-
-
-def fetch(array, at):
-    """Have the processor load an entry of an array into its cache, while other work goes on."""
-
-
-@intrinsic
-def _prefetch(_, array, at):
-    def build(context, builder, signature, args):
-        view = context.make_array(signature.args[0])(context, builder, args[0])
-        index = args[1:]
-        place = cgutils.get_item_pointer(context, builder, signature.args[0], view, index)
-        pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
-        kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
-        load = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
-        # To read, into the nearest cache, data.
-        how = [number(value) for value in (0, 3, 1)]
-        builder.call(load, [builder.bitcast(place, pointer), *how])
-        return context.get_dummy_value()
-
-    return types.void(array, at), build
-
-
-@overload(fetch)
-def _compiled_fetch(array, at):  # noqa: ARG001 - numba's rule
-    def compiled(array, at):
-        _prefetch(array, at)
-
-    return compiled
 
 
 @njit(cache=True, nogil=True)

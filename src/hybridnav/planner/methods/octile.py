@@ -74,14 +74,6 @@ class OverJumps(Method):
                     progress(2, 2)
         return self._search
 
-    def label(self, most_mb: float, progress: Progress) -> bool | None:
-        """Build hub labels of the corner cells, for distances; see `Method`."""
-        if self._grid.corner_cutting:
-            return None
-        is_made = self.prepare().label(self._free(), most_mb)
-        progress(1, 1)
-        return is_made
-
     def _free(self) -> BoolArray:
         return self._grid.enterable(allow_unexplored=self._allow_unexplored)
 
@@ -115,12 +107,6 @@ class OverJumps(Method):
         length_m = path.length_cells * self._grid.resolution_m
         found = filled(Found, passed=path.cells, cost=length_m, lower_bound_m=length_m, stats=stats)
         return round_closed(found, query, self._refiner)
-
-    def cost_of(self, query: Query) -> float:
-        """Return the length of a shortest path; see `Method`."""
-        if query.closed is not None or self._search is None or self._grid.corner_cutting:
-            return self.find(query).cost_m
-        return self._search.length(*query.cells) * self._grid.resolution_m
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""

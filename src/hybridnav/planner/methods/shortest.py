@@ -95,10 +95,6 @@ class OverMesh(Method):
         self._detours: dict[ClosedCells, DetourSearch] = {}
         self._scratch = Pool(partial(np.copy, self._free))
         self._building = threading.RLock()  # a progress callback may plan
-        self._labelling, self._labels_mb = threading.Lock(), settings.labels_mb
-        self._has_begun = (
-            threading.Lock()
-        )  # taken by the query that has labels built; a copy's is free
 
     @property
     def prepared(self) -> MeshSearch | None:
@@ -109,13 +105,13 @@ class OverMesh(Method):
         """Return the method of the changed map; polygons beside changed cells are cut anew, and
         the graph of corners is stale until it is prepared again. See `Method`."""
         made, cells = OverMesh(KnownMap(change.grid, change.topology), self._settings), change.cells
-        is_renewed, search = self._is_renewed, self._search  # `label` sets them the other way
+        search = self._search
         if search is not None:
             was = enterable_of(self._grid, cells, allow_unexplored=self._allow_unexplored)
             changed = cells[was != made._free[tuple(cells.T)]]
             mesh = renew_mesh(search.mesh, made._free, changed @ self._across)
             if mesh is search.mesh:
-                made._search, made._is_renewed = search, is_renewed
+                made._search, made._is_renewed = search, self._is_renewed
             elif (mesh.component < 0).sum() <= _MOST_REMOVED * mesh.n_polygons + _FEW:
                 made._search, made._is_renewed = MeshSearch(mesh), True
         return made
@@ -127,25 +123,6 @@ class OverMesh(Method):
             progress(1, 3)
             search.prepare(lambda done, total: progress(done + 1, total + 1))
         return search
-
-    def label(self, most_mb: float, progress: Progress) -> bool:
-        """Build hub labels of the corners of the mesh; see `Method`."""
-        with self._labelling:
-            search = self._on_mesh()
-            if self._is_renewed:  # a patched mesh does not know which cells are free
-                search = MeshSearch(build_mesh(self._free))
-            is_made = search.label(most_mb, progress)
-            self._search, self._is_renewed = search, False
-        return is_made
-
-    def _label_meanwhile(self) -> None:
-        """Build labels in a thread of their own, if queries have built the graph of corners."""
-        search, most_mb = self._search, self._labels_mb
-        if most_mb is None or search is None or not search.is_prepared or search.labels is not None:
-            return
-        if self._has_begun.acquire(blocking=False):
-            build = partial(self.label, most_mb, no_progress)
-            threading.Thread(target=build, name="hybridnav labels", daemon=True).start()
 
     def _on_mesh(self) -> MeshSearch:
         """Return the search of the mesh, which is built once."""
@@ -188,15 +165,6 @@ class OverMesh(Method):
             return Found(None, stats=stats)
         return self._in_sight(query, path.lower_bound_cells, stats)
 
-    def cost_of(self, query: Query) -> float:
-        """Return the length of a shortest path; see `Method`."""
-        if query.closed is not None or self._search is None or self._budget_s is not None:
-            return self.find(query).cost_m
-        self._label_meanwhile()
-        positions = query.positions or self._positions(query)
-        length = self._search.length(query.cells, positions, epsilon=self._epsilon)
-        return length * self._placing[0]
-
     def _positions(self, query: Query) -> tuple[Position, Position]:
         """Return the points of a query as (row, col) in grid units."""
         start, goal = (self._frame.position_of(*point.tolist()) for point in query.points)
@@ -205,7 +173,6 @@ class OverMesh(Method):
     def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
         """Return the path of the search of the mesh, and the nodes expanded."""
         search = self._search
-        self._label_meanwhile()
         if search is None:
             bound = dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
@@ -260,14 +227,10 @@ class OverMesh(Method):
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
-        """Return labels in the hierarchy of corners; where it is not contracted by hubs, or on the
-        graph; with closed cells of a mesh without them. See `Method`."""
+        """Return labels in the hierarchy of corners, or on the graph where it is not contracted;
+        with closed cells of a mesh without them. See `Method`."""
         # Loads kernels for tables alone.
-        from hybridnav.search.mesh.labels import (  # noqa: PLC0415
-            HubTables,
-            MeshLabels,
-            ViewLabels,
-        )
+        from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
 
         search = self._on_mesh()
         if closed is not None:
@@ -276,8 +239,6 @@ class OverMesh(Method):
         search.prepare()
         if isinstance(search.graph, CornerHierarchy):
             return MeshLabels(search, search.graph)
-        if search.labels is not None:
-            return HubTables(search, search.labels)
         return None if search.edges is None else ViewLabels(search, search.edges)
 
     def find_many(self, queries: QueryMany) -> FoundMany | None:
@@ -290,7 +251,6 @@ class OverMesh(Method):
         cells, points, closed = queries
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
         search = self._on_mesh()
-        self._label_meanwhile()
         found = shortest_paths(search, cells, positions, epsilon=self._epsilon)
         is_done = np.ones(len(cells[0]), dtype=np.bool_)
         if closed is not None:

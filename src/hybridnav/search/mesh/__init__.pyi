@@ -5,7 +5,6 @@ from .build import (
     build_mesh as build_mesh,
 )
 from .cut import DetourSearch as DetourSearch, renew_mesh as renew_mesh
-from .hubs import HubLabels as HubLabels
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
 from .trace import (
     MeshPaths as MeshPaths,

@@ -292,7 +292,7 @@ class DetourSearch:
     @property
     def is_ready(self) -> bool:
         """Whether paths are found round the closed cells as quickly as with them open."""
-        return self._repaired is not None and self._open.labels is None
+        return self._repaired is not None
 
     def repaired(self) -> tuple[Any, Any] | None:
         """Return the corners, and their hierarchy or graph round the closed cells; None without.

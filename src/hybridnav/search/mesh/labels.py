@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.moves import FAR
 from hybridnav.search.distance_table import BLOCK, ROOM, by_number, climbing_room
-from hybridnav.search.mesh.kernels import hubs
 from hybridnav.search.mesh.kernels.ends import (
     costs_to_corners,
-    hub_labels_of_points,
     labels_of_points,
     polygons_of_points,
     straight_costs,
@@ -23,7 +21,7 @@ from hybridnav.search.mesh.search import rounded_into
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.search.distance_table import Ends, Labels
-    from hybridnav.search.mesh import CornerHierarchy, HubLabels, MeshSearch
+    from hybridnav.search.mesh import CornerHierarchy, MeshSearch
 
     Placed = tuple[FloatArray, LongArray, IntArray]
     """float64 (n, 2) points, (row, col), and their polygons: offsets, int32."""
@@ -101,37 +99,6 @@ class ViewLabels(MeshLabels):
     def goal_labels(self, ends: Placed) -> Labels:
         """Return the corners that each goal sees."""
         return views_of_points(self._mesh, ends, _view_room())
-
-
-class HubTables(MeshLabels):
-    """The same by hub labels, where there is no hierarchy.
-
-    `search`: a search with labels.
-    """
-
-    def __init__(self, search: MeshSearch, labels: HubLabels) -> None:
-        mesh = search.mesh
-        self._mesh, self._place = search.arrays, (mesh.component, mesh.polygon_at)
-        self._labels = labels.arrays
-        self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
-
-    def placed(self, ends: Ends) -> Any:
-        """Return points with the polygons that contain them, and their cells."""
-        return *super().placed(ends), ends[0]
-
-    def labels(self, ends: Any) -> Labels:
-        """Return the labels of ends."""
-        seen = np.empty(ROOM, np.int8), np.empty(ROOM, np.int32), np.empty(ROOM, np.int64)
-        room = *seen, np.full(self.n_corners, hubs.FAR)
-        return hub_labels_of_points(
-            self._mesh, self._labels, self._place[1], (ends[3], ends[0]), room
-        )
-
-    goal_labels = labels
-
-    def direct(self, starts: Any, goals: Any, table: LongArray) -> None:
-        """Set the entries of ends that see each other."""
-        super().direct(starts[:3], goals[:3], table)
 
 
 def _view_room() -> tuple[IntArray, FloatArray, IntArray]:

@@ -23,8 +23,7 @@ from hybridnav.search.mesh.build import (
     contract_corners,
     find_edges,
 )
-from hybridnav.search.mesh.hubs import HubLabels, label_corners
-from hybridnav.search.mesh.kernels import hubs, polyanya
+from hybridnav.search.mesh.kernels import polyanya
 from hybridnav.search.mesh.kernels.queries import answer
 from hybridnav.search.mesh.kernels.repairs import footing_of
 
@@ -50,8 +49,6 @@ are apart, which takes 2 to 6 ms. On two raw scans 2 % of the searches that find
 those without one would expand 7,000 and 17,000."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
-_ALONE = math.inf, 0.0, 0.0
-"""Effort of a query by hub labels for the length alone: no time for the path."""
 MOST_NEW = 1024
 """Most corners that closed cells may add to the hierarchy."""
 SURE = 1.0 - 1e-12
@@ -153,36 +150,6 @@ class _HierarchyWork(_Work):
         return *self.endpoints, self.views, self.records, self.touched, *tail
 
 
-class _HubWork(_Work):
-    """Work arrays of a query of hub labels."""
-
-    def __init__(self, mesh: ConvexMesh) -> None:
-        super().__init__(mesh)
-        n = len(mesh.corners)
-        self.sights, self.costs = np.empty((2, _ROOM), np.int8), np.empty((2, _ROOM), np.int64)
-        self.views, self.totals = np.empty((2, _ROOM), np.int32), np.empty(_ROOM, np.int64)
-        self.hubs = np.full(n, hubs.FAR), np.empty(n, np.int32)
-
-    def make_room(self) -> None:
-        self.sights = np.concatenate([self.sights, self.sights], axis=1)
-        self.views = np.concatenate([self.views, self.views], axis=1)
-        self.costs = np.concatenate([self.costs, self.costs], axis=1)
-        self.totals = np.empty(self.costs.shape[1], np.int64)
-
-    @property
-    def arrays(self) -> tuple[object, ...]:
-        """The arrays in the order of `query_hubs`."""
-        return (
-            self.sights,
-            self.views,
-            self.costs,
-            self.totals,
-            *self.hubs,
-            self.counts,
-            self.bounds,
-        )
-
-
 @copies_alike
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
@@ -223,9 +190,6 @@ class MeshSearch:
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
-        self.labels: HubLabels | None = None
-        """Hub labels of the corners, which answer all queries; None unless they were asked for."""
-        self._hub_works: Pool[Any] = Pool(partial(_HubWork, mesh))
         self.is_prepared = False
         """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock, self._begun = threading.Lock(), threading.Lock()
@@ -288,33 +252,8 @@ class MeshSearch:
         assert isinstance(self._graph, CornerHierarchy)  # noqa: S101 - the caller has looked
         return footing_of(self.arrays, self._graph.arrays[:4])
 
-    def label(self, most_mb: float, progress: Progress = no_progress) -> bool:
-        """Build hub labels of the corners, which answer later queries in microseconds.
-
-        The mesh must be as it was built: one that was renewed does not know which cells are free.
-
-        Parameters
-        ----------
-        most_mb
-            Most memory of the labels, in 10^6 bytes.
-        progress
-            See `prepare`.
-
-        Returns
-        -------
-        bool
-            False if they need more memory: queries are then answered as before.
-        """
-        self.prepare()
-        if self.edges is not None:
-            made = label_corners(self.mesh, self.arrays, self.edges, most_mb, progress)
-            self.labels = made
-        return self.labels is not None
-
-    def engine(self) -> tuple[CornerGraph | CornerHierarchy | HubLabels | None, Pool[Any]]:
+    def engine(self) -> tuple[CornerGraph | CornerHierarchy | None, Pool[Any]]:
         """Return what answers queries, None for the mesh itself, and its work arrays."""
-        if self.labels is not None:
-            return self.labels, self._hub_works
         graph = self._graph
         return graph, self.works if graph is None else self.corner_works
 
@@ -367,7 +306,7 @@ class MeshSearch:
             upper = float(hypots(*np.diff(known, axis=0).T).sum())
         (row, col), (to_row, to_col) = positions
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        graph, works = self.engine() if repaired is None else (self._graph, self.corner_works)
+        graph, works = self.engine()
         arrays = self.blocks if graph is None else graph.arrays
         on: Sequence[Any] = (self.arrays, arrays)
         are_apart: Callable[[], bool] | None = None
@@ -380,21 +319,6 @@ class MeshSearch:
             self.expanded += expanded
         bound = length if bound >= length else bound * SURE
         return MeshPath(path if len(path) else known, length, bound, expanded)
-
-    def length(
-        self, cells: tuple[Cell, Cell], positions: tuple[Position, Position], *, epsilon: float
-    ) -> float:
-        """Return the length in cells of the path that `path` finds, infinite for none."""
-        graph, works = self.engine()
-        if graph is None:
-            return self.path(cells, positions, epsilon=epsilon).length_cells
-        (row, col), (to_row, to_col) = positions
-        ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        effort = (math.inf, epsilon, math.inf) if self.labels is None else _ALONE
-        work = works.take()
-        length = self._run((self.arrays, graph.arrays), ends, work, effort)[2]
-        works.give(work)
-        return length
 
     def _run(
         self,

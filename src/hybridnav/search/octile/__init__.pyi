@@ -1,4 +1,3 @@
-from .hubs import JumpHubs as JumpHubs
 from .jumps import (
     JumpGraph as JumpGraph,
     build_jump_graph as build_jump_graph,

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.moves import FAR, length_of_cost
+from hybridnav._base.moves import FAR
 from hybridnav._base.threads import SHARES, Pool, cores
 from hybridnav.maps.geometry import centres
 from hybridnav.search.contraction import contract, renumbered
-from hybridnav.search.octile.hubs import JumpHubs, label_corner_cells
 from hybridnav.search.octile.kernels import queries as kernels
-from hybridnav.search.octile.kernels.hubs import hub_cost
 from hybridnav.search.octile.kernels.legs import (
     COLUMN_BITS,
     KIND_BITS,
@@ -277,57 +275,6 @@ class JumpSearch:
         arcs = graph.first, graph.arcs
         self.arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
         self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
-        self.labels: JumpHubs | None = None
-        """Hub labels of the corner cells, which answer for lengths; None unless asked for."""
-        self._hub_works: Pool[Any]
-
-    def label(self, free: BoolArray, most_mb: float) -> bool:
-        """Build hub labels of the corner cells, which answer for lengths in microseconds.
-
-        Parameters
-        ----------
-        free
-            bool (rows, cols), the free cells of the map.
-        most_mb
-            Most memory of the labels, in 10^6 bytes.
-
-        Returns
-        -------
-        bool
-            False if they need more memory: lengths are then found as before.
-        """
-        graph = self.graph
-        plain = build_jump_graph(free) if graph.is_contracted else graph
-        # Corner cells that are contracted last are on most paths: half as many entries as by counts
-        # of paths from some of them.
-        ranked = np.empty(graph.n_corners, np.int32)
-        order = (graph if graph.is_contracted else contract_graph(graph)).order
-        ranked[order] = np.arange(graph.n_corners)
-        is_free = np.zeros(graph.shape, np.bool_)
-        (top, left), (rows, cols) = graph.origin, graph.shape
-        is_free[1:-1, 1:-1] = free[top + 1 : top + rows - 1, left + 1 : left + cols - 1]
-        corners = plain.places, plain.first, plain.arcs, ranked
-        self.adopt(label_corner_cells(self.arrays[0], graph.places, corners, is_free, most_mb))
-        return self.labels is not None
-
-    def adopt(self, labels: JumpHubs | None) -> None:
-        """Use hub labels of the same graph for lengths; None for none."""
-        if labels is not None:
-            self._hub_works = Pool(partial(labels.room, self.graph.n_corners))
-        self.labels = labels
-
-    def length(self, start: Cell, goal: Cell) -> float:
-        """Return the length in cells of a shortest path, infinite for none."""
-        labels, graph = self.labels, self.graph
-        if labels is None:
-            return self.path(start, goal).length_cells
-        (top, left), width = graph.origin, graph.shape[1]
-        ends = tuple((row - top) * width + col - left for row, col in (start, goal))
-        work = self._hub_works.take()
-        corners = graph.places, graph.component, labels.ranges
-        cost = hub_cost(self.arrays[0], corners, labels.arrays, ends, work)
-        self._hub_works.give(work)
-        return length_of_cost(cost) if cost < FAR else math.inf
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
         """Find a shortest path between two free cells."""

@@ -6,10 +6,8 @@ from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.kernels.labels import climb, grow_rows
-from hybridnav.search.mesh.kernels.hubs import FAR as UNREACHED
-from hybridnav.search.mesh.kernels.hubs import is_hidden, view_of_square
 from hybridnav.search.mesh.kernels.intervals import polygon_in, polygons_with
-from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, lobe_of, see_from_point
+from hybridnav.search.mesh.kernels.views import class_of, cost_of, lobe_of, see_from_point
 
 
 @guarded
@@ -101,47 +99,6 @@ def labels_of_points(mesh, hierarchy, ends, room, work):
             may_follow[i] = np.int64(-1) if is_on else follow[kind, class_of(kind, dx, dy)]
         seeds = seen, to_seen, may_follow
         nodes, costs, n, heap = climb(hierarchy, seeds, (records, heap), nodes, costs, n)
-        offset[k + 1] = n
-    return offset, nodes[:n], costs[:n]
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def hub_labels_of_points(mesh, hub_labels, polygon_at, ends, room):
-    """Return the labels of points by hubs, as `views_of_points` returns views.
-
-    `mesh`: see `successors`; `hub_labels`: the arrays of `HubLabels`; `polygon_at`: int32 (rows,
-    cols), -1 for cells that are not free; `ends`: int64 (n, 2) free cells, float64 (n, 2) points in
-    their closed squares, (row, col); `room`: room for the corners of a square, int8, int32 and
-    int64; int64 (hubs,) least distances.
-    """
-    entries, layout, _, views = hub_labels[:4]
-    shift, units = int(layout[2]), layout[3] * UNITS
-    mask = (np.int64(1) << shift) - 1
-    cells, points = ends
-    sights, views_at, to_seen, least = room
-    offset = np.zeros(len(points) + 1, np.int64)
-    nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
-    for k in range(len(points)):
-        y, x = points[k, 0], points[k, 1]
-        n_seen = view_of_square(mesh, hub_labels, x, y, sights, views_at, to_seen)
-        begin = n
-        for i in range(n_seen):
-            seen, first, last = views[views_at[i]]
-            if is_hidden(
-                mesh, polygon_at, (cells[k, 0], cells[k, 1]), (x, y), seen >> 8, sights, i
-            ):
-                continue
-            for packed in entries[first:last]:
-                hub, reached = packed >> shift, to_seen[i] + (packed & mask)
-                if least[hub] == UNREACHED:
-                    if n == len(nodes):
-                        nodes, costs = grow(nodes), grow(costs)
-                    nodes[n] = hub
-                    n += 1
-                least[hub] = min(least[hub], reached)
-        for i in range(begin, n):
-            costs[i], least[nodes[i]] = np.int64(least[nodes[i]] * units), UNREACHED
         offset[k + 1] = n
     return offset, nodes[:n], costs[:n]
 

@@ -12,7 +12,6 @@ from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
 from hybridnav.search.mesh.kernels.closures import look_round
 from hybridnav.search.mesh.kernels.corner_search import query_corners
-from hybridnav.search.mesh.kernels.hubs import query_hubs
 from hybridnav.search.mesh.kernels.intervals import APART, MET, polygons_of_endpoints
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
@@ -162,8 +161,8 @@ def many(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
     mesh
         See `successors`.
     graph
-        Arrays of a `CornerGraph`, a `CornerHierarchy` or `HubLabels`; for a search of intervals
-        the block of each slot, and the tree of `query`.
+        Arrays of a `CornerGraph` or a `CornerHierarchy`; for a search of intervals the block of
+        each slot, and the tree of `query`.
     place
         Component of polygons, and the polygon of each cell.
     asked
@@ -207,7 +206,7 @@ def _answer(mesh, graph, place, where, points, work, effort):
     """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
     if isinstance(graph[1], tuple):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
-    kernel = {6: query_corners, 5: query_hierarchy}.get(len(graph), query_hubs)
+    kernel = query_corners if len(graph) == 6 else query_hierarchy
     return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
@@ -224,14 +223,9 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
     def by_hierarchy(mesh, graph, place, where, points, work, effort):
         return query_hierarchy(mesh, graph, (place[0], place[1], where), points, work, effort)
 
-    def by_hubs(mesh, graph, place, where, points, work, effort):
-        return query_hubs(mesh, graph, (place[0], place[1], where), points, work, effort)
-
     if isinstance(graph[1], types.BaseTuple):
         return by_intervals
-    if len(graph) == 6:
-        return by_corners
-    return by_hierarchy if len(graph) == 5 else by_hubs
+    return by_corners if len(graph) == 6 else by_hierarchy
 
 
 # Kernels of the search of the hierarchy of corners: shortest any-angle paths.

@@ -23,8 +23,6 @@ from hybridnav.search.contraction import pack
 _LEFT, _RIGHT = 1, 2
 _BENDING = 4
 """Paths may bend round corners of kinds below this one."""
-_OF_MANY = 4
-"""Length of a target that stands for many points."""
 
 
 @njit(cache=True, nogil=True)
@@ -290,7 +288,7 @@ def has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's r
 
     if isinstance(target[0], types.Float):
         return one
-    return many if len(target) == _OF_MANY else None  # `kernels.squares` has another kind
+    return many
 
 
 @njit(cache=True, nogil=True)
