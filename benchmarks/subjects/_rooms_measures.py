@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks.common import print_head, print_row
+from benchmarks.subjects._rooms_agreement import compare_rooms
 from benchmarks.subjects._rooms_buildings import SITES, Building
 from benchmarks.subjects.train_rooms import Training, of_generated
-from hybridnav.harness.judges import compare_rooms
 from hybridnav.rooms.find import judged_rooms
 
 if TYPE_CHECKING:

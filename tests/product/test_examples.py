@@ -37,7 +37,6 @@ RETURNED = {
     "harness.judges.AnyAnglePath",
     "harness.judges.Buckets",
     "harness.judges.PairedDifference",
-    "harness.judges.RoomAgreement",
     "harness.judges.Summary",
     "harness.judges.Verdict",
     "pyramid.DualGraph",

@@ -8,7 +8,6 @@ from .judge import (
     segment_faults as segment_faults,
 )
 from .judge_line import judge_line as judge_line, line_cells as line_cells
-from .statistics import RoomAgreement as RoomAgreement, compare_rooms as compare_rooms
 from .statistics import (
     Buckets as Buckets,
     PairedDifference as PairedDifference,
