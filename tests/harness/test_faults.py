@@ -278,13 +278,10 @@ def test_a_data_frame_holds_what_the_tables_say(study):
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("costs", [(), ("clearance",)])
 def test_head_tables_records_and_data_frame_count_alike(tmp_path, cli, costs):
-    liar = f"class: '{name_of(faulty.Liar)}'"
-    entries = [f"{{name: liar {seed}, {liar}, settings: {{seed: {seed}}}}}" for seed in range(6)]
-    file = tmp_path / "methods.yaml"
-    file.write_text(f"methods: [{', '.join(entries)}, {{class: '{name_of(faulty.TornRegion)}'}}]")
     run, by = tmp_path / "run", [f"--costs={cost}" for cost in costs]
-    words = [str(write_map(tmp_path, ROOMS)), "--methods", str(file), "--pairs", "20", *by]
-    said = cli("evaluate", *words, "-o", str(run))
+    for name in (*(f"Liar{seed}" for seed in range(6)), "TornRegion"):
+        by += ["--baseline", f"{faulty.__name__}:{name}"]
+    said = cli("evaluate", str(write_map(tmp_path, ROOMS)), "--pairs", "20", *by, "-o", str(run))
     assert said.code == 1
 
     def number(pattern, text):

@@ -414,11 +414,9 @@ def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
     mark = uuid.uuid4().hex
     monkeypatch.setenv(MARK, mark)
     out = tmp_path / "run"
-    methods = tmp_path / "methods.yaml"
-    settings = "{planner.ompl.planner: RRTstar, planner.ompl.budget_s: 0.3}"
-    star = f"{{name: star, preset: ompl, settings: {settings}}}"
-    methods.write_text(f"methods: [{star}]")
-    arguments = ["evaluate", FIGURE, "--preset", "ompl", "--methods", methods]
+    star = tmp_path / "star.yaml"
+    star.write_text("planner: {method: ompl, ompl: {planner: RRTstar}}")
+    arguments = ["evaluate", FIGURE, "--preset", "ompl", "--preset", star]
     arguments += ["--set", "planner.ompl.budget_s=0.3", "--pairs", 5, "--workers", 2, "-o", out]
     done = cli(*arguments)
     assert (done.code, done.err) == (0, "")

@@ -1,4 +1,4 @@
-"""Methods by name: aliases, files of methods, classes that were mended, tracebacks."""
+"""Methods by name: aliases, names and settings, classes that were mended, tracebacks."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study, to_frame
 from hybridnav.harness.columns import rows_of_study
 from hybridnav.harness.methods import BASELINES, baseline_spec
-from hybridnav.harness.names import NamedMethod, class_of, load_methods, source_hash
+from hybridnav.harness.names import NamedMethod, class_of, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
@@ -301,16 +301,14 @@ def test_a_class_is_another_one_when_a_file_that_it_imports_was_mended(tmp_path,
     assert source_hash("builtins:object") == ""
 
 
-def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
-    file = tmp_path / "methods.yaml"
-    file.write_text(
-        "methods:\n"
-        "- {name: 'HPA* (20)', baseline: 'HPA*', settings: {cluster_cells: 20}}\n"
-        "- {name: heavy, class: 'mine:Mine', settings: {weight: 2}}\n"
-        "- {class: 'mine:Mine', settings: {weight: 1}}\n"
-        "- {name: 'near', preset: shortest, settings: {planner.epsilon: 0.1}}\n"
+def test_methods_have_names_and_settings_of_their_own(settings, tmp_path):
+    named = (
+        NamedMethod("baseline", "HPA*", "HPA* (20)", {"cluster_cells": 20}),
+        NamedMethod("class", "mine:Mine", "heavy", {"weight": 2}),
+        NamedMethod("class", "mine:Mine", settings={"weight": 1}),
+        NamedMethod("preset", "shortest", "near", {"planner.epsilon": 0.1}),
     )
-    run = replace(settings, baselines=(), methods=load_methods(file))
+    run = replace(settings, baselines=(), methods=named)
     evaluate(run, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     assert study.faults == []
@@ -345,41 +343,6 @@ def test_a_class_that_fails_costs_no_reference(settings, tmp_path):
     # Beside a method that works the reference is asked.
     assert evaluate(replace(only, baselines=("thrun",)), tmp_path / "run") == 2 * made
     assert write_outputs(tmp_path / "run").labels == ["grid-astar", "thrun", "bad"]
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "expected a list under the key methods"),
-        ("methods: {}", "expected a list"),
-        ("methods: [1]", "entry 1: expected keys and values"),
-        ("methods: [{preset: paper, colour: red}]", "no key 'colour'"),
-        ("methods: [{name: x}]", "expected one of baseline, class, preset, graph"),
-        ("methods: [{preset: paper, baseline: thrun}]", "expected one of"),
-        ("methods: [{class: mine}]", "must be written module:class"),
-        ("methods: [{preset: 3}]", "must be texts"),
-        ("methods: [{preset: paper, settings: 3}]", "settings must be keys with values"),
-        ("methods: [{preset: paper, settings: {a: 2020-01-01}}]", "must be numbers and texts"),
-        ("methods: [{preset: paper}, {preset: paper}]", "two are called paper"),
-        ("methods: [{preset: paper, grid: 3}]", "entry 1: grid has the keys robot_radius_m"),
-        ("methods: [{preset: paper, grid: {radius: 3}}]", "grid has the keys"),
-        ("methods: [{preset: paper, grid: {robot_radius_m: -1}}]", "number of metres, got -1"),
-        ("methods: [{preset: paper, grid: {robot_radius_m: .nan}}]", "number of metres, got nan"),
-        ("methods: [{preset: paper, grid: {corner_cutting: 1}}]", "true or false, got 1"),
-        ("methods: [", "methods .*yaml"),
-    ],
-)
-def test_a_file_of_another_form_is_refused_in_one_line(tmp_path, text, words):
-    file = tmp_path / "methods.yaml"
-    file.write_text(text)
-    with pytest.raises(InvalidValueError, match=words) as refusal:
-        load_methods(file)
-    assert "\n" not in str(refusal.value)
-
-
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InvalidValueError, match="No such file"):
-        load_methods(tmp_path / "none.yaml")
 
 
 def test_a_module_that_cannot_be_imported_is_told_at_once(settings, tmp_path):

@@ -221,47 +221,6 @@ def test_the_report_has_the_sentence_below_its_tables(folder, study):
     assert ahead == (part is not None and "grid-astar" in part[1])
 
 
-# --- a grid of its own --------------------------------------------------------------------------
-
-
-def run_on(folder, **grid):
-    own = NamedMethod("baseline", "A*", "other grid", {}, grid)
-    settings = RunSettings(
-        maps=(str(write_map(folder, ROOMS)),),
-        presets=(),
-        methods=(own,),
-        pairs=20,
-        robot_radius_m=1.0,
-    )
-    evaluate(replace(settings), folder / "run")
-    return load_study(folder / "run").of_method("other grid")[0]
-
-
-def test_a_method_for_a_larger_robot_is_judged_on_the_grid_of_the_run(tmp_path):
-    outcome = run_on(tmp_path, robot_radius_m=2.0)
-    assert outcome.faults == []
-    solved = [r for r in outcome.records if r["status"] == "solved"]
-    assert solved
-    # Its "no path" is about its own grid: no answer to this run's question.
-    reasons = {r["status"] for r in outcome.records} - {"solved"}
-    assert reasons <= {"start or goal is not free on its own grid", "no path on its own grid"}
-    assert reasons
-    assert all(r["bound"] is None for r in solved)
-    assert outcome.preparation["grid"] == {"robot_radius_m": 2.0}
-
-
-def test_a_method_for_a_smaller_robot_runs_into_walls(tmp_path):
-    outcome = run_on(tmp_path, robot_radius_m=0.0)
-    assert any("is not free" in text for _, text in outcome.faults)
-
-
-def test_a_method_with_another_corner_rule_is_found_out(tmp_path):
-    outcome = run_on(tmp_path, corner_cutting=True)
-    assert any("cuts a corner" in text for _, text in outcome.faults)
-    study = load_study(tmp_path / "run")
-    assert rows_of_methods(study)[1]["settings"] == "on a grid with corner_cutting true"
-
-
 QUERY_S = 0.05
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.harness import RunSettings, evaluate, load_methods
+from hybridnav.harness import NamedMethod, RunSettings, evaluate
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.judges import judge_path
 from hybridnav.harness.output import write_outputs
@@ -71,12 +71,9 @@ def test_a_process_that_ends_says_how(tmp_path, monkeypatch):
     """By `os._exit(3)`, `sys.exit`, and a signal."""
     monkeypatch.setenv("PYTHONPATH", importable())
     ends = {"exit": "3", "leave": "5", "kill": "-9"}
-    entries = [
-        f"{{name: {name}, class: '{name_of(faulty.Ends)}', settings: {{how: {name}}}}}"
-        for name in ends
-    ]
-    (tmp_path / "m.yaml").write_text(f"methods: [{', '.join(entries)}]")
-    methods = load_methods(tmp_path / "m.yaml")
+    methods = tuple(
+        NamedMethod("class", name_of(faulty.Ends), name, {"how": name}) for name in ends
+    )
     file = str(write_map(tmp_path, ["...", "..."]))
     evaluate(RunSettings(maps=(file,), presets=(), methods=methods, pairs=1), tmp_path / "run")
     pairs = [one for one in read_records(tmp_path / "run") if one["type"] == "pair"]

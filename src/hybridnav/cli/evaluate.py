@@ -28,15 +28,6 @@ BaselinesOption = Annotated[
         help="A baseline, or module:class; may be given several times.",
     ),
 ]
-MethodsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--methods",
-        metavar="FILE",
-        help="A YAML file of methods: presets, baselines, classes and graphs with names and "
-        "settings.",
-    ),
-]
 GraphsOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -110,7 +101,6 @@ def evaluate(
     out: options.OutOption[Path],
     preset: options.PresetOption[list[str] | None] = None,
     baseline: BaselinesOption = None,
-    methods: MethodsOption = None,
     graph: GraphsOption = None,
     floor: options.GraphFloorOption = None,
     clear_edges: ClearEdgesOption = False,
@@ -146,7 +136,6 @@ def evaluate(
         raise UsageError(
             "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
         )
-    from hybridnav.harness.names import load_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -163,14 +152,13 @@ def evaluate(
     if floor is not None and not graph:
         raise UsageError("--floor goes with --graph: name the graph, or leave it out")
     _check_maps(map_files)
-    others = baseline or graph or methods
+    others = baseline or graph
     names = preset if preset is not None else ([] if others else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
         graphs=tuple(_graph(file, floor) for file in graph or ()),
-        methods=() if methods is None else load_methods(methods),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,

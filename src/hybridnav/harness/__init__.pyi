@@ -1,6 +1,6 @@
 from .analysis import Study as Study, load_study as load_study, to_frame as to_frame
 from .tables import compare_runs as compare_runs
-from .names import NamedMethod as NamedMethod, load_methods as load_methods
+from .names import NamedMethod as NamedMethod
 from .output import write_outputs as write_outputs
 from .run import RunSettings as RunSettings, evaluate as evaluate
 from .workers import distances_on_cluster as distances_on_cluster

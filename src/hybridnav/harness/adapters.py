@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._base.typing import IntArray
-    from hybridnav.harness.baselines import Solver
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import Metric, PlanResult, PlanStats, Preset
@@ -218,45 +216,3 @@ def checked(answer: object) -> MethodResult:
             "or MethodResult(None) for no path"
         )
     return answer
-
-
-class OnOwnGrid:
-    """A method on a grid of its own.
-
-    Its paths are judged on the grid of the run. Its plans, its bounds and its "no path" are about
-    its own grid: they are not passed on, and a query without a path has no answer.
-
-    `method`: the method, made for `grid`; `grid`: its grid, of the same cells as that of the run.
-    """
-
-    region_of = None
-
-    def __init__(self, method: Solver, grid: OccupancyGrid) -> None:
-        self._method = method
-        self._free = grid.classes == CellClass.FREE
-        self.name = method.name
-        self.n_nodes, self.n_edges = method.n_nodes, method.n_edges
-        self.memory_bytes = method.memory_bytes
-        self.version = getattr(method, "version", "")
-        self.settings = getattr(method, "settings", "")
-
-    def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        """Plan between two cells that are free on the grid of the run."""
-        if not (self._free[start] and self._free[goal]):
-            return MethodResult(None, gave_up="start or goal is not free on its own grid")
-        answer = checked(self._method.solve(start, goal))
-        line, claim = answer.any_angle, answer.by_costs
-        return replace(
-            answer,
-            proof=None,
-            nodes=None,
-            arcs=None,
-            bound=math.inf,
-            any_angle=None if line is None else replace(line, lower_bound_m=0.0),
-            by_costs=None if claim is None else replace(claim, lower_bound_m=0.0),
-            gave_up="" if answer.is_path else answer.gave_up or "no path on its own grid",
-        )
-
-    def close(self) -> None:
-        """End the processes of the method."""
-        close_method(self._method)

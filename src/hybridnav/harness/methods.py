@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.adapters import FoundMethod, HybridMethod, OnOwnGrid, close_method
+from hybridnav.harness.adapters import FoundMethod, HybridMethod, close_method
 from hybridnav.harness.names import baseline_name, class_of, own_name, source_hash
 from hybridnav.planner import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
@@ -70,8 +70,6 @@ class MethodSpec:
     """The baseline, or the class as `module:class`, that makes it; empty for that of its name."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of its class."""
-    grid: dict[str, Any] = field(default_factory=dict)
-    """Settings of a grid of its own; empty for that of the run."""
     source: str = ""
     """Hash of the file of a class of others: a class that was mended is another method."""
     label: str = ""
@@ -106,8 +104,6 @@ class MethodSpec:
             parts += [self.graph.digest, self.clear_edges_only]
         if self.factory or self.settings or self.source:
             parts += [self.factory, self.settings, self.source]
-        if self.grid:
-            parts.append(self.grid)
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -172,8 +168,8 @@ def baseline_spec(
 ) -> MethodSpec:
     """Return the method of a baseline, or of a class written `module:class`.
 
-    Names are those of `BASELINES`, or as in the literature, such as "HPA*". An entry of a file of
-    methods adds a name and settings.
+    Names are those of `BASELINES`, or as in the literature, such as "HPA*"; `named` adds a name and
+    settings.
 
     Raises `InvalidValueError` when there is none of that name, or its class cannot be imported.
     """
@@ -183,7 +179,7 @@ def baseline_spec(
     spec = MethodSpec(name, None)
     if name not in BASELINES:
         spec = replace(spec, source=source_hash(name), label=own_name(made_of) or name)
-    if named is not None and (named.name or named.settings or named.grid):
+    if named is not None and (named.name or named.settings):
         spec = replace(
             spec, name=named.name or name, factory=name, settings=named.settings, label=""
         )
@@ -196,19 +192,13 @@ def baseline_spec(
 def named_spec(
     method: NamedMethod, *, merge_distance_m: float | None, by_costs: bool, clear_edges_only: bool
 ) -> MethodSpec:
-    """Return the method of an entry of a file of methods.
+    """Return the method that a user named.
 
     Raises `InvalidValueError` when there is no such baseline or class, or settings do not go with
     the source.
     """
-    if method.grid and by_costs:
-        raise InvalidValueError(
-            f"method {method.name or method.source}: its own grid cannot be used with costs: "
-            "leave out one of them"
-        )
     if method.kind in {"baseline", "class"}:
-        spec = baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
-        return replace(spec, grid=method.grid)
+        return baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
     if method.kind == "preset":
         overrides = [f"{key}={json.dumps(value)}" for key, value in method.settings.items()]
         preset = load_preset(method.source, overrides=overrides)
@@ -217,7 +207,7 @@ def named_spec(
         if method.settings:
             raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
         spec = graph_spec(method.source, clear_edges_only=clear_edges_only)
-    return replace(spec, name=method.name or spec.name, grid=method.grid)
+    return replace(spec, name=method.name or spec.name)
 
 
 def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:
@@ -269,8 +259,6 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     """Build a method for a map, with the costs of its cells if it can plan by them."""
     began = clock()
     topology = None
-    if spec.grid:
-        grid = replace(grid, **spec.grid)
     if spec.pyramid:
         topology = TopologicalMap(DualGraphPyramid.build(grid, **spec.pyramid))
     built = clock()
@@ -288,8 +276,6 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     else:
         method, costs = _of_class(spec, grid if topology is None else topology, costs)
     by_costs = costs is not None
-    if spec.grid:
-        method, topology = OnOwnGrid(method, grid), None
     seconds = built - began, clock() - built
     label = spec.label and (own_name(method) or spec.label)
     return Prepared(method, topology, *seconds, by_costs, label)

@@ -1,4 +1,4 @@
-"""Names of methods: aliases, classes and the hashes of their sources, lists in YAML files."""
+"""Names of methods: aliases, classes and the hashes of their sources."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ import difflib
 import hashlib
 import importlib
 import inspect
-import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import yaml
 
 from hybridnav.errors import InvalidValueError, brief
 
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from types import ModuleType
 
-    from hybridnav._base.typing import PathLike
 
 ALIASES = {
     "a-star": "grid-astar",
@@ -46,16 +42,13 @@ _RIVALS = {
 }
 """Planners of others, which were baselines by these names: their classes in `benchmarks`."""
 
-_KEYS = ("name", "baseline", "class", "preset", "graph", "settings", "grid")
-_SOURCES = _KEYS[1:5]
 _HASH_DIGITS = 12
 _MOST_LETTERS, _MOST_LETTERS_OF_SETTINGS = 60, 200
-_MOST_RADIUS_M = 1e3
 
 
 @dataclass(frozen=True)
 class NamedMethod:
-    """One entry of a YAML file of methods.
+    """A method of a run with a name and settings of its own, for `RunSettings.methods`.
 
     Examples
     --------
@@ -71,9 +64,6 @@ class NamedMethod:
     """Name in tables; empty for that of the source."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of the class; of a preset, values by dotted key."""
-    grid: dict[str, Any] = field(default_factory=dict)
-    """Grid of its own, `robot_radius_m` and `corner_cutting`; empty for that of the run. Paths are
-    judged on that of the run."""
 
 
 def baseline_name(name: str, known: Iterable[str]) -> str:
@@ -166,102 +156,3 @@ def own_settings(method: Any) -> str:
     """Return the settings that a method states in its `settings`, on one line; empty for none."""
     words = getattr(method, "settings", "")
     return " ".join(words.split())[:_MOST_LETTERS_OF_SETTINGS] if isinstance(words, str) else ""
-
-
-def load_methods(path: PathLike) -> tuple[NamedMethod, ...]:
-    """Read a YAML file of methods.
-
-    Parameters
-    ----------
-    path
-        A file with a list `methods`. Each entry has one of `baseline`, `class`, `preset` and
-        `graph`, and may have a `name` and `settings`.
-
-    Returns
-    -------
-    tuple of NamedMethod
-        In the order of the file.
-
-    Raises
-    ------
-    InvalidValueError
-        When the file cannot be read or has another form; the message names the entry.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from hybridnav.harness import load_methods
-    >>> _ = Path("methods.yaml").write_text("methods: [{name: taut, preset: shortest}]")
-    >>> load_methods("methods.yaml")[0].name
-    'taut'
-    """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidValueError(f"methods {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InvalidValueError(f"methods {path}: {' '.join(str(error).split())}") from None
-    entries = content.get("methods") if isinstance(content, dict) else None
-    if not isinstance(entries, list) or not entries:
-        raise InvalidValueError(f"methods {path}: expected a list under the key methods")
-    methods = tuple(
-        _entry(entry, f"methods {path}, entry {at}") for at, entry in enumerate(entries, 1)
-    )
-    names = [method.name or method.source for method in methods]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise InvalidValueError(f"methods {path}: two are called {twice[0]}: set a name for each")
-    return methods
-
-
-def _entry(entry: Any, where: str) -> NamedMethod:
-    if not isinstance(entry, dict):
-        raise InvalidValueError(f"{where}: expected keys and values, got {brief(entry)}")
-    unknown = [key for key in entry if key not in _KEYS]
-    if unknown:
-        raise InvalidValueError(
-            f"{where}: no key {brief(unknown[0])}: there are {', '.join(_KEYS)}"
-        )
-    kinds = [key for key in _SOURCES if key in entry]
-    if len(kinds) != 1:
-        raise InvalidValueError(f"{where}: expected one of {', '.join(_SOURCES)}, got {kinds}")
-    source, name = entry[kinds[0]], entry.get("name", "")
-    if not isinstance(source, str) or not isinstance(name, str):
-        raise InvalidValueError(f"{where}: {kinds[0]} and name must be texts")
-    if kinds[0] == "class" and ":" not in source:
-        raise InvalidValueError(f"{where}: class {brief(source)} must be written module:class")
-    settings = entry.get("settings") or {}
-    if not isinstance(settings, dict) or not all(isinstance(key, str) for key in settings):
-        raise InvalidValueError(f"{where}: settings must be keys with values")
-    try:
-        json.dumps(settings, sort_keys=True)
-    except TypeError as error:
-        raise InvalidValueError(f"{where}: settings must be numbers and texts: {error}") from None
-    try:
-        grid = _checked_grid(entry.get("grid") or {})
-    except InvalidValueError as error:
-        raise InvalidValueError(f"{where}: {error}") from None
-    return NamedMethod(kinds[0], source, " ".join(name.split())[:_MOST_LETTERS], settings, grid)
-
-
-def _checked_grid(given: Any) -> dict[str, Any]:
-    """Return the settings of a grid of its own as a file of methods states them.
-
-    Raises
-    ------
-    InvalidValueError
-        When a key or a value is not known.
-    """
-    if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
-        raise InvalidValueError(
-            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {brief(given)}"
-        )
-    radius = given.get("robot_radius_m", 0)
-    is_number = isinstance(radius, (int, float)) and not isinstance(radius, bool)
-    if not is_number or not 0 <= radius <= _MOST_RADIUS_M:
-        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {brief(radius)}")
-    if not isinstance(given.get("corner_cutting", False), bool):
-        raise InvalidValueError(
-            f"grid: corner_cutting is true or false, got {brief(given['corner_cutting'])}"
-        )
-    return dict(given)

@@ -84,7 +84,7 @@ class RunSettings:
     the nearest node in sight of the start. They take the edges that are shortest in metres, and go
     straight on from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
-    """Methods with names and settings of their own, as `load_methods` reads them from a file."""
+    """Methods with names and settings of their own."""
     clear_edges_only: bool = False
     """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None

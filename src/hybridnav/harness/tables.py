@@ -250,9 +250,7 @@ def _settings(record: Record) -> str:
     given = record.get("settings") or {}
     if record.get("preset") is not None:
         given = _unlike(record["preset"].get("planner", {}), _DEFAULTS["planner"])
-    words = record.get("settings_text") or _words(given)
-    grid = record.get("grid") or {}
-    return words + (f"{'; ' if words else ''}on a grid with {_words(grid)}" if grid else "")
+    return record.get("settings_text") or _words(given)
 
 
 _DEFAULTS = Preset().model_dump()

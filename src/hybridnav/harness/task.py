@@ -214,7 +214,6 @@ def _of_method(spec: MethodSpec) -> Record:
         **({"label": spec.label} if spec.label else {}),
         **({"source": spec.source, "settings_sha": spec.who} if spec.source else {}),
         **({"settings": spec.settings} if spec.settings else {}),
-        **({"grid": spec.grid} if spec.grid else {}),
         "preset": None if spec.preset is None else _plain(spec.preset),
         "pyramid": _plain(spec.pyramid),
     }
