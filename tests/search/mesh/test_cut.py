@@ -18,14 +18,11 @@ from hybridnav.maps import CellClass
 from hybridnav.search.mesh import (
     ConvexMesh,
     DetourSearch,
-    MeshPath,
     MeshSearch,
     build_mesh,
     renew_mesh,
     shortest_paths,
 )
-from hybridnav.search.mesh import cut as detours
-from hybridnav.search.mesh import search as searches
 from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
@@ -221,7 +218,7 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
     left, search, round_it, anew = detour_of(case, kind)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
-        found, opened = round_it.path(*query), search.path(*query)
+        found, opened = round_it.search.path(*query), search.path(*query)
         assert found.length_cells == pytest.approx(optimum, abs=1e-9)
         assert found.lower_bound_cells == found.length_cells
         assert (found.positions is None) == math.isinf(optimum)
@@ -250,7 +247,7 @@ def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(
     for query in queries(lefts[0], seed):
         for round_it, fresh in zip([*rounds, *rounds], [*anew, *anew], strict=True):
             optimum = fresh.path(*query).length_cells
-            assert round_it.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
+            assert round_it.search.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
             assert search.path(*query).length_cells == pytest.approx(
                 opened.path(*query).length_cells, abs=1e-9
             )
@@ -271,7 +268,7 @@ def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
         opened = search.path(*query)
-        assert round_it.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
+        assert round_it.search.path(*query).length_cells == pytest.approx(optimum, abs=1e-9)
         if not round_it.is_met_by(opened):
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
@@ -306,61 +303,7 @@ def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
     for cell, is_met in (((1 if above else 3, 4), False), ((3 if above else 1, 4), True)):
         round_it = DetourSearch(search, free, np.array([cell[0] * 9 + cell[1]]))
         assert round_it.is_met_by(opened) is is_met
-        assert round_it.path(*query).length_cells == pytest.approx(opened.length_cells)
-
-
-@pytest.mark.parametrize("kind", KINDS[1:])
-def test_a_graph_is_repaired_unless_an_end_is_a_corner_of_a_closed_cell(kind: str) -> None:
-    free = np.ones((6, 9), np.bool_)
-    free[2, 4] = False
-    search = search_of(build_mesh(free), kind)
-    for where, is_repaired in ((0.5, True), (0.0, False)):
-        round_it = DetourSearch(search, free, np.array([2 * 9 + 3, 3 * 9 + 5]))
-        found = round_it.path(((3, 3), (2, 8)), ((3.0 + where, 3.0 + where), (2.5, 8.5)))
-        assert round_it.is_ready is is_repaired
-        assert found.positions is not None
-
-
-@settings(max_examples=examples(60), deadline=None)
-@given(closures(), seeds)
-def test_of_equally_short_paths_the_graph_takes_the_same_with_cells_closed_beside(
-    case: tuple[Any, Any], seed: int
-) -> None:
-    left, search, round_it, _ = detour_of(case, "landmarks")
-    rng = np.random.default_rng(seed)
-    for first, last in rng.choice(np.argwhere(left), (8, 2)).tolist():
-        query = (first, last), ((first[0] + 0.5, first[1] + 0.5), (last[0] + 0.5, last[1] + 0.5))
-        opened, found = search.path(*query), round_it.path(*query)
-        if opened.positions is not None and not round_it.is_met_by(opened):
-            assert found.positions is not None
-            assert found.positions.tolist() == opened.positions.tolist()
-
-
-@settings(max_examples=examples(60), deadline=None)
-@given(closures(), seeds, st.sampled_from([1, 3]))
-def test_a_long_search_that_asks_whether_its_ends_are_apart_is_exact(
-    case: tuple[Any, Any], seed: int, patience: int
-) -> None:
-    left, _, round_it, anew = detour_of(case, "landmarks")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(searches, "PATIENCE", patience)
-        for query in [*queries(left, seed)] * 2:
-            optimum = anew.path(*query).length_cells
-            found = round_it.path(*query)
-            assert found.length_cells == pytest.approx(optimum, abs=1e-9)
-            assert found.lower_bound_cells == found.length_cells
-
-
-def test_a_graph_that_queries_have_built_leaves_paths_round_closed_cells_alone() -> None:
-    free = np.ones((9, 9), np.bool_)
-    free[4, 4] = False
-    for expanded, is_used in ((0, True), (20_000, False)):
-        search = search_of(build_mesh(free), "landmarks")
-        search.expanded = expanded
-        round_it = DetourSearch(search, free, np.array([4 * 9 + 3]))
-        found = round_it.path(((4, 0), (4, 8)), ((4.5, 0.5), (4.5, 8.5)))
-        assert found.lower_bound_cells == found.length_cells
-        assert round_it.is_ready is is_used
+        assert round_it.search.path(*query).length_cells == pytest.approx(opened.length_cells)
 
 
 @pytest.mark.parametrize("is_prepared", [False, True])
@@ -373,47 +316,9 @@ def test_two_cells_that_meet_at_a_corner_let_nothing_through(*, is_prepared: boo
     apart = DetourSearch(search, free, np.array([1 * 4 + 2, 2 * 4 + 1]))
     opened = search.path(*query)
     assert apart.is_met_by(opened)
-    assert apart.path(*query).length_cells > opened.length_cells
+    assert apart.search.path(*query).length_cells > opened.length_cells
     one = DetourSearch(search, free, np.array([1 * 4 + 2]))
     assert not one.is_met_by(opened)
-
-
-def steps(
-    round_it: DetourSearch, query: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
-) -> Iterator[MeshPath]:
-    """The answers of a search that is stopped after one step, after two, and so on."""
-    monkeypatch.setattr(searches, "SLICE", 1)
-    for count in itertools.count(1):
-        clock = itertools.count()
-        for module in (detours, searches):
-            monkeypatch.setattr(module, "perf_counter", lambda now=clock: next(now))
-        yield round_it.path(*query, budget_s=count)
-        if next(clock) <= count:
-            return
-
-
-@settings(max_examples=examples(25), deadline=None)
-@given(closures(), seeds, st.sampled_from(KINDS[1:]))
-def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
-    case: tuple[Any, Any], seed: int, kind: str
-) -> None:
-    left, search, round_it, anew = detour_of(case, kind)
-    rng = np.random.default_rng(seed)
-    (a, b), (c, d) = rng.choice(np.argwhere(left), 2).tolist()
-    query = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
-    optimum = anew.path(*query).length_cells
-    with pytest.MonkeyPatch.context() as patch:
-        found = list(steps(round_it, query, patch))
-    bounds = [path.lower_bound_cells for path in found]
-    assert bounds == sorted(bounds)
-    assert bounds[-1] == found[-1].length_cells == pytest.approx(optimum, abs=1e-9)
-    for path in found:
-        assert path.lower_bound_cells <= optimum * (1 + 1e-12) <= path.length_cells * (1 + 2e-12)
-    # What was stopped leaves nothing behind, for neither search.
-    assert round_it.path(*query).length_cells == found[-1].length_cells
-    assert search.path(*query).length_cells == pytest.approx(
-        MeshSearch(search.mesh).path(*query).length_cells, abs=1e-9
-    )
 
 
 @settings(max_examples=examples(25), deadline=None)
@@ -424,7 +329,7 @@ def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
     left, _, round_it, anew = detour_of(case)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
-        found = round_it.path(*query, epsilon=epsilon)
+        found = round_it.search.path(*query, epsilon=epsilon)
         assert math.isinf(found.length_cells) == math.isinf(optimum)
         if math.isfinite(optimum):
             assert found.lower_bound_cells <= optimum + 1e-9

@@ -6,7 +6,7 @@ import math
 import threading
 import warnings
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -171,33 +171,24 @@ class OverMesh(Method):
         return start, goal
 
     def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
-        """Return the path of the search of the mesh, and the nodes expanded."""
+        """Return a shortest path round what is closed, and the nodes expanded."""
         search = self._search
         if search is None:
             bound = dist(*positions)
             return MeshPath(None, math.inf, bound, 0), 0
-        began, closed = clock(), query.closed
-        detours = None if closed is None else self._round(search, closed)
-        effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
-        if detours is not None and detours.is_ready:
-            found = detours.path(query.cells, positions, **effort)
-            return found, found.expanded
-        found = search.path(query.cells, positions, **effort)
-        expanded = found.expanded
-        is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
-        if detours is None or is_cut_off:
-            return found, expanded
-        if found.positions is None or detours.is_met_by(found):
-            bound = found.lower_bound_cells
-            left_s = self._budget_s
-            if left_s is not None:
-                left_s = max(left_s - (clock() - began), 0.0)
-            found = detours.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
-            expanded += found.expanded
-            # Closed cells make no path shorter.
-            bound = max(min(bound, found.length_cells), found.lower_bound_cells)
-            found = found._replace(lower_bound_cells=bound)
-        return found, expanded
+        began, epsilon, left_s = clock(), self._epsilon, self._budget_s
+        path = search.path(query.cells, positions, epsilon=epsilon, budget_s=left_s)
+        if query.closed is None or math.isinf(path.lower_bound_cells):
+            return path, path.expanded
+        detours = self._round(search, query.closed)
+        if path.positions is not None and not detours.is_met_by(path):
+            return path, path.expanded
+        if left_s is not None:
+            left_s = max(left_s - (clock() - began), 0.0)
+        around = detours.search.path(query.cells, positions, epsilon=epsilon, budget_s=left_s)
+        # Closed cells make no path shorter.
+        bound = max(min(path.lower_bound_cells, around.length_cells), around.lower_bound_cells)
+        return around._replace(lower_bound_cells=bound), path.expanded + around.expanded
 
     def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
         """Return the shortest path of cells, shortened by line of sight, with a proved bound."""

@@ -16,18 +16,14 @@ def _unpack(arcs, entry, nodes, count):
     of the arc, or -1 minus that number if it is passed backwards. Return the corners, a new array
     if there was no room, and their number.
     """
-    first, middles, at, lists, pool = arcs
+    first, middles = arcs
     stack = np.empty((64, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = entry
     depth = 1
     while depth > 0:
         depth -= 1
         tail, head, arc = stack[depth, 0], stack[depth, 1], stack[depth, 2]
-        number, past = max(arc, -1 - arc), np.int64(NO_ARC)
-        if number < middles.size:
-            past = middles[number]
-        elif len(pool):
-            past = pool[number - middles.size, 2]
+        past = middles[max(arc, -1 - arc)] if middles.size else np.int64(NO_ARC)
         if past < 0:
             if count == nodes.size:
                 nodes = np.concatenate((nodes, nodes))
@@ -37,10 +33,7 @@ def _unpack(arcs, entry, nodes, count):
         if depth + 2 > stack.shape[0]:
             stack = np.concatenate((stack, stack))
         middle = past >> 32
-        low = first[middle] if middle < first.size else 0
-        if at.size and at[middle]:
-            low = middles.size + lists[at[middle], 0]
-        back, on = low + (past >> 16 & 0xFFFF), low + (past & 0xFFFF)
+        back, on = first[middle] + (past >> 16 & 0xFFFF), first[middle] + (past & 0xFFFF)
         if arc < 0:
             back, on = on, back
         stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, head, on
@@ -55,10 +48,9 @@ def corners_between(arcs, meeting, records):
     """Return the corners that a path passes, from the start to the goal.
 
     `arcs`: offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
-    graph that is not contracted. The patches of `repair`, empty without any. `meeting`: the corner
-    where the searches from both endpoints meet; `records`: int64 (n, 4): columns 2 and 3 hold the
-    tail (in the high half) and arc by which each corner was reached from the start and from the
-    goal, or `NO_ARC`. Returns int64 (k,).
+    graph that is not contracted. `meeting`: the corner where the searches from both endpoints meet;
+    `records`: int64 (n, 4): columns 2 and 3 hold the tail (in the high half) and arc by which each
+    corner was reached from the start and from the goal, or `NO_ARC`. Returns int64 (k,).
     """
     chain = np.empty(64, np.int64)
     n_chain = 0

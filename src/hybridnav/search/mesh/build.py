@@ -237,8 +237,8 @@ class CornerGraph:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """The arrays in the order of the kernels, with nothing closed."""
-        return self.first, self.heads, self.landmark_distances, None, None, NOTHING_CLOSED[1]
+        """The arrays in the order of the kernels."""
+        return self.first, self.heads, self.landmark_distances
 
 
 def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray, IntArray] | None:
@@ -319,28 +319,6 @@ _LOOKED_AN_EDGE = 110
 does not begin: on five of the six real maps on which it would be given up."""
 
 
-def read_only(*arrays: Any) -> tuple[Any, ...]:
-    """Return views of arrays that cannot be written: kernels are compiled for these."""
-    views = tuple(array.view() for array in arrays)
-    for view in views:
-        view.flags.writeable = False
-    return views
-
-
-_NO_ROWS = np.empty((0, 4), np.int64)
-NOTHING_CLOSED = (
-    read_only(np.empty(0, np.int32), _NO_ROWS, _NO_ROWS),
-    (
-        read_only(np.array([1, 0, 1, -1]), np.zeros(1, np.int64), np.empty(0, np.int64)),
-        *read_only(np.empty((0, 0), np.bool_)),
-        read_only(np.empty(0, np.bool_), np.empty(0, np.int32)),
-        *read_only(np.empty(0, np.int32)),
-        0,
-    ),
-)
-"""Patches of a hierarchy, and what is closed, while nothing is; see `kernels.repairs`."""
-
-
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class CornerHierarchy:
@@ -362,8 +340,8 @@ class CornerHierarchy:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """The arrays in the order of the kernels, with nothing closed."""
-        return self.first, self.arcs, self.middles, self.follow, NOTHING_CLOSED
+        """The arrays in the order of the kernels."""
+        return self.first, self.arcs, self.middles, self.follow
 
 
 def contract_corners(
@@ -400,4 +378,7 @@ def contract_corners(
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
     if len(arcs) and not len(found[1]):
         return None
-    return CornerHierarchy(*read_only(found[0], found[1], found[2], follow))
+    made = found[0], found[1], found[2], follow
+    for array in made:
+        array.flags.writeable = False
+    return CornerHierarchy(*made)

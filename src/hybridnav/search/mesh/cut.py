@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import partial
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,34 +12,19 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.build import (
     ConvexMesh,
-    CornerHierarchy,
     merge_triangles,
-    read_only,
     select_triangles,
     triangulate,
 )
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
-from hybridnav.search.mesh.kernels.corner_search import link
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
-from hybridnav.search.mesh.kernels.repairs import repair
-from hybridnav.search.mesh.search import (
-    MOST_NEW,
-    MeshPath,
-    MeshSearch,
-    round_into,
-)
+from hybridnav.search.mesh.search import MeshPath, MeshSearch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.search.mesh.trace import MeshPaths
-
-
-_PATCHED = 1 << 16
-"""Initial room for arcs of corners whose arcs change round closed cells."""
 
 
 def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
@@ -219,17 +202,12 @@ def _joined(
 
 # Shortest any-angle paths round closed cells.
 
-Cell = tuple[int, int]
-Position = tuple[float, float]
-
 
 @copies_alike
 class DetourSearch:
     """Exact shortest any-angle paths round closed cells; threads may share it.
 
-    The first query that needs it repairs the hierarchy of corners round the closed cells, or adds
-    their corners to the graph. Where there is neither, and for ends at a corner of a closed cell,
-    these cells are cut out of the mesh.
+    The first query that needs it cuts the closed cells out of the mesh.
 
     Parameters
     ----------
@@ -248,7 +226,7 @@ class DetourSearch:
     >>> from hybridnav.search.mesh import DetourSearch, MeshSearch, build_mesh
     >>> free = np.ones((3, 5), dtype=bool)
     >>> detour = DetourSearch(MeshSearch(build_mesh(free)), free, np.array([2, 7]))
-    >>> detour.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
+    >>> detour.search.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
     array([[0.5, 0.5],
            [2. , 2. ],
            [2. , 3. ],
@@ -267,67 +245,19 @@ class DetourSearch:
         self._closed = closed[free.ravel()[closed]]
         self._closure = kernels.closure_of(self._closed, free.shape[1])
         self._search: MeshSearch | None = None
-        self._repaired: tuple[Any, Any] | None = None
-        self._has_parts = False
 
     @property
     def search(self) -> MeshSearch:
         """The search of the mesh without the closed cells."""
         # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
         if self._search is None:
-            self._search = self._without(
-                lambda left: MeshSearch(renew_mesh(self._open.mesh, left, self._closed))
-            )
+            left = self._scratch.take()
+            left.ravel()[self._closed] = False
+            made = MeshSearch(renew_mesh(self._open.mesh, left, self._closed))
+            left.ravel()[self._closed] = True
+            self._scratch.give(left)
+            self._search = made
         return self._search
-
-    def _without(self, make: Callable[[BoolArray], Any]) -> Any:
-        """Return what is made of the free cells that are not closed."""
-        left = self._scratch.take()
-        left.ravel()[self._closed] = False
-        made = make(left)
-        left.ravel()[self._closed] = True
-        self._scratch.give(left)
-        return made
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether paths are found round the closed cells as quickly as with them open."""
-        return self._repaired is not None
-
-    def repaired(self) -> tuple[Any, Any] | None:
-        """Return the corners, and their hierarchy or graph round the closed cells; None without.
-
-        A graph that queries have built is left alone: of equally short paths round closed cells,
-        the one that is found must not depend on what was asked before.
-        """
-        opened, graph = self._open, self._open.graph
-        if self._repaired is not None or graph is None:
-            return self._repaired
-        if not isinstance(graph, CornerHierarchy) and opened.is_worth_a_graph:
-            return None
-        xs, ys, kinds, is_listed, (polygons, members) = self._without(
-            lambda left: kernels.corners_round(
-                opened.arrays, self._closure, self._closed, left, opened.place
-            )
-        )
-        n_corners = len(opened.mesh.corners)
-        if len(xs) > n_corners + MOST_NEW:
-            return None
-        corners = xs, ys, *read_only(kinds), *opened.arrays[3:]
-        free, members = read_only(self._free, members)
-        listed = read_only(is_listed, polygons)
-        around = read_only(*self._closure), free, listed, members, n_corners
-        if not isinstance(graph, CornerHierarchy):
-            links = link(corners, around, opened.place, graph.landmark_distances)
-            known = *graph.arrays[:3], *read_only(*links), around
-            self._repaired = corners, known
-            return self._repaired
-        arrays = graph.arrays[:4]
-        known, room = (opened.footing, around, opened.edges, opened.place), _PATCHED
-        while not len((patches := repair(corners, arrays, *known, room))[1]):
-            room *= 4
-        self._repaired = corners, (*arrays, (read_only(*patches), around))
-        return self._repaired
 
     def is_met_by(self, path: MeshPath) -> bool:
         """Return whether a shortest path between open cells is illegal with these cells closed.
@@ -348,38 +278,3 @@ class DetourSearch:
         """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
         along = paths.positions, paths.path_start
         return kernels.paths_cross(self._closure, self._free, *along)
-
-    def path(
-        self,
-        cells: tuple[Cell, Cell],
-        positions: tuple[Position, Position],
-        *,
-        epsilon: float = 0.0,
-        budget_s: float | None = None,
-    ) -> MeshPath:
-        """Find a shortest path between two positions, as `MeshSearch.path` does."""
-        until = math.inf if budget_s is None else perf_counter() + budget_s
-        ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
-        corners = ends[(ends == np.floor(ends)).all(axis=1)]
-        repaired = None
-        if not any(kernels.path_crosses(self._closure, self._free, one[None]) for one in corners):
-            repaired = self.repaired()
-        search = self.search if repaired is None else self._open
-        known: tuple[Any, ...] | None = None
-        if repaired is not None:
-            are_apart: Callable[[], bool] | None = None
-            if not isinstance(self._open.graph, CornerHierarchy):
-                are_apart = partial(self._are_apart, cells, positions)
-                if self._has_parts and are_apart():
-                    return MeshPath(None, math.inf, math.inf, 0)
-            known = *repaired, are_apart
-        left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
-        found = search.path(cells, positions, epsilon=epsilon, budget_s=left_s, repaired=known)
-        # Where there are parts, later queries ask the cut mesh at once.
-        self._has_parts |= math.isinf(found.lower_bound_cells)
-        return found
-
-    def _are_apart(self, *ends: Any) -> bool:
-        """Return whether the closed cells part two positions: the cut mesh knows it at once, where
-        a search of the graph would visit all that its start reaches."""
-        return math.isinf(self.search.path(*ends, budget_s=0.0).lower_bound_cells)

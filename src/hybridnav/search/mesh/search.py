@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from functools import cached_property, partial
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -25,11 +25,8 @@ from hybridnav.search.mesh.build import (
 )
 from hybridnav.search.mesh.kernels import polyanya
 from hybridnav.search.mesh.kernels.queries import answer
-from hybridnav.search.mesh.kernels.repairs import footing_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
     from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
 
@@ -43,14 +40,8 @@ _ROOM = 4096
 """Initial room for nodes of a query."""
 SLICE = 256
 """Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
-PATIENCE = 2048
-"""Corners that a search round closed cells expands, in 1.5 ms, before it asks whether its endpoints
-are apart, which takes 2 to 6 ms. On two raw scans 2 % of the searches that find a path expand more;
-those without one would expand 7,000 and 17,000."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
-MOST_NEW = 1024
-"""Most corners that closed cells may add to the hierarchy."""
 SURE = 1.0 - 1e-12
 """Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
 _WORTH = 20_000
@@ -113,7 +104,7 @@ class _CornerWork(_Work):
 
     def __init__(self, mesh: ConvexMesh, n_landmarks: int) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners) + MOST_NEW
+        n = len(mesh.corners)
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
         self.corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, np.empty(n, np.int32)
@@ -135,7 +126,7 @@ class _HierarchyWork(_Work):
 
     def __init__(self, mesh: ConvexMesh) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners) + MOST_NEW
+        n = len(mesh.corners)
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         self.records, self.touched = np.full((n, 4), FAR), np.empty(n, np.int32)
         self.heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
@@ -227,8 +218,6 @@ class MeshSearch:
                 if graph is None:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
-            if isinstance(graph, CornerHierarchy):
-                _ = self.footing
             progress(2, 2)
 
     def adopt(
@@ -246,18 +235,12 @@ class MeshSearch:
         self.edges, self._graph = edges, graph
         self.is_prepared = True
 
-    @cached_property
-    def footing(self) -> tuple[Any, ...]:
-        """What repairs need of the hierarchy; see `kernels.repairs`."""
-        assert isinstance(self._graph, CornerHierarchy)  # noqa: S101 - the caller has looked
-        return footing_of(self.arrays, self._graph.arrays[:4])
-
     def engine(self) -> tuple[CornerGraph | CornerHierarchy | None, Pool[Any]]:
         """Return what answers queries, None for the mesh itself, and its work arrays."""
         graph = self._graph
         return graph, self.works if graph is None else self.corner_works
 
-    def path(  # noqa: PLR0913 - all but two have defaults
+    def path(
         self,
         cells: tuple[Cell, Cell],
         positions: tuple[Position, Position],
@@ -265,7 +248,6 @@ class MeshSearch:
         epsilon: float = 0.0,
         budget_s: float | None = None,
         known: FloatArray | None = None,
-        repaired: tuple[Any, ...] | None = None,
     ) -> MeshPath:
         """Find a shortest path between two positions.
 
@@ -284,9 +266,6 @@ class MeshSearch:
             float64 (n, 2), a path from start to goal in free space: the answer until the search
             finds a shorter one. With epsilon the search ends as soon as this path is proved good
             enough; without epsilon it saves little.
-        repaired
-            Corners, and hierarchy or graph, round closed cells, see `DetourSearch`; and a function
-            that is asked once, in a long search, whether the endpoints are apart. Or None.
 
         Returns
         -------
@@ -308,12 +287,8 @@ class MeshSearch:
         ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
         graph, works = self.engine()
         arrays = self.blocks if graph is None else graph.arrays
-        on: Sequence[Any] = (self.arrays, arrays)
-        are_apart: Callable[[], bool] | None = None
-        if repaired is not None:
-            *on, are_apart = repaired
         work, effort = works.take(), (upper, epsilon, until)
-        _, path, length, bound, expanded = self._run(on, ends, work, effort, are_apart)
+        _, path, length, bound, expanded = self._run(arrays, ends, work, effort)
         works.give(work)
         if graph is None and not self.is_prepared:
             self.expanded += expanded
@@ -322,19 +297,18 @@ class MeshSearch:
 
     def _run(
         self,
-        on: Sequence[Any],
+        graph: tuple[Any, ...],
         ends: tuple[tuple[int, ...], tuple[float, ...]],
         work: Any,
         effort: tuple[float, float, float],
-        are_apart: Callable[[], bool] | None = None,
     ) -> tuple[int, FloatArray, float, float, int]:
         """Run a kernel in slices until it is done, or out of time; see `answer`."""
         upper, epsilon, until = effort
         step = NO_LIMIT if until == math.inf else SLICE
-        limit = min(step if until else 0, NO_LIMIT if are_apart is None else PATIENCE)
+        limit = step if until else 0
         while True:
             left = upper, 1.0 + epsilon, limit
-            found = answer(*on, self.place, ends, (work.arrays, work.told), left)
+            found = answer(self.arrays, graph, self.place, ends, (work.arrays, work.told), left)
             status = found[0]
             if status == polyanya.DONE:
                 return cast("tuple[int, FloatArray, float, float, int]", found)
@@ -342,10 +316,7 @@ class MeshSearch:
                 work.make_room()
             elif perf_counter() >= until:
                 limit = -1
-            elif are_apart is not None and limit >= PATIENCE and are_apart():
-                work.bounds[polyanya.LOWER], limit = math.inf, -1
             else:
-                are_apart = are_apart if limit < PATIENCE else None
                 limit += step
 
 

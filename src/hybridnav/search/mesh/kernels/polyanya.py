@@ -319,7 +319,7 @@ def landmarks_of(mesh, graph, component, source, table):
     """Compute the distances of all corners from landmarks, in free space.
 
     Those in the graph are longer where a shortest path leaves the landmark, or arrives, in the
-    quadrant opposite to the blocked cell. Round closed cells, a path may go on from such a corner.
+    quadrant opposite to the blocked cell.
 
     Parameters
     ----------

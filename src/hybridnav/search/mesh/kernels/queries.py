@@ -10,8 +10,7 @@ from hybridnav._base.moves import FAR
 from hybridnav._base.trig import hypot
 from hybridnav.search.contraction import NO_ARC, corners_between
 from hybridnav.search.mesh.kernels.blocks import open_blocks
-from hybridnav.search.mesh.kernels.closures import look_round
-from hybridnav.search.mesh.kernels.corner_search import query_corners
+from hybridnav.search.mesh.kernels.corner_search import look, query_corners
 from hybridnav.search.mesh.kernels.intervals import APART, MET, polygons_of_endpoints
 from hybridnav.search.mesh.kernels.polyanya import (
     BEGUN,
@@ -206,7 +205,7 @@ def _answer(mesh, graph, place, where, points, work, effort):
     """Answer one query by the kernel for its kind of graph, as Python does without the compiler."""
     if isinstance(graph[1], tuple):
         return query(mesh, graph[0], graph[1], place[1], where, points, work, effort)
-    kernel = query_corners if len(graph) == 6 else query_hierarchy
+    kernel = query_corners if len(graph) == 3 else query_hierarchy
     return kernel(mesh, graph, (place[0], place[1], where), points, work, effort)
 
 
@@ -225,7 +224,7 @@ def _answer_of_kind(mesh, graph, place, where, points, work, effort):  # noqa: A
 
     if isinstance(graph[1], types.BaseTuple):
         return by_intervals
-    return by_corners if len(graph) == 6 else by_hierarchy
+    return by_corners if len(graph) == 3 else by_hierarchy
 
 
 # Kernels of the search of the hierarchy of corners: shortest any-angle paths.
@@ -241,8 +240,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
     `mesh`, `endpoints`: see `successors`; `hierarchy`: results of `contract` and
-    `classes_that_follow`; patches of `repair` with what `look_round` needs, all empty if nothing is
-    closed; `where`: see `look_round`; `work`: arrays of one query: room for the polygons
+    `classes_that_follow`; `where`: see `look`; `work`: arrays of one query: room for the polygons
     of the endpoints; room of `see_from_point`; records of corners, int64 (n, 4), costs from the
     start and from the goal (`FAR`), and the tail and arc by which each was reached; corners
     touched; two heaps; counts and bounds; `effort`: see `query`. Result: see `query`.
@@ -254,8 +252,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        rooms, around = (starts, goals, room), hierarchy[4][1]
-        status, n, n_all = look_round(mesh, where, endpoints, rooms, bounds, around)
+        status, n, n_all = look(mesh, where, endpoints, (starts, goals, room), bounds)
         if n_all > len(heaps[0]):
             status = WORK_FULL
         if status == WORK_FULL:
@@ -274,8 +271,7 @@ def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
             return status, path
     # The path, and its length from its points, which the sums of a search only come near.
     if counts[LAST] >= 0:
-        first, _, middles, _, (patches, _) = hierarchy
-        nodes = corners_between((first, middles, *patches), counts[LAST], records)
+        nodes = corners_between((hierarchy[0], hierarchy[2]), counts[LAST], records)
         path = path_through(mesh, endpoints, nodes)
         is_proved = bounds[LOWER] >= bounds[UPPER]
         bounds[UPPER] = 0.0
@@ -315,7 +311,7 @@ def _seed(mesh, endpoints, seen, direction, work):
 def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, arcs, _, follow, ((at, lists, pool), _) = hierarchy
+    first, arcs, _, follow = hierarchy
     _, _, _, records, touched, heaps, counts, bounds = work
     sx, sy, tx, ty = endpoints
     to_start, to_goal, n_touched = counts[SIZE], counts[MARKED], counts[TOUCHED]
@@ -337,13 +333,7 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
         direction = 0 if low_start <= low_goal else 1
         heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
-        # Arcs of a patched corner are numbered behind those of the hierarchy.
-        behind, is_patched = 0, len(at) > 0 and at[node] > 0
-        if is_patched:
-            behind = len(arcs)
-            low, high = lists[at[node], 0], lists[at[node], 0] + lists[at[node], 1]
-        else:
-            low, high = np.int64(first[node]), np.int64(first[node + 1])
+        low, high = np.int64(first[node]), np.int64(first[node + 1])
         if size + high - low > len(heap):
             status = WORK_FULL
             break
@@ -368,16 +358,11 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
             # class here; an end on the corner rules nothing out.
             by, may_follow = records[node, 2 + direction], np.int64(-1)
             if by != NO_ARC:
-                last = by & 0xFFFFFFFF
-                came = arcs[last, 1] if last < len(arcs) else pool[last - len(arcs), 1]
-                may_follow = follow[kinds[node] & 3, came & 63]
+                may_follow = follow[kinds[node] & 3, arcs[by & 0xFFFFFFFF, 1] & 63]
             elif from_x != x or from_y != y:
                 may_follow = follow[kinds[node] & 3, class_of(kinds[node], from_x - x, from_y - y)]
             for arc in range(low, high):
-                if is_patched:
-                    packed, further = pool[arc, 1], cost + pool[arc, 0]
-                else:
-                    packed, further = arcs[arc, 1], cost + arcs[arc, 0]
+                packed, further = arcs[arc, 1], cost + arcs[arc, 0]
                 other = packed >> 12
                 known = records[other, direction]
                 if may_follow >> (packed >> 6 & 63) & 1 == 0 or known <= further:
@@ -390,8 +375,7 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
                 if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1
-                by = node << 32 | behind + arc
-                records[other, direction], records[other, 2 + direction] = further, by
+                records[other, direction], records[other, 2 + direction] = further, node << 32 | arc
                 push(heap, size, estimate, other)
                 size += 1
         to_start, to_goal = (to_start, size) if direction else (size, to_goal)

@@ -123,7 +123,6 @@ def paths(graph, middles, origin, endpoints, work):
     begin = np.zeros(n + 1, np.int64)
     counts = np.full((n, 3), np.int64(-1))
     cells = np.empty((0, 2), np.int64)
-    no_patches = touched[:0], records[:0], records[:0]
     n_cells = np.int64(0)
     for i in range(n):
         pair = (
@@ -134,7 +133,7 @@ def paths(graph, middles, origin, endpoints, work):
         if cost < FAR:
             nodes = touched[:0]
             if meeting >= 0:
-                nodes = corners_between((first, middles, *no_patches), meeting, records)
+                nodes = corners_between((first, middles), meeting, records)
             cells, n_cells, counts[i, 0], counts[i, 1] = cells_of(
                 graph, pair, meeting, nodes, origin, cells, n_cells
             )
