@@ -17,7 +17,6 @@ import hybridnav as hn
 from hybridnav import check_proof
 from hybridnav.ext.fleet import plot_building
 from hybridnav.ext.graphs import build_lane_graph, plot_route_graph
-from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_costs,
     plot_level,
@@ -25,7 +24,6 @@ from hybridnav.viz import (
     plot_map,
     plot_mesh,
     plot_rooms,
-    plot_search,
     save_figure,
 )
 
@@ -91,15 +89,6 @@ def draw_rooms(file: Path) -> None:
 def draw_mesh(file: Path) -> None:
     """Draw the convex mesh of the office."""
     save_figure(plot_mesh(hn.load_map(OFFICE, robot_radius_m=0.25)), file, dpi=150)
-
-
-def draw_search(file: Path) -> None:
-    """Draw the search of the mesh that finds the shortest path through the office."""
-    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
-    mesh, frame = build_mesh(grid.classes == hn.CellClass.FREE), grid.frame
-    cells = frame.cell_of(*START), frame.cell_of(*GOAL)
-    trace = trace_search(mesh, cells, (frame.position_of(*START), frame.position_of(*GOAL)))
-    save_figure(plot_search(grid, trace), file, dpi=150)
 
 
 def draw_robot(file: Path) -> None:
@@ -232,7 +221,6 @@ PICTURES = {
     "office-regions.png": draw_regions,
     "office-rooms.png": draw_rooms,
     "mesh-office.png": draw_mesh,
-    "mesh-search.png": draw_search,
     "office-robot.png": draw_robot,
     "building.png": draw_building,
     "office-lanes.png": draw_lanes,

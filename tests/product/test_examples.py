@@ -33,7 +33,6 @@ RETURNED = {
     "search.mesh.CornerHierarchy",
     "search.mesh.MeshPath",
     "search.mesh.MeshPaths",
-    "search.mesh.SearchTrace",
     "harness.judges.AnyAnglePath",
     "harness.judges.Buckets",
     "harness.judges.PairedDifference",

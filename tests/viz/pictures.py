@@ -13,7 +13,6 @@ from matplotlib.text import Text
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.search.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_dual,
     plot_losses,
@@ -23,7 +22,6 @@ from hybridnav.viz import (
     plot_places,
     plot_plan,
     plot_rooms,
-    plot_search,
     plot_speed,
     plot_topology,
     plot_tour,
@@ -68,13 +66,6 @@ def _tour(ax: Axes) -> Axes:
     return plot_tour(two_rooms(), tour, ax=ax)
 
 
-def _search(ax: Axes) -> Axes:
-    grid = two_rooms().grid
-    mesh = build_mesh(grid.classes == hn.CellClass.FREE)
-    cells, positions = ((5, 4), (12, 56)), ((5.5, 4.25), (12.5, 56.5))
-    return plot_search(grid, trace_search(mesh, cells, positions), ax=ax)
-
-
 def _paths(ax: Axes) -> Axes:
     shortest = [(1.0, 1.0), (5.8, 1.4), (6.6, 1.4), (11.0, 2.4)]
     path = [(1.0, 1.0), (5.8, 4.8), (6.6, 4.8), (10.1, 4.3), (11.0, 2.4)]
@@ -96,7 +87,6 @@ PICTURES: dict[str, Callable[[Axes], Axes]] = {
     "rooms": lambda ax: plot_rooms(two_rooms(), ax=ax),
     "tour": _tour,
     "mesh": lambda ax: plot_mesh(two_rooms().grid, ax=ax),
-    "search": _search,
     "paths": _paths,
     "losses": lambda ax: plot_losses(_losses(), ax=ax),
     "speed": lambda ax: plot_speed(_losses(), {"a": 0.3, "b": 2.0, "c": 40.0}, ax=ax),

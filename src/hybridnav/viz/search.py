@@ -1,4 +1,4 @@
-"""Pictures of the convex mesh, and of the search of its intervals."""
+"""Pictures of the convex mesh, and of searches by OMPL."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.maps.islands import unique_rows
-from hybridnav.search.mesh import SearchTrace, build_mesh
+from hybridnav.search.mesh import build_mesh
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.layout import finish
@@ -22,7 +20,7 @@ from hybridnav.viz.maps import ground_entries
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planner import Path
     from hybridnav.refine.ompl import Search
@@ -30,9 +28,6 @@ if TYPE_CHECKING:
     from hybridnav.viz.layout import Entry
 
 
-_ORDER = LinearSegmentedColormap.from_list("order", ["#fff0b8", "#7cc3b5", "#2a5b9e"])
-"""Colours of intervals from the first to the last: falling in lightness, for every kind of colour
-vision and in grey."""
 _POLYGON, _SIDE = style.PLACES[4], style.PARALLEL
 _FULL = 0.45
 """Opacity of polygons."""
@@ -78,7 +73,11 @@ def plot_mesh(
     'mesh'
     """
     mesh = build_mesh(grid.classes == CellClass.FREE) if mesh is None else mesh
-    check_mesh(grid, mesh)
+    if mesh.polygon_at.shape != grid.shape:
+        raise InvalidValueError(
+            f"the mesh is of a map of {mesh.polygon_at.shape} cells, the grid has {grid.shape}: "
+            "build it from the grid's free cells"
+        )
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     line = canvas.sizes.line
     colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
@@ -89,7 +88,7 @@ def plot_mesh(
         rings, facecolors=_POLYGON, alpha=_FULL, linewidths=0, zorder=1, gid="polygons"
     )
     canvas.ax.add_collection(fill, autolim=False)
-    draw_sides(canvas, grid, mesh)
+    _draw_sides(canvas, grid, mesh)
     convex = mesh.is_convex
     x, y = corners[convex].T
     size = (1.5 * line) ** 2
@@ -105,16 +104,7 @@ def plot_mesh(
     return finish(canvas, entries + ground_entries(grid), words, framed=True)
 
 
-def check_mesh(grid: OccupancyGrid, mesh: ConvexMesh) -> None:
-    """Raise `InvalidValueError` if a mesh belongs to a map of another size."""
-    if mesh.polygon_at.shape != grid.shape:
-        raise InvalidValueError(
-            f"the mesh is of a map of {mesh.polygon_at.shape} cells, the grid has {grid.shape}: "
-            "build it from the grid's free cells"
-        )
-
-
-def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
+def _draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
     """Draw the sides that two polygons share, each once."""
     slots = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
     # The twin begins at the end of the side.
@@ -124,66 +114,7 @@ def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
     canvas.add_lines(lines, colors=_SIDE, linewidths=width, alpha=0.6, zorder=3, gid="sides")
 
 
-def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> list[Entry]:
-    """Draw the views of a search, the roots, and the path; return legend entries."""
-    line, ax = canvas.sizes.line, canvas.ax
-    draw_sides(canvas, grid, trace.mesh)
-    n = len(trace.parents)
-    views = _views(trace)
-    rings = grid.frame.points_of_grid(views.reshape(-1, 2)).reshape(-1, 4, 2)
-    shades = _ORDER(np.linspace(0, 1, max(n, 2))[:n])
-    cones = PolyCollection(list(rings), facecolors=shades, linewidths=0, zorder=2, gid="views")
-    ax.add_collection(cones, autolim=False)
-    x, y = grid.frame.points_of_grid(unique_rows(trace.roots).rows).T
-    ax.scatter(x, y, s=(2.4 * line) ** 2, c=style.HOLE, linewidths=0, zorder=5, gid="roots")
-    swatches = tuple(Patch(fc=_ORDER(share)) for share in (0.0, 0.5, 1.0))
-    dot = Line2D([], [], ls="", marker="o", ms=3.5 * line, mfc=style.HOLE, mec="none")
-    entries: list[Entry] = [
-        (swatches, "seen through intervals, first to last"),
-        (dot, "root"),
-        (Line2D([], [], color=_SIDE, lw=0.8 * line), "side of a polygon"),
-    ]
-    endpoints = grid.frame.points_of_grid(trace.endpoints)
-    if trace.path.positions is not None:
-        points = grid.frame.points_of_grid(trace.path.positions)
-        ax.add_line(Line2D(*points.T, color=style.PATH, lw=1.8 * line, zorder=6, gid="path"))
-        entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "shortest path"))
-    for point, marker in zip(endpoints, "os", strict=True):
-        ax.plot(
-            *point, marker, ms=5 * line, mfc=style.FREE, mec=style.PATH, mew=1.4 * line, zorder=7
-        )
-    return entries
-
-
-def _views(trace: SearchTrace) -> FloatArray:
-    """Return the view that each interval adds, float64 (n, 4, 2) in grid units.
-
-    The view is the part of the polygon before it that lies between its rays.
-    """
-    far = trace.intervals
-    near = np.repeat(trace.roots[:, None], 2, axis=1)
-    later = np.flatnonzero(trace.parents >= 0)
-    before = trace.parents[later]
-    # With the parent's root the view begins at the parent's interval, else at the new root.
-    kept = (trace.roots[later] == trace.roots[before]).all(axis=1)
-    later, before = later[kept], before[kept]
-    for end in (0, 1):
-        near[later, end] = _met(trace.roots[later], far[later, end], trace.intervals[before])
-    return np.concatenate([far, near[:, ::-1]], axis=1)
-
-
-def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatArray:
-    """Return the points where segments from roots to points cross intervals; a root that lies on
-    one."""
-    along, drawn = intervals[:, 1] - intervals[:, 0], points - roots
-    off = intervals[:, 0] - roots
-    cross = drawn[:, 0] * along[:, 1] - drawn[:, 1] * along[:, 0]
-    reach = off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0]
-    share = np.divide(reach, cross, out=np.zeros(len(cross)), where=cross != 0)
-    return roots + share.clip(0, 1)[:, None] * drawn
-
-
-# Pictures of a search: states or intervals, corridor, and path.
+# Pictures of a search by OMPL: states, corridor, and path.
 
 _CORRIDOR = style.PLACES[1]
 _STRENGTH = 0.55
@@ -192,7 +123,7 @@ _STATE, _EDGE = style.HOLE, style.PARALLEL
 
 def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     grid: OccupancyGrid,
-    search: Search | SearchTrace | None,
+    search: Search | None,
     *,
     corridor: BoolArray | None = None,
     path: Path | None = None,
@@ -200,23 +131,19 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw the states or intervals of a search, its corridor, and its path.
-
-    For a search by OMPL, the picture shows states and motions. For a search of the mesh it shows
-    the view through each interval, coloured in the order of discovery, and the roots of the views.
+    """Draw the states and motions of a search by OMPL, its corridor, and its path.
 
     Parameters
     ----------
     grid
         The map. The picture is cropped to its known part.
     search
-        By OMPL: valid states that were drawn (dots), and motions of trees or roadmaps (lines); None
-        for a search without any, as when a straight line suffices. On the mesh: the result of
-        `trace_search`.
+        Valid states that were drawn (dots), and motions of trees or roadmaps (lines); None for a
+        search without any, as when a straight line suffices.
     corridor
         bool (rows, cols), the cells that the search could stand on; None for all.
     path
-        The path found; a search of the mesh has its own.
+        The path found.
     ax
         Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     title
@@ -232,17 +159,12 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     Raises
     ------
     InvalidValueError
-        When the corridor or the mesh has another shape than the grid.
+        When the corridor has another shape than the grid.
 
     Examples
     --------
-    >>> from hybridnav.search.mesh import build_mesh, trace_search
     >>> from hybridnav.viz import plot_search
-    >>> grid = hn.example_map("figure1")
-    >>> endpoints = (5, 5), (25, 20)
-    >>> centres = tuple((row + 0.5, col + 0.5) for row, col in endpoints)
-    >>> trace = trace_search(build_mesh(grid.enterable()), endpoints, centres)
-    >>> plot_search(grid, trace, title="search").get_title()
+    >>> plot_search(hn.example_map("figure1"), None, title="search").get_title()
     'search'
     """
     if corridor is not None:
@@ -253,14 +175,9 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
             )
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     _draw_ground(canvas, grid, corridor)
-    if isinstance(search, SearchTrace):
-        check_mesh(grid, search.mesh)
-        entries = draw_intervals(canvas, grid, search)
-        counts = [f"{len(search.parents):,} intervals", f"{search.path.expanded:,} expanded"]
-    else:
-        entries = _draw_states(canvas, search)
-        sizes = (0, 0) if search is None else (len(search.states), len(search.edges))
-        counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
+    entries = _draw_states(canvas, search)
+    sizes = (0, 0) if search is None else (len(search.states), len(search.edges))
+    counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
     line = canvas.sizes.line
     if path is not None:
         drawn = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")

@@ -24,7 +24,7 @@ from hybridnav.search.mesh.search import MeshPath, MeshSearch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.search.mesh.trace import MeshPaths
+    from hybridnav.search.mesh.batch import MeshPaths
 
 
 def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
