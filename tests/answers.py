@@ -18,7 +18,7 @@ from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
 
 import hybridnav as hn
 from benchmarks.subjects.explore import narrow_world, widest_point
-from hybridnav.ext.graphs import build_route_graph
+from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.live.explore import explore
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser
 
@@ -81,7 +81,7 @@ def answers_on(grid: hn.OccupancyGrid, count: int) -> dict[str, str]:
     labels = hn.find_rooms(grid)
     pyramid = hn.DualGraphPyramid.build(grid, rooms=labels)
     topology = hn.TopologicalMap(pyramid)
-    graph = build_route_graph(topology)
+    graph = build_lane_graph(topology)
     found = {
         "rooms": digest(labels.label_of, labels.names),
         "pyramid": digest(*(level.field_of for level in pyramid)),

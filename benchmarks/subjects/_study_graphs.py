@@ -20,7 +20,7 @@ from benchmarks.subjects._swagger_like import (
     swagger_like,
 )
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.ext.graphs import WaypointGraph, build_route_graph
+from hybridnav.ext.graphs import WaypointGraph, build_lane_graph
 from hybridnav.ext.graphs.method import GraphMethod
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from hybridnav.harness.baselines.regions import Cell
     from hybridnav.maps import OccupancyGrid
 
-NODES = 2000
-"""Nodes that our own graphs aim at: as many as graphs of SWAGGER have, 366 to 5,101 on ten ROS
-maps. Without an aim a map of hundreds of thousands of cells takes up to minutes."""
 MOST_SKELETON = 100_000
 """Cells of the skeleton of free space up to which graphs are made: a maze whose corridors are a
 cell wide is all skeleton, and a graph of it has tens of thousands of nodes."""
@@ -46,16 +43,15 @@ _MERGE_M = 4.0
 
 
 class RouteGraphMethod(GraphMethod):
-    """Routes on our own graph, as `hybridnav export --nodes` writes it for Nav2."""
+    """Routes on our own graph of lanes, as `hybridnav export` writes it for Nav2."""
 
-    def __init__(self, grid: OccupancyGrid, *, nodes: int = NODES) -> None:
+    def __init__(self, grid: OccupancyGrid) -> None:
         check_skeleton(grid)
         scaled = _in_buildings(grid)
         topology = TopologicalMap(DualGraphPyramid.build(scaled, merge_distance_m=_MERGE_M))
-        built = build_route_graph(topology, nodes=nodes)
+        built = build_lane_graph(topology)
         graph = _graph_of("our graph", grid, built.positions, built.edges)
         super().__init__(grid, graph)
-        self.settings = f"{nodes:,} nodes aimed at"
 
 
 class SwaggerLike(GraphMethod):

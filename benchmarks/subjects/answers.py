@@ -207,8 +207,6 @@ _AB = ["--start", "1.0,13.2", "--goal", "40.6,19.4"]
 _FAR = ["--start", "1:1.0,13.2", "--goal", "2:6,17.2"]
 FILES = {
     "nav2.geojson": ["export", *_OFFICE],
-    "nav2-roadmap.geojson": ["export", *_OFFICE, "--style", "roadmap"],
-    "nav2-nodes.geojson": ["export", *_OFFICE, "--style", "roadmap", "--nodes", "200"],
     "nav2-lanes.geojson": ["export", *_OFFICE, "--lanes", "0.6"],
     "rmf.building.yaml": ["export", *_OFFICE, "--format", "rmf"],
     "office.osm": ["export", *_OFFICE, "--format", "osm", "--anchor", "50.1,8.6,12"],

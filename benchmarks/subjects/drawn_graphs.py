@@ -1,12 +1,12 @@
 """The table of graphs that people have drawn: what is wrong with them, and how long routes are.
 
-Seven graphs of Nav2 and STRANDS on their maps and three of AMRL on their walls, and beside each two
-that hybridnav builds from the map: lanes, and a roadmap. Pairs are random free cells with a path
-between them. `edges in walls` are those that the robot cannot follow, `out of reach` is the share
-of free points that see no node. `at a wall` are routes over an edge that the robot cannot follow,
-in the graph as it is; `solved` and the losses, over the shortest any-angle path, are those without
-such edges, and the losses are those of the pairs that all three graphs solve (`common`). Every
-route is judged anew; a wrong one ends the command.
+Seven graphs of Nav2 and STRANDS on their maps and three of AMRL on their walls, and beside each the
+lanes that hybridnav builds from the map. Pairs are random free cells with a path between them.
+`edges in walls` are those that the robot cannot follow, `out of reach` is the share of free points
+that see no node. `at a wall` are routes over an edge that the robot cannot follow, in the graph as
+it is; `solved` and the losses, over the shortest any-angle path, are those without such edges, and
+the losses are those of the pairs that both graphs solve (`common`). Every route is judged anew; a
+wrong one ends the command.
 """
 
 from __future__ import annotations
@@ -30,11 +30,9 @@ from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable
     from pathlib import Path
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.ext.graphs import RouteGraph
     from hybridnav.harness.scenes import Pair
     from hybridnav.harness.tables import Row
 
@@ -51,11 +49,6 @@ WALLS = "GDC3", "AHG2", "AHG_Apartment"
 """Graphs of AMRL, which come with segments of walls; those of GDC2 leave its outside open."""
 _CELL_M, _RIM_M, _GAP_M = 0.05, 4.0, 3.0
 """Cells of walls, the free rim round them, and the widest gap that lets no outside in."""
-BUILDERS: dict[str, Callable[[hn.TopologicalMap], RouteGraph]] = {
-    "lanes": hn.ext.graphs.build_lane_graph,
-    "roadmap": hn.ext.graphs.build_route_graph,
-}
-"""What hybridnav builds, by the names of the styles of `hybridnav export`."""
 
 
 def drawn_on_walls(
@@ -92,9 +85,8 @@ def rows_of(
 ) -> list[Row]:
     """Return the rows of a drawn graph, and of those that are built."""
     graphs = {graph.name if graph.format == "networkx" else graph.format: graph}
-    for name, build in BUILDERS.items():
-        built = build(topology)
-        graphs[name] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name=name)
+    built = hn.ext.graphs.build_lane_graph(topology)
+    graphs["lanes"] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name="lanes")
     grid = topology.grid
     losses = [
         _losses(GraphMethod(grid, one, clear_edges_only=True), grid, pairs)

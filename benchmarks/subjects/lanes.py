@@ -28,7 +28,6 @@ from scipy.spatial import KDTree
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, matches, option, read
 from benchmarks.subjects.drawn_graphs import GRAPHS
-from benchmarks.subjects.nav2 import BUILDINGS
 from hybridnav.ext.graphs.attach import (
     MANY_CANDIDATES,
     Network,
@@ -49,6 +48,20 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
 
+BUILDINGS = (
+    "bwi_gdc/2/2.yaml",
+    "bwi_gdc/3/3.yaml",
+    "bwi_gdc/3ne/3ne.yaml",
+    "bwi_mapper/intel.yaml",
+    "f1tenth_simulator/stata_basement.yaml",
+    "fetch_maps/3_1_16_localization.yaml",
+    "fetch_maps/4_26_15.yaml",
+    "fetch_maps/9_16_15.yaml",
+    "strands/g4s/g4s_y2.yaml",
+    "strands/tsc_y3/tsc20160523.yaml",
+    "strands/tsc_y4/tsc_1701.yaml",
+    "willow/willow-2010-02-18-0.10.yaml",
+)
 _UNSEEN = (
     "aws_small_house/map.yaml",
     "turtlebot4/depot.yaml",
@@ -246,7 +259,6 @@ OPTIONS = [
     DATA,
     option("--maps", action="append", default=[]),
     option("--spacing", default="", help="distances between lanes in metres, with commas"),
-    option("--nodes", default="", help="numbers of nodes of roadmaps beside, with commas"),
     option("--pairs", type=int, default=1000),
     option("--steady", action="store_true", help="state how many nodes keep their ids"),
 ]
@@ -255,7 +267,6 @@ OPTIONS = [
 def main(given: Namespace) -> None:
     """Print the tables."""
     spacings = [float(word) if word else None for word in given.spacing.split(",")]
-    roadmaps = [int(word) for word in given.nodes.split(",") if word]
     names = [*BUILDINGS, *_UNSEEN] if given.data else []
     files: dict[Path, Path | None] = {OFFICE: None}
     files |= {given.data / name: None for name in names}
@@ -268,11 +279,6 @@ def main(given: Namespace) -> None:
             continue
         floor = Floor(file, given.pairs)
         found = rows_of(floor, drawn, spacings, steady=given.steady)
-        for nodes in roadmaps:
-            began = time.process_time()
-            built = hn.ext.graphs.build_route_graph(floor.topology, nodes=nodes or None)
-            seconds = time.process_time() - began
-            found.append(floor.row(f"roadmap, {nodes or 'all'}", built, seconds))
         rows += found
         sys.stderr.write("".join(f"{row}\n" for row in found))
     sys.stdout.write(to_markdown(rows))

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.subjects import _study_graphs
-from benchmarks.subjects._study_graphs import MOST_SKELETON, NODES, RouteGraphMethod, SwaggerLike
+from benchmarks.subjects._study_graphs import MOST_SKELETON, RouteGraphMethod, SwaggerLike
 from benchmarks.subjects._study_run import GRAPHS
 from benchmarks.subjects._swagger_like import (
     BOUNDARY_M,
@@ -121,10 +121,10 @@ def test_nodes_are_as_near_as_the_distances_say():
 def test_routes_are_those_of_the_exported_file(tmp_path):
     path = write_map(tmp_path, ["".join(5 * x for x in line) for line in ROOMS for _ in range(5)])
     grid = hn.load_map(path, robot_radius_m=0)
-    made = RouteGraphMethod(grid, nodes=60)
+    made = RouteGraphMethod(grid)
     scaled = replace(grid, frame=replace(grid.frame, resolution_m=0.1))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(scaled, merge_distance_m=4.0))
-    built = hn.ext.graphs.build_route_graph(topology, nodes=60)
+    built = hn.ext.graphs.build_lane_graph(topology)
     assert made.n_nodes == built.n_nodes
     hn.ext.graphs.export_nav2(built, tmp_path / "graph.geojson")
     graph = hn.ext.graphs.load_graph(tmp_path / "graph.geojson")
@@ -146,7 +146,7 @@ def test_as_they_are_they_have_no_fault(tmp_path):
         outcome = study.of_method(name)[0]
         assert outcome.is_any_angle
         assert np.isfinite(outcome.lengths_m).sum() == N_PAIRS
-        assert 0 <= outcome.any_angle_losses.max() < 1
+        assert 0 <= outcome.any_angle_losses.max() < 2
         assert outcome.preparation["n_edges"] > outcome.preparation["n_nodes"] > 5
         row = next(row for row in rows_of_methods(study) if row["method"] == name)
         assert row["settings"]
@@ -236,5 +236,4 @@ def test_the_page_on_the_harness_states_their_limits():
         .read_text(encoding="utf-8")
         .replace("\n", " ")
     )
-    assert f"with {NODES:,} nodes aimed at" in page
     assert f"has more than {MOST_SKELETON:,} cells" in page

@@ -15,7 +15,7 @@ from tests.nav2_reader import read_nav2
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 OFFICE = FIGURE.parents[1] / "office" / "office.yaml"
-SMALL = ("--robot-radius", "0", "--spacing", "1", "--style", "roadmap")
+SMALL = ("--robot-radius", "0", "--spacing", "1")
 
 
 def test_a_map_becomes_a_graph_with_a_report_and_a_picture(cli, tmp_path):
@@ -60,34 +60,32 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
     assert not out.exists()
 
 
-def test_roadmaps_have_nodes_near_every_point(cli, tmp_path):
-    def nodes(*more):
-        given = ("export", FIGURE, "-o", tmp_path / "g.json", "--json", "--force")
-        return cli(*given, *SMALL[:2], *SMALL[4:], *more).answer["nodes"]
-
-    near = nodes()
-    assert near == nodes("--spacing", 1)
-    assert near > nodes("--spacing", 2)
-
-
-def test_lanes_are_the_style_and_keep_the_ids_of_a_graph_before(cli, tmp_path):
+def test_lanes_keep_the_ids_of_a_graph_before(cli, tmp_path):
     first, second = tmp_path / "a.geojson", tmp_path / "b.geojson"
     done = cli("export", FIGURE, "-o", first, *SMALL[:2], "--json")
     assert (done.code, done.err) == (0, "")
     assert set(done.answer["kinds"]) <= {"room", "door", "crossing", "end", "bend"}
     few = done.answer["nodes"]
-    assert few < cli("export", FIGURE, "-o", second, *SMALL, "--json").answer["nodes"]
     facts = read_nav2(first).node_facts
     assert {one["class"] for one in facts.values()} == set(done.answer["kinds"])
     done = cli("export", FIGURE, "-o", second, "--force", *SMALL[:2], "--keep", first, "--json")
     assert (done.code, first.read_bytes()) == (0, second.read_bytes())
-    done = cli("export", FIGURE, "-o", second, "--force", *SMALL[:4], "--style", "lanes", "--json")
+    done = cli("export", FIGURE, "-o", second, "--force", *SMALL, "--json")
     assert done.answer["nodes"] >= few
     given = ("export", FIGURE, "-o", second, "--force", *SMALL[:2])
-    assert cli(*given, "--style", "dense").refuses(2, "--style", "lanes, roadmap")
-    assert cli(*given, "--nodes", 5).refuses(2, "--nodes is for --style roadmap")
-    assert cli(*given, *SMALL[4:], "--keep", first).refuses(2, "--keep is for --style lanes")
     assert cli(*given, "--keep", tmp_path / "no.geojson").refuses(3, "no.geojson")
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "instead"),
+    [
+        ("export", "--style", "graphs are lanes"),
+        ("export", "--nodes", "a larger --spacing"),
+        ("evaluate", "--methods", "RunSettings(methods=)"),
+    ],
+)
+def test_options_that_went_say_what_to_do_instead(cli, command, option, instead):
+    assert cli(command, FIGURE, option, "5").refuses(2, f"{option} is gone", instead)
 
 
 def test_named_points_come_from_a_file(cli, tmp_path):
@@ -118,8 +116,6 @@ def test_named_points_come_from_a_file(cli, tmp_path):
     for text in ("a: [1, 2]\nlifts: {a: [1.5, 2.5]}\n", "lifts: {1: [1, 2], '1': [1.5, 2.5]}\n"):
         (tmp_path / "points.yaml").write_text(text)
         assert cli(*given, "-o", out, "--force").refuses(2, "must be", "there once")
-    refused = cli(*given, "-o", out, "--force", "--style", "roadmap")
-    assert refused.refuses(2, "--points is for --style lanes")
 
 
 @pytest.mark.parametrize(
@@ -203,12 +199,12 @@ def test_what_changed_since_a_graph_to_keep_is_listed(cli, tmp_path):
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
     given = ("export", FIGURE, "-o", tmp_path / "g.geojson", "--force", *SMALL)
     assert "ids  " not in cli(*given).out
-    monkeypatch.setattr("hybridnav.messages.MOST_ID", 20)
+    monkeypatch.setattr("hybridnav.messages.MOST_ID", 5)
     (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("ids  ")]
     features = json.loads((tmp_path / "g.geojson").read_text())["features"]
     most = max(each["properties"]["id"] for each in features)
     assert f"up to {most};" in line
-    assert "messages of ComputeRoute hold 20" in line
+    assert "messages of ComputeRoute hold 5" in line
 
 
 def test_rooms_and_places_are_written_as_tables_and_features(cli, tmp_path):
@@ -229,7 +225,6 @@ def test_rooms_and_places_are_written_as_tables_and_features(cli, tmp_path):
 def test_options_of_graphs_are_refused_for_rooms_and_places(cli, tmp_path):
     places = ("export", FIGURE, "--format", "places", "-o", tmp_path / "p.csv")
     for option in (
-        ("--nodes", 5),
         ("--spacing", 3),
         ("--report", 9),
         ("--plot", tmp_path / "p.png"),
@@ -318,17 +313,6 @@ def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
         assert [floor.name for floor in hn.ext.fleet.load_building_graph(out).floors] == ["0"]
         done = cli("check", FIGURE, out, *SMALL[:2], "--floor", "0", "--json")
         assert (done.code, done.answer["findings"]) == (0, {})
-
-
-def test_the_loss_of_few_nodes_is_printed_and_a_warning(cli, tmp_path):
-    given = ("export", OFFICE, "-o", tmp_path / "a.geojson", "--style", "roadmap", "--nodes")
-    few = cli(*given, 60, "--json")
-    loss = few.answer["report"]["nearest"]["mean"]
-    assert (few.code, loss > 0.1) == (0, True)
-    assert f"are {loss:.0%} longer on average than shortest paths, above 10%" in few.err
-    many = cli(*given, 2000, "--force")
-    assert (many.code, many.err) == (0, "")
-    assert "nearest    routes longer by" in many.out
 
 
 def test_what_a_format_does_not_hold_is_printed(cli, tmp_path):

@@ -88,7 +88,7 @@ def test_routes_are_those_of_the_policy(classes, data):
 
 def house_graph():
     return hn.ext.graphs.WaypointGraph.from_networkx(
-        _points(hn.ext.graphs.build_route_graph(topology_of(HOUSE))), name="house"
+        _points(hn.ext.graphs.build_lane_graph(topology_of(HOUSE))), name="house"
     )
 
 
@@ -110,7 +110,7 @@ def test_a_sound_graph_has_no_counter_examples(tmp_path):
     path = write_map(tmp_path, letters(HOUSE), "house")
     grid = hn.load_map(path, robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=10.0))
-    built = hn.ext.graphs.build_route_graph(topology)
+    built = hn.ext.graphs.build_lane_graph(topology)
     graph = hn.ext.graphs.WaypointGraph.from_networkx(_points(built), name="house")
     settings_ = RunSettings(maps=(str(path),), presets=(), graphs=(graph,), pairs=60)
     evaluate(settings_, tmp_path / "run")
@@ -124,7 +124,7 @@ def test_a_sound_graph_has_no_counter_examples(tmp_path):
     assert study.faults == []
     report = hn.ext.graphs.judge_route_graph(built, pairs=2000)
     assert outcome.any_angle_losses.min() >= -1e-9
-    assert outcome.any_angle_losses.mean() == pytest.approx(report.nearest.mean, abs=0.03)
+    assert outcome.any_angle_losses.mean() == pytest.approx(report.nearest.mean, abs=0.06)
 
 
 @pytest.mark.usefixtures("here")
@@ -168,7 +168,7 @@ def test_settings_that_do_not_go_together(tmp_path):
             RunSettings(maps=(path,), presets=(), graphs=(mine,), corner_cutting=True),
             tmp_path / "run",
         )
-    route_graph = hn.ext.graphs.build_route_graph(topology_of(HOUSE))
+    route_graph = hn.ext.graphs.build_lane_graph(topology_of(HOUSE))
     wrong: Any = (route_graph,)
     with pytest.raises(hn.errors.InvalidValueError, match="expected a WaypointGraph"):
         evaluate(RunSettings(maps=(path,), presets=(), graphs=wrong), tmp_path / "run")

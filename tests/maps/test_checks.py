@@ -27,7 +27,7 @@ PLANNERS: Any = hn.HybridPlanner
 BUILD: Any = hn.ext.graphs
 MAPS: Any = hn
 CARRY: Any = carry_costs
-GRAPH = hn.ext.graphs.build_route_graph(TOPOLOGY)
+GRAPH = hn.ext.graphs.build_lane_graph(TOPOLOGY)
 
 CALLS: dict[str, Callable[[], object]] = {
     "grid is": lambda: JUDGES("office"),
@@ -45,9 +45,8 @@ CALLS: dict[str, Callable[[], object]] = {
     "graph is": lambda: BUILD.judge_route_graph("graph"),
     "graph is None": lambda: BUILD.export_nav2(None, "graph.geojson"),
     "pairs is 1000": lambda: BUILD.judge_route_graph(GRAPH, pairs=10**20),
-    "topology is None": lambda: BUILD.build_route_graph(None),
-    "nodes is 'many'": lambda: BUILD.build_route_graph(TOPOLOGY, nodes="many"),
-    "spacing_m is nan": lambda: BUILD.build_route_graph(TOPOLOGY, spacing_m=np.nan),
+    "topology is None": lambda: BUILD.build_lane_graph(None),
+    "spacing_m is nan": lambda: BUILD.build_lane_graph(TOPOLOGY, spacing_m=np.nan),
     "grid is 'office'": lambda: MAPS.write_movingai_map("office", "office.map"),
     "before is None": lambda: CARRY(layer_of(np.ones((3, 5))), None, GRID),
     "costs is": lambda: PLANNERS(TOPOLOGY, preset="robot", costs=np.ones((3, 5))),

@@ -15,7 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 import hybridnav as hn
-from hybridnav.ext.graphs import build_route_graph, export_bundle, route_messages
+from hybridnav.ext.graphs import build_lane_graph, export_bundle, route_messages
 from hybridnav.messages import fill_message
 from tests import ros_stand_in
 from tests.nav2_reader import read_nav2
@@ -56,7 +56,7 @@ def node(
     model, bundle = folder / "floor.hnm", folder / "nav2"
     hn.save(grid, model)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
-    graph = build_route_graph(topology, nodes=20)
+    graph = build_lane_graph(topology)
     # Ids as `--keep` leaves them: they are not those of the order.
     graph = replace(graph, ids=(graph.ids[0] * 3 + 700, graph.ids[1] * 3 + 701))
     export_bundle(topology, graph, bundle)

@@ -144,8 +144,18 @@ def run(arguments: list[str]) -> int:
     return code if isinstance(code, int) else EXIT_SOLVED
 
 
+_GONE = {
+    "--methods": "name methods in Python, RunSettings(methods=)",
+    "--nodes": "fewer nodes come of a larger --spacing",
+    "--style": "leave it out, graphs are lanes",
+}
+"""Options of former versions, and what to do instead."""
+
+
 def _explain(error: Any) -> None:
     message = error.format_message()
+    if instead := _GONE.get(getattr(error, "option_name", "")):
+        message = f"{error.option_name} is gone: {instead}"
     if "\n" in message:  # a command without arguments: its whole help
         sys.stderr.write(f"{message}\n")
         return

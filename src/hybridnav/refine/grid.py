@@ -14,7 +14,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.kernels import line_of_sight as kernels
-from hybridnav.refine.kernels.line_of_sight import apart, clear_segments, reaches, shared
+from hybridnav.refine.kernels.line_of_sight import clear_segments
 from hybridnav.refine.kernels.taut import marks_of
 from hybridnav.search.grid_search import Cell, GridSearch
 
@@ -169,70 +169,6 @@ class Sight:
             bool (n,); true for two equal endpoints.
         """
         return clear_segments(self._marks, np.ascontiguousarray(tails), np.ascontiguousarray(heads))
-
-    def apart(
-        self, taken: FloatArray, candidates: FloatArray, spacing_cells: float, most: int
-    ) -> BoolArray:
-        """Choose positions one by one that see no other within a distance.
-
-        Parameters
-        ----------
-        taken
-            float64 (k, 2), positions as in `clear` that are there already.
-        candidates
-            float64 (n, 2), positions to choose from, in the order in which they are tried.
-        spacing_cells
-            The distance in cells; with 0, only equal positions are left out.
-        most
-            Number of positions, taken ones included, at which to stop.
-
-        Returns
-        -------
-        BoolArray
-            bool (n,), the chosen candidates.
-        """
-        both = np.concatenate([taken, candidates])
-        return apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
-
-    def reaches(self, corners: FloatArray, steps: FloatArray, farthest: float) -> FloatArray:
-        """Return about how far rays from lattice corners run through free cells.
-
-        Parameters
-        ----------
-        corners
-            float64 (n, 2), (row, col) in grid units.
-        steps
-            float64 (n, 2), steps of length 1 along the rays.
-        farthest
-            Distance in cells at which rays end.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n,), in cells, up to a step of half a cell.
-        """
-        return reaches(self._marks, corners, steps, farthest)
-
-    def shared(
-        self, starts: FloatArray, goals: FloatArray, limits: FloatArray, positions: FloatArray
-    ) -> BoolArray:
-        """Return which pairs see a common position over which the way is short enough.
-
-        Parameters
-        ----------
-        starts, goals
-            float64 (n, 2), as in `clear`.
-        limits
-            float64 (n,), lengths in cells up to which a way is short enough.
-        positions
-            float64 (k, 2), as in `clear`.
-
-        Returns
-        -------
-        BoolArray
-            bool (n,).
-        """
-        return shared(self._marks, starts, goals, limits, positions)
 
 
 class Refiner(Protocol):

@@ -238,7 +238,7 @@ def test_doors_that_no_edge_passes_are_not_in_the_graph_of_a_floor():
     wide = topology_of(NOOK, robot_radius_m=0.6)
     for topology, expected in ((rooms, 3), (wide, 1)):
         floor = hn.ext.fleet.floor_graph(
-            topology, hn.ext.graphs.build_route_graph(topology), name="1"
+            topology, hn.ext.graphs.build_lane_graph(topology), name="1"
         )
         named = {
             facts["door_name"] for facts in floor.graph.edge_facts.values() if "door_name" in facts

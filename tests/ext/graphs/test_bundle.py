@@ -9,7 +9,7 @@ import yaml
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.ext.graphs import build_lane_graph, build_route_graph, export_bundle
+from hybridnav.ext.graphs import build_lane_graph, export_bundle
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.nav2_reader import read_nav2
 from tests.nav2_robot import (
@@ -24,7 +24,7 @@ from tests.nav2_robot import (
 
 
 def bundle_of(here, folder, **options):
-    graph = build_route_graph(here, nodes=40, seed=1)
+    graph = build_lane_graph(here, spacing_m=1.0)
     return graph, export_bundle(here, graph, folder, **options)
 
 

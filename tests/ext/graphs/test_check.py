@@ -19,7 +19,7 @@ from tests.drawn_rooms import HOUSE, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid
 
 HERE = topology_of(HOUSE, origin_m=(-3.0, 1.0), yaw_rad=0.4)
-SOUND = hn.ext.graphs.build_route_graph(HERE)
+SOUND = hn.ext.graphs.build_lane_graph(HERE)
 
 
 @pytest.fixture
@@ -330,7 +330,7 @@ def test_free_ground_outside_the_building_gets_no_nodes_and_a_warning():
     nameless = [line.replace("o", ".") for line in WITH_MARGIN]
     topology = topology_of(nameless)
     letters = np.array([list(line) for line in reversed(WITH_MARGIN)])
-    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=2.0)
+    graph = hn.ext.graphs.build_lane_graph(topology, spacing_m=2.0)
     cells = topology.grid.frame.cells_of(graph.points)
     assert set(letters[tuple(cells.T)]) == {"k", "a"}
     plain = graph.to_networkx()
@@ -346,7 +346,7 @@ def test_free_ground_outside_the_building_gets_no_nodes_and_a_warning():
 
 def test_a_room_outside_is_no_free_ground():
     topology = topology_of(WITH_MARGIN)
-    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=2.0)
+    graph = hn.ext.graphs.build_lane_graph(topology, spacing_m=2.0)
     assert "hall" in graph.rooms
     (island,) = hn.ext.graphs.check_graph(
         topology, hn.ext.graphs.WaypointGraph.from_networkx(graph.to_networkx())

@@ -72,7 +72,7 @@ def test_nothing_lies_in_rooms_that_lists_leave_out():
     topology = grown(cells, hn.RoomLabels(("room-1", "room-2", "room-3", "room-4"), labels))
     assert topology.rooms.is_listed.tolist() == [True, True, True, False]
     assert "room-4" not in build_lane_graph(topology).rooms
-    report = hn.ext.graphs.build_route_graph(topology)
+    report = hn.ext.graphs.build_lane_graph(topology)
     assert "room-4" not in report.rooms
 
 

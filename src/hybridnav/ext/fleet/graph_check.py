@@ -327,12 +327,11 @@ def judge_building_graph(
     --------
     >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, building_graph
     >>> from hybridnav.ext.fleet import judge_building_graph, match_graph
-    >>> from hybridnav.ext.graphs import build_route_graph
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
     >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (0.5, 0.5))
     >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
-    >>> matched = match_graph(house, building_graph(house, build=build_route_graph))
+    >>> matched = match_graph(house, building_graph(house))
     >>> judge_building_graph(matched, pairs=20).counts["all"].answers
     {'solved': 20}
     """

@@ -1,4 +1,3 @@
-from .build import build_route_graph as build_route_graph
 from .bundle import export_bundle as export_bundle
 from .check import GraphCheck as GraphCheck, check_graph as check_graph
 from .gather import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,7 +17,7 @@ from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.graphs import fleet_options as given
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from hybridnav.ext.fleet import Building
     from hybridnav.ext.graphs import Excess, GraphReport, RouteGraph
@@ -44,8 +43,7 @@ SpacingOption = Annotated[
     typer.Option(
         "--spacing",
         metavar="D",
-        help="Distance in metres between the lanes of a hall, by default 4, less in arenas; of a "
-        "roadmap, within which points see a node, by default 1.",
+        help="Distance in metres between the lanes of a hall, by default 4, less in arenas.",
     ),
 ]
 
@@ -63,10 +61,8 @@ def export(
     costs: options.CostsOption = None,
     operations: given.OperationsOption = False,
     kind: FormatOption = "nav2",
-    style: given.StyleOption = "lanes",
     points: given.PointsOption = None,
     keep: given.KeepOption = None,
-    nodes: given.NodesOption = None,
     spacing_m: SpacingOption = None,
     lanes_m: given.LanesOption = None,
     frame: options.FrameOption[str] = "map",
@@ -96,10 +92,8 @@ def export(
     common.check_picture(plot)
     fleet = given.Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     of_graphs = {
-        "--style": None if style == given.STYLES[0] else style,
         "--points": points,
         "--keep": keep,
-        "--nodes": nodes,
         "--spacing": spacing_m,
         "--lanes": lanes_m,
         "--report": report,
@@ -107,7 +101,6 @@ def export(
     }
     homes = [each for each in _ENDINGS if each not in _PARTS]
     given.check_homes(of_graphs, homes, f"--format {kind}")
-    given.check_style(style, {"--nodes": nodes}, {"--points": points, "--keep": keep})
     named, lifts = given.read_points(points) if points else ({}, ())
     settings = reading.settings(map_file)
     seconds: dict[str, float] = {}
@@ -123,11 +116,11 @@ def export(
         return
     own = floor if keep is not None and keep.suffix in given.ENDINGS.get(kind, ()) else None
     before = None if keep is None else hn.ext.graphs.load_graph(keep, floor=own)
-    for_lanes = {name: each for name, each in (("keep", before), ("points", named)) if each}
     began = clock()
-    build = _builder(style, nodes, spacing_m, settings.pyramid.seed)
     with common.progress_bar("building the graph") as advance:
-        graph = build(topology, progress=advance, **for_lanes)
+        graph = hn.ext.graphs.build_lane_graph(
+            topology, spacing_m=spacing_m, points=named, keep=before, progress=advance
+        )
         if lanes_m is not None:
             graph = hn.ext.graphs.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(clock() - began, 6)
@@ -136,8 +129,7 @@ def export(
         missing = list(_write_graph(topology, graph, aim, out, frame))
         graph, keepout = given.opened(graph, robot)  # as the file holds it
         missing += given.left_out(topology, graph)
-    is_few = fleet is not None or nodes is not None
-    pairs = given.LOSS_PAIRS if report is None and is_few else report
+    pairs = given.LOSS_PAIRS if report is None and fleet is not None else report
     judged = None
     if pairs is not None:
         with common.stage("comparing routes", seconds, "report"):
@@ -148,18 +140,8 @@ def export(
     changes = {} if before is None else hn.ext.graphs.graph_changes(before, graph)
     figures |= {"left_out": missing} | ({"changes": changes} if changes else {})
     given.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
-    given.warn_of_loss({graph.grid.name: judged} if judged is not None and is_few else {})
+    given.warn_of_loss({graph.grid.name: judged} if judged is not None and fleet else {})
     given.draw(graph, keepout, plot)
-
-
-def _builder(
-    style: str, nodes: int | None, spacing_m: float | None, seed: int
-) -> Callable[..., RouteGraph]:
-    """Return what builds the graph of a map in a style; see `export`."""
-    if style == "lanes":
-        return partial(hn.ext.graphs.build_lane_graph, spacing_m=spacing_m)
-    near_m = 1.0 if spacing_m is None else spacing_m
-    return partial(hn.ext.graphs.build_route_graph, nodes=nodes, spacing_m=near_m, seed=seed)
 
 
 def _export_over_floors(
@@ -168,8 +150,6 @@ def _export_over_floors(
     out: Path | None,
     force: bool,
     kind: str,
-    style: str,
-    nodes: int | None,
     spacing_m: float | None,
     anchor: str | None,
     vehicles: list[str] | None,
@@ -179,7 +159,6 @@ def _export_over_floors(
 ) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
     out = _checked_out(kind, out, force=force)
-    given.check_style(style, {"--nodes": nodes}, {})
     fleet = given.Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
     if fleet is None and kind != "indoorgml":
         raise common.UsageError(
@@ -195,12 +174,11 @@ def _export_over_floors(
             parts = _write_indoorgml(building, out, map_file)
         given.respond(*parts, seconds, as_json=as_json)
         return
-    build = _builder(style, nodes, spacing_m, reading.seed or 0)
     reports: list[GraphReport] = []
     bare: list[str] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
-        built = build(topology)
+        built = hn.ext.graphs.build_lane_graph(topology, spacing_m=spacing_m)
         bare.extend(f"{topology.grid.name}: {each}" for each in given.left_out(topology, built))
         reports.append(hn.ext.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
         return built
@@ -340,7 +318,7 @@ def _ids_line(graph: RouteGraph) -> list[str]:
     if most <= MOST_ID:
         return []
     held = f"messages of ComputeRoute hold {MOST_ID:,}"
-    return [f"ids        up to {most:,}; {held}: for these, give fewer --nodes"]
+    return [f"ids        up to {most:,}; {held}: for these, give a larger --spacing"]
 
 
 def _line(excess: Excess) -> str:

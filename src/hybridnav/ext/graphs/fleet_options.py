@@ -21,21 +21,11 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.ext.graphs import GraphReport, RouteGraph
 
-STYLES = ("lanes", "roadmap")
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
 """Endings of the file of each format."""
 LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 """Pairs by which the loss of a graph for a fleet is measured, and from where on it is a warning."""
 
-StyleOption = Annotated[
-    str,
-    typer.Option(
-        "--style",
-        metavar="NAME",
-        help="lanes: few nodes in the middle of free space, as a person draws them; roadmap: many "
-        "nodes, for routes nearly as short as paths.",
-    ),
-]
 KeepOption = Annotated[
     Path | None,
     typer.Option(
@@ -51,15 +41,6 @@ PointsOption = Annotated[
         metavar="FILE",
         help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
         "get a node with the name at each. Its section lifts: has points of lifts.",
-    ),
-]
-NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        min=1,
-        help="Nodes of a roadmap to aim at: fewer nodes, longer routes.",
     ),
 ]
 LanesOption = Annotated[
@@ -263,14 +244,6 @@ def _pair(value: Any) -> tuple[float, float] | None:
     return pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
 
 
-def check_style(style: str, of_roadmaps: dict[str, Any], of_lanes: dict[str, Any]) -> None:
-    """Refuse styles that are none, and options of the other one."""
-    if style not in STYLES:
-        raise UsageError(f"--style must be one of {', '.join(STYLES)}, got {style!r:.80}")
-    check_homes(of_roadmaps, ("roadmap",), f"--style {style}")
-    check_homes(of_lanes, ("lanes",), f"--style {style}")
-
-
 def check_homes(given: dict[str, Any], homes: Iterable[str], chosen: str) -> None:
     """Refuse options that are not None where what is chosen, as `--format rmf`, is no home."""
     what, _, got = chosen.partition(" ")
@@ -286,7 +259,7 @@ def warn_of_loss(judged: dict[str, GraphReport]) -> None:
             complain(
                 f"warning: routes on the graph of {printable(name)} are {report.nearest.mean:.0%} "
                 f"longer on average than shortest paths, above {_MOST_LOSS:.0%}: for shorter ones "
-                "give a smaller --spacing, or --style roadmap without --nodes"
+                "give a smaller --spacing"
             )
 
 

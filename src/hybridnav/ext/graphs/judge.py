@@ -140,21 +140,6 @@ class FreeSpace:
         found: FloatArray = chain[kept]
         return found
 
-    def moved_off(self, bends: FloatArray, away_cells: float) -> FloatArray:
-        """Move positions off the blocked cell that paths bend round there, into a free cell.
-
-        `bends`: float64 (n, 2), lattice corners with one blocked cell of four; `away_cells`: how
-        far along rows, and along columns, where there is room, and elsewhere `RIM_CELLS`; no whole
-        number. Returns float64 (n, 2).
-        """
-        row, col = bends.astype(np.int64).T
-        below = ~(self.free[row - 1, col - 1] & self.free[row - 1, col])
-        left = ~(self.free[row - 1, col - 1] & self.free[row, col - 1])
-        off = np.stack([np.where(below, 1.0, -1.0), np.where(left, 1.0, -1.0)], axis=1)
-        near = bends + RIM_CELLS * off
-        moved = np.clip(bends + away_cells * off, RIM_CELLS, np.array(self.free.shape) - RIM_CELLS)
-        return np.where(self.sight.clear(near, moved)[:, None], moved, near)
-
     def components_at(self, positions: FloatArray) -> IntArray:
         """Return the connected part of free space that each position lies in, int32 (n,)."""
         found: IntArray = self.component_of[tuple(self.cells_at(positions).T)]
@@ -278,10 +263,10 @@ def judge_route_graph(
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph, judge_route_graph
+    >>> from hybridnav.ext.graphs import build_lane_graph, judge_route_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=12.0)
-    >>> graph = build_route_graph(hn.TopologicalMap(pyramid))
+    >>> graph = build_lane_graph(hn.TopologicalMap(pyramid))
     >>> judge_route_graph(graph, pairs=10).best.solved
     1.0
     """

@@ -6,76 +6,10 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.trig import exp, hypot, log
+from hybridnav._base.trig import hypot
 from hybridnav.maps.geometry import passed_cells
 
-# Spanners, and shortest routes between many pairs.
-
-_ROUNDING = 1e-12
-"""Relative slack on the length of a route, which is a sum of rounded numbers."""
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def spanner(positions, pairs, lengths, stretch):
-    """Choose pairs so that a route over chosen ones joins every pair, at most `stretch` times as
-    long.
-
-    Parameters
-    ----------
-    positions
-        float64 (n, 2), nodes.
-    pairs
-        int64 (m, 2), two nodes each, by length.
-    lengths
-        float64 (m,), the distance of each pair, ascending.
-    stretch
-        At least 1.
-
-    Returns
-    -------
-    array
-        bool (m,), the chosen pairs.
-    """
-    n, m = len(positions), len(pairs)
-    first = np.full(n, -1, np.int64)
-    following, head = np.empty(2 * m, np.int64), np.empty(2 * m, np.int64)
-    costs, reached = np.full(n, np.inf), np.empty(n, np.int64)
-    is_chosen = np.zeros(m, np.bool_)
-    n_arcs = 0
-    for pair in range(m):
-        tail, goal = pairs[pair, 0], pairs[pair, 1]
-        limit = stretch * lengths[pair] * (1.0 + _ROUNDING)
-        costs[tail], reached[0], n_reached = 0.0, tail, 1
-        heap = [(lengths[pair], 0.0, tail)]
-        is_joined = False
-        while heap and not is_joined:
-            _, cost, here = heapq.heappop(heap)
-            is_joined = here == goal
-            arc = first[here] if cost <= costs[here] else -1
-            while arc >= 0:
-                other = head[arc]
-                row, col = positions[other, 0], positions[other, 1]
-                step = hypot(positions[here, 0] - row, positions[here, 1] - col)
-                rest = hypot(positions[goal, 0] - row, positions[goal, 1] - col)
-                through = cost + step
-                if through < costs[other] and through + rest <= limit:
-                    if costs[other] == np.inf:
-                        reached[n_reached] = other
-                        n_reached += 1
-                    costs[other] = through
-                    heapq.heappush(heap, (through + rest, through, other))
-                arc = following[arc]
-        for k in range(n_reached):
-            costs[reached[k]] = np.inf
-        if not is_joined:
-            is_chosen[pair] = True
-            for k in range(2):
-                node = pairs[pair, k]
-                head[n_arcs], following[n_arcs] = pairs[pair, 1 - k], first[node]
-                first[node] = n_arcs
-                n_arcs += 1
-    return is_chosen
+# Shortest routes between many pairs.
 
 
 @guarded
@@ -153,15 +87,6 @@ def routes(graph, starts, goals, passed):
         for k in range(goals[0][pair], goals[0][pair + 1]):
             finish[goals[1][k]] = np.inf
     return found, offsets, expanded
-
-
-@njit(cache=True, nogil=True)
-def log_uniform(low, high, shares):
-    """Return numbers between `low` and each of `high`, by their shares in the logarithm."""
-    found = np.empty(len(high))
-    for k in range(len(high)):
-        found[k] = low * exp(shares[k] * log(high[k] / low))
-    return found
 
 
 # Free distances to the left and right along edges, and clearance.

@@ -12,11 +12,10 @@ from hybridnav._base.copies import frozen
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.ext.graphs.bends import Nodes
-from hybridnav.ext.graphs.build import missing_bends
 from hybridnav.ext.graphs.cover import Aims, complete
 from hybridnav.ext.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.ext.graphs.files.nav2_rules import MOST_ID
+from hybridnav.ext.graphs.joining import Nodes, missing_bends
 from hybridnav.ext.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.ext.graphs.lanes import described
 from hybridnav.ext.graphs.orientation import Orientation
@@ -91,8 +90,8 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
 
     One lane runs in the middle of each corridor and aisle; wide halls have a net of lanes. Nodes
     lie at crossings, doors, rooms and ends of lanes, and where lanes bend. Edges run along the
-    main directions of walls where there is room for it. Each is tested exactly, as in
-    `build_route_graph`. Nodes are connected exactly where free space connects them. Turned and
+    main directions of walls where there is room for it. Edges are segments that the robot can
+    follow, tested exactly. Nodes are connected exactly where free space connects them. Turned and
     mirrored maps have turned and mirrored lanes.
 
     Parameters
@@ -338,7 +337,7 @@ def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
 def _connect(sketch: Sketch, space: FreeSpace) -> None:
     """Join parts of the graph that free space connects."""
     sketch.unify()  # else parts that meet at one place are joined in vain
-    nodes = Nodes(space, len(sketch.positions), sketch.positions)
+    nodes = Nodes(space, sketch.positions)
     edges = [*map(tuple, sketch.edges.tolist())]
     while missing := missing_bends(nodes, np.array(edges, dtype=np.int64).reshape(-1, 2)):
         for path in missing:
@@ -375,7 +374,7 @@ def _described(
         for kind, known, name in zip(sketch.kinds.tolist(), by_degree, names, strict=True)
     ]
     doors = np.maximum(sketch.kinds - (DOOR - 1), 0).tolist()
-    nodes = Nodes(space, len(kinds), space.turn.back(sketch.positions), kinds, doors)
+    nodes = Nodes(space, space.turn.back(sketch.positions), kinds, doors)
     both = np.concatenate([sketch.edges, sketch.edges[:, ::-1]])
     return replace(described(topology, nodes, both), names=tuple(names))
 

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.ext.graphs.bends import Nodes
+from hybridnav.ext.graphs.joining import Nodes
 from hybridnav.ext.graphs.judge import RIM_CELLS, FreeSpace
 from hybridnav.ext.graphs.kernels import least_along, least_widths
 from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph
@@ -193,10 +193,10 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph, keep_right
+    >>> from hybridnav.ext.graphs import build_lane_graph, keep_right
     >>> grid = hn.OccupancyGrid(np.zeros((20, 80)), hn.Frame(0.1), robot_radius_m=0.2)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-    >>> graph = keep_right(topology, build_route_graph(topology), apart_m=0.6)
+    >>> graph = keep_right(topology, build_lane_graph(topology), apart_m=0.6)
     >>> "lane" in graph.kinds
     True
     """
@@ -228,7 +228,6 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
     chosen = unique_rows(np.concatenate(parts)).rows.astype(np.int64)
     nodes = Nodes(
         space,
-        graph.n_nodes + len(new),
         np.concatenate([positions, new]),
         [*graph.kinds, *[LANE] * len(new)],
         [*graph.doors.tolist(), *[0] * len(new)],

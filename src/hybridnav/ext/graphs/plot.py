@@ -186,12 +186,10 @@ def _draw_findings(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry
 # Pictures of route graphs over their map.
 
 _KINDS = {
-    "cover": ("further nodes", style.ARC, "o", 1.6),
     "lane": ("lanes", style.SELF_LOOP, "o", 1.6),
     "bend": ("bends", style.PARALLEL, "o", 2.0),
     "end": ("ends", style.PARALLEL, "s", 3.0),
     "crossing": ("crossings", style.INK, "o", 3.0),
-    "place": ("places", style.INK, "o", 3.0),
     "room": ("rooms", style.PATH, "s", 4.0),
     "door": ("doors", style.HOLE, "D", 4.0),
 }
@@ -228,10 +226,10 @@ def plot_route_graph(
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph, plot_route_graph
+    >>> from hybridnav.ext.graphs import build_lane_graph, plot_route_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> plot_route_graph(build_route_graph(topology), title="graph").get_title()
+    >>> plot_route_graph(build_lane_graph(topology), title="graph").get_title()
     'graph'
     """
     grid = graph.grid

@@ -61,10 +61,10 @@ def route_messages(
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph, route_messages
+    >>> from hybridnav.ext.graphs import build_lane_graph, route_messages
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=12.0)
-    >>> graph = build_route_graph(hn.TopologicalMap(pyramid))
+    >>> graph = build_lane_graph(hn.TopologicalMap(pyramid))
     >>> route = route_messages(graph, graph.edges[0].tolist())["route"]
     >>> [edge["edgeid"] - graph.n_nodes for edge in route["edges"]]
     [0]

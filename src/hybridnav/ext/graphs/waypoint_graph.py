@@ -200,16 +200,16 @@ LANE = "lane"
 class RouteGraph:
     """Nodes in free space, and straight edges between them that are free for the robot.
 
-    Edges have a direction: a passage in both directions is two edges. Made by `build_route_graph`.
+    Edges have a direction: a passage in both directions is two edges. Made by `build_lane_graph`.
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> from hybridnav.ext.graphs import build_lane_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=12.0)
-    >>> graph = build_route_graph(hn.TopologicalMap(pyramid))
+    >>> graph = build_lane_graph(hn.TopologicalMap(pyramid))
     >>> graph.n_nodes > 2, graph.kinds[0]
-    (True, 'place')
+    (True, 'crossing')
     """
 
     grid: OccupancyGrid
@@ -218,8 +218,7 @@ class RouteGraph:
     """float64 (n, 2), (row, col) of each node in grid units."""
     kinds: tuple[str, ...]
     """The kind of each node: room, door, point (a named one), crossing, end (of a lane), bend, or
-    place. A cover is for points that would see no node nearby, a lane for a lane of
-    `keep_right`."""
+    lane (of `keep_right`)."""
     rooms: tuple[str | None, ...]
     """The room of each node, None for no room."""
     doors: LongArray

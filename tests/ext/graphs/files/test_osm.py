@@ -106,7 +106,7 @@ STAIRS = Link(
 @pytest.fixture(scope="module")
 def house():
     topology = topology_of(HOUSE)
-    graph = hn.ext.graphs.build_route_graph(topology, spacing_m=6)
+    graph = hn.ext.graphs.build_lane_graph(topology, spacing_m=6)
     links = (LIFT, STAIRS)
     floors = [
         hn.ext.fleet.floor_graph(topology, graph, name=name, links=links, elevation_m=height)

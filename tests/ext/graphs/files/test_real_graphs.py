@@ -30,7 +30,7 @@ def gdc(data):
     for name in ("2", "3"):
         grid = hn.load_map(data / "bwi_gdc" / name / f"{name}.yaml", robot_radius_m=0.25)
         topologies[name] = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-        graphs[name] = hn.ext.graphs.build_route_graph(topologies[name], nodes=300)
+        graphs[name] = hn.ext.graphs.build_lane_graph(topologies[name])
         degrees = np.bincount(graphs[name].edges[:, 0], minlength=graphs[name].n_nodes)
         x, y = graphs[name].points[int(degrees.argmax())].tolist()
         at[name] = LinkEnd(name, (x + 0.02, y))

@@ -171,7 +171,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         that an edge passes, none that are closed to the robot or lead nowhere. They are called
         "FLOOR_doorNUMBER" and "FLOOR_openingNUMBER".
     graph
-        Its route graph, as `build_lane_graph`, `build_route_graph` and `keep_right` make it.
+        Its route graph, as `build_lane_graph` and `keep_right` make it.
     name
         Name of the floor.
     elevation_m
@@ -196,11 +196,11 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph
+    >>> from hybridnav.ext.graphs import build_lane_graph
     >>> from hybridnav.ext.fleet import floor_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> floor = floor_graph(topology, build_route_graph(topology), name="1")
+    >>> floor = floor_graph(topology, build_lane_graph(topology), name="1")
     >>> floor.graph.n_nodes > 2, floor.doors
     (True, ())
     """
@@ -243,7 +243,7 @@ def building_graph(
     name
         Name of the building in files.
     build
-        Makes the route graph of a floor, as `build_lane_graph` and `build_route_graph` do.
+        Makes the route graph of a floor, as `build_lane_graph` does.
     progress
         Called after each floor with the number of floors done and of all floors.
 

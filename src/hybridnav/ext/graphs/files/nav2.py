@@ -54,10 +54,10 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_route_graph, export_nav2
+    >>> from hybridnav.ext.graphs import build_lane_graph, export_nav2
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
-    >>> export_nav2(build_route_graph(topology), "graph.geojson")
+    >>> export_nav2(build_lane_graph(topology), "graph.geojson")
     """
     if isinstance(graph, WaypointGraph):
         name = graph.name
@@ -78,7 +78,7 @@ def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[st
     if not graph.n_edges:
         raise InvalidValueError(
             f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: "
-            "build it by build_route_graph, with a smaller spacing_m (--spacing)"
+            "build it by build_lane_graph, with a smaller spacing_m (--spacing)"
         )
     if graph.n_nodes + graph.n_edges > rules.MOST_ID:
         raise InvalidValueError(

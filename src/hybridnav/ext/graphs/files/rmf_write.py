@@ -100,7 +100,7 @@ def export_rmf(
     if not any(floor.graph.n_edges for floor in building.floors):
         raise InvalidValueError(
             f"building {building.name!r:.60} has no edge, expected lanes: build its graphs by "
-            "build_route_graph, with a smaller spacing_m (--spacing)"
+            "build_lane_graph, with a smaller spacing_m (--spacing)"
         )
     links = tuple(_aligned(link) for link in building.links)
     moved = [
