@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 import hybridnav as hn
 from hybridnav._base.clock import clock
 from hybridnav._base.files import check_replaceable, printable, without_controls
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import HybridNavError, MapError, PresetError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from hybridnav._base.progress import Progress
 
 EXIT_SOLVED = 0
 EXIT_NOT_SOLVED = 1
@@ -103,13 +102,7 @@ def progress_bar(text: str) -> Iterator[Progress]:
 def _spinner(text: str) -> Iterator[None]:
     """Draw a spinner on stderr, and after some seconds a bar with the time that went by."""
     from rich.console import Console  # noqa: PLC0415 - on demand
-    from rich.progress import (  # noqa: PLC0415
-        BarColumn,
-        Progress,
-        SpinnerColumn,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
 
     parts = SpinnerColumn(), TextColumn("{task.description}", markup=False)
     with Progress(*parts, console=Console(stderr=True), transient=True) as shown:

@@ -19,11 +19,7 @@ from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile
 from hybridnav.harness.records import query_key
 from hybridnav.harness.tables import METHOD_COLUMNS, text_of
-from hybridnav.harness.yardstick import (
-    ANSWERED,
-    KINDS,
-    OPTIMA,
-)
+from hybridnav.harness.yardstick import ANSWERED, KINDS, OPTIMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError, MapWarning, brief
 from hybridnav.harness.methods import (
     REFERENCE,
@@ -47,7 +47,6 @@ from hybridnav.maps.files.movingai import load_scenarios
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
     from hybridnav.harness.names import NamedMethod
     from hybridnav.harness.records import Record

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.endpoints import read_points
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray
     from hybridnav.harness.records import Record
     from hybridnav.harness.task import Task

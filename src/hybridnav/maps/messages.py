@@ -9,14 +9,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import MAX_CELLS, CellClass
 from hybridnav.maps.frame import Frame
-from hybridnav.messages import (
-    count_of,
-    header_message,
-    number_of,
-    pose_message,
-    pose_of,
-    value_of,
-)
+from hybridnav.messages import count_of, header_message, number_of, pose_message, pose_of, value_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

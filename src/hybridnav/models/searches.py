@@ -26,12 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.models.container import FiledPart, Part
     from hybridnav.planner import PlannerSettings
     from hybridnav.search.found import Prepared
-    from hybridnav.search.mesh import (
-        ConvexMesh,
-        CornerGraph,
-        CornerHierarchy,
-        MeshSearch,
-    )
+    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.search.octile import JumpSearch
 
 

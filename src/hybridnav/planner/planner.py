@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
@@ -16,7 +16,7 @@ from hybridnav.planner import Preset, load_preset
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
-from hybridnav.planner.follow import begun, opened, update_of
+from hybridnav.planner.follow import PlannerUpdate, begun, opened, update_of
 from hybridnav.planner.methods import make_method
 from hybridnav.planner.methods.grid import KnownMap
 from hybridnav.planner.planning import Planning
@@ -32,13 +32,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import PathLike
     from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planner import PlanBatch, PlanResult
-    from hybridnav.planner.follow import PlannerUpdate
     from hybridnav.planner.guide.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.planning import Smooth

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner import PlanStatus
 from hybridnav.planner.endpoints import read_points
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from scipy import sparse
 
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.closures.blocked import Closable
     from hybridnav.maps.costs import CostLayer

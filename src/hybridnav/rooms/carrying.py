@@ -13,12 +13,7 @@ from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
-from hybridnav.rooms.doors import (
-    LEAST_DOOR_M,
-    RoomBoundaries,
-    measured_clearance_m,
-    numbered,
-)
+from hybridnav.rooms.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m, numbered
 from hybridnav.rooms.registering import (
     Candidate,
     Surface,

@@ -18,7 +18,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import legal_moves
 from hybridnav._base.threads import Pool
 from hybridnav.maps.costs.factors import UNIT_BITS
-from hybridnav.pyramid.record import SURVIVES
+from hybridnav.pyramid.record import SURVIVES, Record
 from hybridnav.route.route import Corridor
 from hybridnav.search.grid_search import move_tables
 from hybridnav.search.kernels import descent as _kernels
@@ -28,7 +28,6 @@ from hybridnav.search.kernels.grid_search import BUCKETS
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.pyramid.record import Record
 
 Cell = tuple[int, int]
 _ROOM = 1024

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import cells_of_line
@@ -21,7 +21,6 @@ from hybridnav.search.found import Found, Method, PlanStats
 from hybridnav.search.lattice import LatticeSearch, build_lattice
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.maps.areas import Box
     from hybridnav.planner.settings import CheapestSettings

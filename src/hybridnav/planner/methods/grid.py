@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import octile_distance_in_cells
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav.maps import CellClass
 from hybridnav.planner.methods.own_refiner import own_refiner
 from hybridnav.refine import GridRefiner
 from hybridnav.search.found import Found, Method, PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer

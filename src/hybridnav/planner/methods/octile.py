@@ -9,14 +9,13 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import behind
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import Found, FoundMany, Method, PlanStats
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import BoolArray
     from hybridnav.planner import PlannerSettings
     from hybridnav.search.distance_table import LabelSource

@@ -11,19 +11,17 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import path_length_in_cells
-from hybridnav._base.progress import no_progress
+from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.trig import dist
 from hybridnav.errors import PresetError, brief
 from hybridnav.maps.geometry import polyline_length
-from hybridnav.planner.methods.grid import round_closed
+from hybridnav.planner.methods.grid import KnownMap, round_closed
 from hybridnav.planner.methods.own_refiner import class_of, one_line, refused
 from hybridnav.planner.path import is_length
 from hybridnav.search.found import Found, Method
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav.planner import PlannerSettings
-    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.refine import GridRefiner
     from hybridnav.search.found import Query
 

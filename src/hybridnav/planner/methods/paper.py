@@ -16,16 +16,14 @@ from hybridnav import route as routes
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
-from hybridnav._base.progress import no_progress
-from hybridnav.planner.methods.grid import WholeMap, on_cells, round_closed
+from hybridnav._base.progress import Progress, no_progress
+from hybridnav.planner.methods.grid import KnownMap, WholeMap, on_cells, round_closed
 from hybridnav.route.route import Route, RouteOfPlaces
 from hybridnav.search.descent import Descent, DescentSettings
 from hybridnav.search.found import Found, Method, PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav._base.progress import Progress
     from hybridnav._base.typing import LongArray
-    from hybridnav.planner.methods.grid import KnownMap
     from hybridnav.planner.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.search.found import Metric, Query

@@ -14,14 +14,7 @@ from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.checks import checked_type
-from hybridnav.rooms.files.entries import (
-    LIMITS,
-    Outline,
-    Read,
-    fingerprint,
-    in_cells,
-    packed,
-)
+from hybridnav.rooms.files.entries import LIMITS, Outline, Read, fingerprint, in_cells, packed
 from hybridnav.rooms.files.outlines import Outlines, decimals_of
 from hybridnav.rooms.files.paint import apart, by_rule, outlined
 from hybridnav.rooms.files.read import check_points, check_rooms, labels_of

@@ -10,12 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import Pool
-from hybridnav.search.mesh.build import (
-    ConvexMesh,
-    merge_triangles,
-    select_triangles,
-    triangulate,
-)
+from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
 from hybridnav.search.mesh.kernels import closures as kernels
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
