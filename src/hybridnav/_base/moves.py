@@ -95,7 +95,7 @@ def cost_of(cells: LongArray) -> int:
     return (len(cells) - 1 - diagonal) * STRAIGHT + diagonal * DIAGONAL
 
 
-def octile_distance_in_cells(first: ArrayLike, second: ArrayLike) -> float:
+def octile_distance_in_cells(first: tuple[int, int], second: tuple[int, int]) -> float:
     """Return the length of the shortest octile path between two cells without obstacles."""
-    rows, cols = np.abs(np.subtract(first, second))
-    return float(abs(int(rows) - int(cols)) + min(int(rows), int(cols)) * math.sqrt(2.0))
+    rows, cols = abs(first[0] - second[0]), abs(first[1] - second[1])
+    return abs(rows - cols) + min(rows, cols) * math.sqrt(2.0)

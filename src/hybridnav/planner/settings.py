@@ -287,13 +287,13 @@ class PaperSettings(_Refined):
     """Whether a route comes down from the places through the levels of the pyramid to small fields,
     or its places are the corridor at once."""
     field_cells: Annotated[_Int, Field(ge=1)] = 128
-    """Mean size of the fields in which a descent ends, in cells."""
+    """Mean size of the fields at which a descent ends, in cells."""
     step: Annotated[_Float, Field(ge=1, allow_inf_nan=False)] = 8.0
     """How many times smaller the fields of each level of a descent are than those before."""
     ring: Annotated[_Int, Field(ge=0, le=100)] = 1
     """Rings of fields that a descent keeps beside its route; at the top two more."""
     horizon_cells: Annotated[_Int, Field(ge=0)] = 128
-    """Cells that grid A* looks ahead in the last fields; 0 for one search of all of them."""
+    """Cells that grid A* looks ahead along the last fields; 0 for one search inside them."""
     corridor: Literal["route", "joined", "neighbours"] = "joined"
     """With `levels: places`, the fields in which the refiner searches: see
     `hybridnav.route.corridor_of`."""

@@ -1,9 +1,10 @@
 """A descent through the levels of a pyramid: routes of ever smaller fields, and a path of cells.
 
 A route of places is found first. Its fields and those beside them are kept, and the next route is
-found among their sons, two levels down; so on to fields of some hundred cells, in which A* finds
-the path. N. Sturtevant and M. Buro (Partial pathfinding using map abstraction and refinement, 2005)
-plan so on abstractions of a grid, and refine a part of the path at a time.
+found among their sons, some levels down; so on to fields of some hundred cells, along which A*
+finds the path, window by window. N. Sturtevant and M. Buro (Partial pathfinding using map
+abstraction and refinement, 2005) plan so on abstractions of a grid, and refine a part of the path
+at a time.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 _ROOM = 1024
+_ROOT_2 = math.sqrt(2)
 _WINDOWS = 1 << 20
 """More windows than a descent has."""
 NEARLY = 0.85
@@ -51,7 +53,7 @@ class DescentSettings(NamedTuple):
     ring: int = 1
     """Rings of fields kept beside the route at each level; places keep two more."""
     horizon_cells: int = 128
-    """Cells that a window of A* looks ahead in the last fields; 0 for all of them at once."""
+    """Cells that a window of A* looks ahead along the last fields."""
 
 
 class Descended(NamedTuple):
@@ -66,7 +68,9 @@ class Descended(NamedTuple):
     expanded_fields: int
     """Fields expanded, at all levels."""
     corridor_cells: int
-    """Cells of the last fields."""
+    """Cells of the last fields: those of the corridor, or of the route alone."""
+    length: float
+    """Length of the path, cells; 0 without one."""
 
 
 def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]:
@@ -117,25 +121,27 @@ def pack(
         total = np.stack([np.bincount(of_level, part, n_fields) for part in sums.T], axis=1)
         means = total[:, 1:] / total[:, :1]
         arcs = of_level[lowest.arcs[edge_end >= min(2 * level + 2, SURVIVES)]]
+        is_open = enterable.flat[survivors[alive]]
+        may_pass = is_open[arcs].all(axis=1) & (arcs[:, 0] != arcs[:, 1])
+        arcs = arcs[may_pass]
         if above is None:
             middle = np.stack(np.divmod(survivors[alive], cols), axis=1)
-            costs = pyramid[level].max_distance_m / pyramid.grid.resolution_m
+            costs = pyramid[level].max_distance_m[may_pass] / pyramid.grid.resolution_m
             parent = np.full(n_fields, -1)
         else:
             middle = means[:, :2]
             rows_cols = np.abs(middle[arcs[:, 0]] - middle[arcs[:, 1]])
-            costs = rows_cols.max(axis=1) + (math.sqrt(2) - 1) * rows_cols.min(axis=1)
+            costs = rows_cols.max(axis=1) + (_ROOT_2 - 1) * rows_cols.min(axis=1)
             if units is not None:
                 costs *= means[arcs, 2].mean(axis=1) / (1 << UNIT_BITS)
             parent = above[alive] + starts[-2]
         first, neighbour, cost = _neighbours(arcs, costs, n_fields)
-        is_open = enterable.flat[survivors[alive]]
-        parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle, is_open))
+        parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle))
         n_arcs += len(neighbour)
         starts.append(starts[-1] + n_fields)
         above = of_level
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32, np.bool_]
+    dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32]
     arrays: list[Any] = [c.astype(dtype) for c, dtype in zip(columns, dtypes, strict=True)]
     arrays[0] = np.append(arrays[0], n_arcs)
     return LevelFields._make([np.array(starts), *arrays, survivors, lowest.areas])
@@ -154,32 +160,28 @@ def _neighbours(
 ) -> tuple[LongArray, LongArray, FloatArray]:
     """Return where the neighbours of each field begin, the neighbours, each once, and their costs.
 
-    Arcs between the same two fields cost the same; self-loops are left out.
+    Arcs between the same two fields cost the same.
     """
     ends = np.concatenate([arcs, arcs[:, ::-1]])
-    is_plain = ends[:, 0] != ends[:, 1]
-    keys, chosen = np.unique(
-        ends[is_plain, 0].astype(np.int64) * n_fields + ends[is_plain, 1], return_index=True
-    )
+    keys, chosen = np.unique(ends[:, 0].astype(np.int64) * n_fields + ends[:, 1], return_index=True)
     tails, heads = np.divmod(keys, max(n_fields, 1))
     first = np.searchsorted(tails, np.arange(n_fields))
-    return first, heads, np.tile(costs, 2)[is_plain][chosen]
+    return first, heads, np.tile(costs, 2)[chosen]
 
 
 class _Work:
     """What one descent writes, and its number."""
 
     def __init__(self, fields: LevelFields, n_cells: int) -> None:
-        n_fields, n_last = len(fields.open), len(fields.survivor)
+        n_fields = len(fields.parent)
         self.number = 0
         self.marks = Marks(
             cost=np.empty(n_fields),
             came=np.empty(n_fields, dtype=np.int32),
             seen=np.zeros(n_fields, dtype=np.int64),
             kept=np.zeros(n_fields, dtype=np.int64),
-            listed=np.zeros(n_fields + 1, dtype=np.int32),
-            inside=np.zeros(n_last, dtype=np.bool_),
-            told=np.zeros(5, dtype=np.int64),
+            listed=np.zeros(n_fields, dtype=np.int32),
+            told=np.zeros(6, dtype=np.int64),
             heap=np.empty((_ROOM, 2)),
             records=np.zeros(n_cells, dtype=np.int64),
             waiting=np.empty(_ROOM * BUCKETS, dtype=np.int32),
@@ -247,8 +249,10 @@ class Descent:
         rings[0] += 2 if settings.ring else 0
         self._rings, self._horizon = rings, float(settings.horizon_cells)
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
-        tables = move_tables(corner_cutting=corner_cutting)
-        self._ground = MapCells(moves.ravel(), enterable.shape[1], self.field_of.ravel(), *tables)
+        successors, _ = move_tables(corner_cutting=corner_cutting)
+        self._ground = MapCells(
+            moves.ravel(), enterable.shape[1], self.field_of.ravel(), successors
+        )
         self._works = Pool(partial(_Work, self.fields, enterable.size))
 
     @property
@@ -267,12 +271,19 @@ class Descent:
         return found
 
     def corridor(self, start: Cell, goal: Cell) -> tuple[Descended, Corridor | None]:
-        """Find the last fields alone, and return them as a corridor, None without a route."""
-        return self._descend(start, goal, 0.0)
+        """Find the last fields alone, with the rings round them, as a corridor; None without a
+        route."""
+        found, listed = self._descend(start, goal, 0.0)
+        if listed is None:
+            return found, None
+        inside = np.zeros(len(self.fields.survivor), dtype=np.bool_)
+        inside[listed - self.fields.starts[-2]] = True
+        return found, Corridor(self.field_of, inside, found.corridor_cells)
 
     def _descend(
         self, start: Cell, goal: Cell, horizon: float
-    ) -> tuple[Descended, Corridor | None]:
+    ) -> tuple[Descended, IntArray | None]:
+        """Return the outcome of a descent, and the last fields where there is a route."""
         cols = self._ground.cols
         ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
         work = self._works.take()
@@ -281,16 +292,17 @@ class Descent:
             route, cells = _kernels.descend(
                 self.fields, marks, self._ground, work.number + 1, ends, self._rings, horizon
             )
-            status, last, expanded_fields, expanded, corridor_cells = marks.told.tolist()
+            status, last, *effort, diagonals = marks.told.tolist()
             if status != _kernels.FULL:
                 break
             work.make_room()
             work.number += _WINDOWS  # what the stopped descent stamped counts no more
         work.number = max(work.number + 1, last)
-        corridor = None
-        if status >= 0 and horizon <= 0:
-            corridor = Corridor(self.field_of, marks.inside.copy(), corridor_cells)
+        listed = marks.listed[:status].copy() if status >= 0 and horizon <= 0 else None
         self._works.give(work)
-        path = cells if len(cells) else None
-        effort = expanded, expanded_fields, corridor_cells
-        return Descended(route[::-1] if self.is_of_places else route[:0], path, *effort), corridor
+        n = len(cells)
+        places = route[::-1] if self.is_of_places else route[:0]
+        length = n - 1 - diagonals + diagonals * _ROOT_2 if n else 0.0
+        fields, expanded, corridor = effort
+        path = cells if n else None
+        return Descended(places, path, expanded, fields, corridor, length), listed

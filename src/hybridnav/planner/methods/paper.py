@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav import route as routes
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.planner.methods.grid import KnownMap, WholeMap, on_cells, round_closed
@@ -23,9 +23,10 @@ from hybridnav.search.descent import Descent, DescentSettings
 from hybridnav.search.found import Found, Method, PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import LongArray
+    from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.planner.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
+    from hybridnav.route.route import Corridor
     from hybridnav.search.found import Metric, Query
 
 
@@ -46,6 +47,7 @@ class MaxDistance(Method):
         self._topology, self._settings = known.topology, settings
         self._whole_map = WholeMap(known, settings)
         self._refiner, self._own = self._whole_map.refiners
+        self._is_plain = self._own is None and known.costs is None
         self._search: MaxDistanceSearch | Descent | None = None
         self._building = threading.RLock()  # a progress callback may plan
 
@@ -78,49 +80,57 @@ class MaxDistance(Method):
     def find(self, query: Query) -> Found:
         """Find a path along the route; see `Method`."""
         began, search = clock(), self.prepare()
-        found = (
-            self._down(search, query, began)
-            if isinstance(search, Descent)
-            else self._along(search, query, began)
-        )
+        if not isinstance(search, Descent):
+            found = self._along(search, query, began)
+        elif self._is_plain and self._settings.horizon_cells:
+            found = self._in_one(search, query, began)
+        else:
+            found = self._down(search, query, began)
         if found is None:
             return self._over_whole_map(query, {"coarse": clock() - began})
-        if not found.has_path:
+        if query.closed is None or not found.has_path:
             return found
         return round_closed(found, query, self._refiner)
 
-    def _down(self, descent: Descent, query: Query, began: float) -> Found | None:
-        """Return the path that a descent leads to, None to search the whole map."""
-        is_plain = self._own is None and self._refiner.costs is None
-        if is_plain and self._settings.horizon_cells:
-            down, corridor = descent.find(*query.cells), None
-            cells, expanded = down.cells, down.expanded
-            seconds = {"descent": clock() - began}
-        else:
-            down, corridor = descent.corridor(*query.cells)
-            seconds = {"coarse": clock() - began}
-            cells, expanded = None, 0
-        if corridor is not None:
-            cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
-            seconds["refine"] = clock() - began - seconds["coarse"]
-        is_whole = self._topology.grid.corner_cutting
-        stats = PlanStats(
+    def _in_one(self, descent: Descent, query: Query, began: float) -> Found | None:
+        """Return the path that a descent finds down to the cells, None to search the whole map."""
+        places, cells, expanded, fields, corridor_cells, length = descent.find(*query.cells)
+        seconds = {"descent": clock() - began}
+        stats = filled(
+            PlanStats,
             expanded=expanded,
-            expanded_places=down.expanded_fields,
-            corridor_cells=down.corridor_cells,
+            expanded_places=fields,
+            corridor_cells=corridor_cells,
             seconds=seconds,
         )
-        if corridor is None and cells is None:
+        if cells is None:
             # Fields of one class that meet by sides are joined by arcs: no route, no path.
-            return None if is_whole else Found(None, stats=stats)
-        if cells is None and self._refiner.costs is not None:  # cells that the layer closes
-            return None
-        bound = octile_distance_in_cells(*query.cells)
-        found = on_cells(self._refiner, cells, bound_cells=bound, stats=stats)
-        route = RouteOfPlaces(self._topology, down.places) if len(down.places) else None
-        if is_plain and cells is not None:
-            return replace(found, route=route, optimum=partial(self._optimum_m, query, cells))
-        return replace(found, route=route)
+            return None if self._topology.grid.corner_cutting else Found(None, stats=stats)
+        per_cell = self._topology.grid.resolution_m
+        return filled(
+            Found,
+            passed=cells,
+            cost=length * per_cell,
+            lower_bound_m=octile_distance_in_cells(*query.cells) * per_cell,
+            route=self._route_of(places),
+            optimum=partial(self._optimum_m, query, cells),
+            stats=stats,
+        )
+
+    def _route_of(self, places: IntArray) -> RouteOfPlaces | None:
+        """Return the route of some places, None for none."""
+        return (
+            filled(RouteOfPlaces, topology=self._topology, places=places) if len(places) else None
+        )
+
+    def _down(self, descent: Descent, query: Query, began: float) -> Found | None:
+        """Return the path in the last fields of a descent, None to search the whole map."""
+        down, corridor = descent.corridor(*query.cells)
+        route = self._route_of(down.places)
+        found = self._refined(query, began, corridor, route, down.expanded_fields)
+        if found is None or not found.has_path or not self._is_plain:
+            return found
+        return replace(found, optimum=partial(self._optimum_m, query, found.cells))
 
     def _optimum_m(self, query: Query, cells: LongArray) -> float:
         """Return the length of a shortest path of cells, metres, by A* on the whole map."""
@@ -133,29 +143,36 @@ class MaxDistance(Method):
     def _along(self, search: MaxDistanceSearch, query: Query, began: float) -> Found | None:
         """Return the path in the fields of the places, None to search the whole map."""
         topology = self._topology
-        route = search.search(*map(topology.place_at, query.cells))
-        seconds = {"coarse": clock() - began}
-        if route is None and topology.grid.corner_cutting:
-            return None
-        if route is None:
-            return Found(None, stats=PlanStats(seconds=seconds))
+        found = search.search(*map(topology.place_at, query.cells))
+        if found is None:
+            return self._refined(query, began, None, None, 0)
         beside, enterable = self._settings.corridor, search.enterable
-        corridor = routes.corridor_of(topology, route.places, beside=beside, enterable=enterable)
-        seconds["coarse"] = clock() - began
+        corridor = routes.corridor_of(topology, found.places, beside=beside, enterable=enterable)
+        places, arcs = topology.place_ids[found.places], topology.arc_ids[found.arcs]
+        route = Route(tuple(places.tolist()), tuple(arcs.tolist()))
+        return self._refined(query, began, corridor, route, found.expanded)
+
+    def _refined(
+        self,
+        query: Query,
+        began: float,
+        corridor: Corridor | None,
+        route: Route | RouteOfPlaces | None,
+        expanded_places: int,
+    ) -> Found | None:
+        """Return the path in a corridor, None to search the whole map."""
+        seconds = {"coarse": clock() - began}
+        if corridor is None:
+            is_whole = self._topology.grid.corner_cutting
+            stats = PlanStats(expanded_places=expanded_places, seconds=seconds)
+            return None if is_whole else Found(None, stats=stats)
         cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
         seconds["refine"] = clock() - began - seconds["coarse"]
         if cells is None and self._refiner.costs is not None:  # cells that the layer closes
             return None
-        places, arcs = topology.place_ids[route.places], topology.arc_ids[route.arcs]
-        stats = PlanStats(
-            expanded=expanded,
-            expanded_places=route.expanded,
-            corridor_cells=corridor.n_cells,
-            seconds=seconds,
-        )
+        stats = PlanStats(expanded, expanded_places, 0, corridor.n_cells, seconds)
         bound = octile_distance_in_cells(*query.cells)
-        found = on_cells(self._refiner, cells, bound_cells=bound, stats=stats)
-        return replace(found, route=Route(tuple(places.tolist()), tuple(arcs.tolist())))
+        return replace(on_cells(self._refiner, cells, bound_cells=bound, stats=stats), route=route)
 
     def _over_whole_map(self, query: Query, seconds: dict[str, float]) -> Found:
         """Return the answer on the whole map, with the seconds spent before."""

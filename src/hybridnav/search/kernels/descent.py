@@ -16,6 +16,8 @@ FULL = BUCKET_FULL
 """Status of a descent whose open list has too little room."""
 _UNLIMITED = 1 << 62
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
+FARTHEST = 8
+"""Horizons that a straight window looks ahead."""
 
 
 class LevelFields(NamedTuple):
@@ -26,15 +28,13 @@ class LevelFields(NamedTuple):
     first: np.ndarray
     """int64 (n + 1,), the neighbours of field v are first[v] .. first[v + 1] of the next two."""
     neighbour: np.ndarray
-    """int32 (m,), fields of the same level, each once."""
+    """int32 (m,), fields of the same level that a route may pass, each once."""
     cost: np.ndarray
     """float32 (m,), the cost of going there, in cells."""
     parent: np.ndarray
     """int32 (n,), the field of the level above that holds it, -1 for places."""
     middle: np.ndarray
     """float32 (n, 2), row and column from which the way to the goal is estimated."""
-    open: np.ndarray
-    """bool (n,), whether a route may pass the field."""
     survivor: np.ndarray
     """int64 (fields of the last level,), the surviving cell of each, flat."""
     areas: np.ndarray
@@ -53,12 +53,11 @@ class Marks(NamedTuple):
     kept: np.ndarray
     """int64 (n,), the descent that kept the field."""
     listed: np.ndarray
-    """int32 (n + 1,), fields in the order in which they are kept; last, how many are inside."""
-    inside: np.ndarray
-    """bool (fields of the last level,), the corridor of this descent, and of no other one."""
+    """int32 (n,), fields in the order in which they are kept."""
     told: np.ndarray
-    """int64 (5,), status: `NO_WAY`, `FULL`, or the fields of the corridor; the number of the last
-    window; fields expanded at all levels; cells expanded; cells of the corridor."""
+    """int64 (6,), status: `NO_WAY`, `FULL`, or how many of the last fields are listed; the number
+    of the last window; fields expanded at all levels; cells expanded; cells of the fields that are
+    listed; diagonal moves of the path."""
     heap: np.ndarray
     """float64 (room, 2), open list of fields: estimates, and the fields."""
     records: np.ndarray
@@ -78,8 +77,6 @@ class MapCells(NamedTuple):
     """int32 (n_cells,), the field of the last level that holds each cell, -1 for none."""
     successors: np.ndarray
     """uint32 (9 * 256,), see `grid_search.move_tables`."""
-    detours: np.ndarray
-    """uint32 (9 * 256,), the other table."""
 
 
 @njit(cache=True, nogil=True)
@@ -102,7 +99,7 @@ def _search(fields, marks, number, ends, goal_at, is_limited):
     Returns
     -------
     int
-        LevelFields expanded; `NO_WAY` or `FULL` without a route.
+        Fields expanded; `NO_WAY` or `FULL` without a route.
     """
     start, goal = ends
     heap, size, expanded = marks.heap, 1, 0
@@ -122,7 +119,7 @@ def _search(fields, marks, number, ends, goal_at, is_limited):
         for at in range(fields.first[v], fields.first[v + 1]):
             w = np.int64(fields.neighbour[at])
             seen = marks.seen[w]
-            if seen == -number or not fields.open[w]:
+            if seen == -number:
                 continue
             if is_limited and marks.kept[fields.parent[w]] != number:
                 continue
@@ -162,7 +159,7 @@ def _keep(fields, marks, number, goal, ring):
             v = np.int64(marks.listed[i])
             for at in range(fields.first[v], fields.first[v + 1]):
                 w = np.int64(fields.neighbour[at])
-                if fields.open[w] and marks.kept[w] != number:
+                if marks.kept[w] != number:
                     marks.kept[w], marks.listed[n_listed] = number, w
                     n_listed += 1
         low = high
@@ -170,13 +167,55 @@ def _keep(fields, marks, number, goal, ring):
 
 
 @njit(cache=True, nogil=True)
-def _walk(fields, marks, ground, number, ends, listed, horizon):
-    """Find a path in the corridor, window by window.
+def _with_room(path, n_path, n_more):
+    """Return a path with room for more cells."""
+    if n_path + n_more <= path.size:
+        return path
+    longer = np.empty(2 * (n_path + n_more), np.int32)
+    longer[:n_path] = path[:n_path]
+    return longer
+
+
+@njit(cache=True, nogil=True)
+def _straight(ground, cell, target, path, at):
+    """Write the cells that lead straight on to the target into a path, without the first one.
+
+    Diagonal moves are taken as soon as they are legal, the others where they are not: no path is
+    shorter. Return how many there are, 0 where neither is legal.
+    """
+    cols = ground.cols
+    rows, columns = target // cols - cell // cols, target % cols - cell % cols
+    k_row, row_step = (2, cols) if rows > 0 else (6, -cols)
+    k_col, col_step = (0, 1) if columns > 0 else (4, -1)
+    k_both = (3 if k_col else 1) if rows > 0 else (5 if k_col else 7)
+    rows, columns = abs(rows), abs(columns)
+    k_side, side_step = (k_row, row_step) if rows > columns else (k_col, col_step)
+    n_both, n_side = min(rows, columns), abs(rows - columns)
+    n = 0
+    while n_both + n_side > 0:
+        moves = np.int64(ground.moves[np.uint64(cell)])
+        if n_both > 0 and moves >> k_both & 1:
+            n_both -= 1
+            cell += row_step + col_step
+        elif n_side > 0 and moves >> k_side & 1:
+            n_side -= 1
+            cell += side_step
+        else:
+            return 0
+        path[at + n] = cell
+        n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _walk(fields, marks, ground, number, ends, n_route, horizon):
+    """Find a path along the route of the last fields, window by window.
 
     A window leads from where the path ends to the surviving cell of the first field of the route
-    that is `horizon` cells ahead, or to the goal. Four fifths of its shortest path are taken, so
-    that no window's end bends the path much, and the next window begins there. In so short a window
-    A* expands little more than the path.
+    that is so many cells ahead, or to the goal: straight on, of windows of `FARTHEST` times the
+    horizon and less the first for which that is legal; else by A*, `horizon` cells ahead. Four
+    fifths of its shortest path are taken, so that no window's end bends the path much, and the next
+    window begins there. In so short a window A* expands little more than the path.
 
     Parameters
     ----------
@@ -184,57 +223,66 @@ def _walk(fields, marks, ground, number, ends, listed, horizon):
         As in `descend`.
     ends
         Flat cells of start and goal.
-    listed
-        How many fields are listed, and how many of these, the first ones, are the route.
+    n_route
+        How many fields the route has; they are listed first.
     horizon
-        Cells that a window looks ahead, > 0.
+        Cells that a window of A* looks ahead, > 0.
 
     Returns
     -------
     tuple
-        The cells, int64 (k, 2); the number of the last window; the cells expanded. Without a path,
-        no cells, and a status in place of the window.
+        The cells, int64 (k, 2), the number of the last window, the cells expanded, and the diagonal
+        moves. Without a path, no cells, and a status in place of the window.
     """
     start, goal = ends
-    n_route = listed[1]
+    cols, waits = ground.cols, (marks.records, marks.waiting)
     path, n_path, expanded = np.empty(1024, np.int32), 1, 0
     path[0] = start
     base = fields.starts[fields.starts.size - 2]
     cell, at, window = np.int64(start), n_route - 1, np.int64(number)
     while cell != goal:
         # The route is listed backwards.
-        reached, to = marks.cost[marks.listed[at]], at
-        while to > 0 and marks.cost[marks.listed[to]] < reached + horizon:
+        reached, ahead, to = marks.cost[marks.listed[at]], FARTHEST * horizon, at
+        while to > 0 and marks.cost[marks.listed[to]] < reached + ahead:
             to -= 1
-        target = fields.survivor[marks.listed[to] - base] if to > 0 else goal
-        window += 1
-        cost, effort = astar(
-            ground.moves, ground.cols, (cell, target), _UNLIMITED,
-            ground.successors, ground.detours, ground.field_of, marks.inside,
-            marks.records, window, marks.waiting,
-        )  # fmt: skip
-        expanded += effort
-        if cost < 0:
-            return np.empty((0, 2), np.int64), (FULL if cost == BUCKET_FULL else NO_WAY), expanded
-        part = trace(marks.records, ground.cols, cell, target)
-        taken = part.size if target == goal else max(part.size * 4 // 5, min(part.size, 2))
-        if n_path + taken > path.size:
-            longer = np.empty(2 * (n_path + taken), np.int32)
-            longer[:n_path] = path[:n_path]
-            path = longer
-        path[n_path : n_path + taken - 1] = part[1:taken]
-        n_path += taken - 1
-        cell = part[taken - 1]
+        while True:
+            target = fields.survivor[marks.listed[to] - base] if to > 0 else goal
+            most = max(abs(target // cols - cell // cols), abs(target % cols - cell % cols))
+            path = _with_room(path, n_path, most)
+            size = _straight(ground, cell, target, path, n_path)
+            if size > 0 or ahead <= horizon:
+                break
+            ahead /= 2
+            while to < at - 1 and marks.cost[marks.listed[to + 1]] >= reached + ahead:
+                to += 1
+        expanded += size
+        if size == 0:
+            window += 1
+            cost, effort = astar(
+                ground.moves, cols, (cell, target), _UNLIMITED,
+                ground.successors, ground.successors, None, None, waits[0], window, waits[1],
+            )  # fmt: skip
+            expanded += effort
+            if cost < 0:
+                status = FULL if cost == BUCKET_FULL else NO_WAY
+                return np.empty((0, 2), np.int64), status, expanded, 0
+            part = trace(marks.records, cols, cell, target)
+            size = part.size - 1
+            path = _with_room(path, n_path, size)
+            path[n_path : n_path + size] = part[1:]
+        n_path += size if target == goal else max(size * 4 // 5, 1)
+        cell = np.int64(path[n_path - 1])
         # The route's field that lies as far on; one at least, so that windows end.
-        on = at - 1
-        while on > to and marks.cost[marks.listed[on]] < reached + 0.8 * horizon:
-            on -= 1
-        at = max(on, 0)
-    cells = np.empty((n_path, 2), np.int64)
+        at -= 1
+        while at > to and marks.cost[marks.listed[at]] < reached + 0.8 * ahead:
+            at -= 1
+        at = max(at, 0)
+    cells, diagonals = np.empty((n_path, 2), np.int64), 0
     for i in range(n_path):
-        cells[i, 0] = path[i] // ground.cols
-        cells[i, 1] = path[i] - cells[i, 0] * ground.cols
-    return cells, window, expanded
+        cells[i, 0] = path[i] // cols
+        cells[i, 1] = path[i] - cells[i, 0] * cols
+        diagonals += i > 0 and cells[i, 0] != cells[i - 1, 0] and cells[i, 1] != cells[i - 1, 1]
+    return cells, window, expanded, diagonals
 
 
 @guarded
@@ -263,12 +311,8 @@ def descend(fields, marks, ground, number, ends, rings, horizon):
     starts, cols = fields.starts, ground.cols
     last = starts.size - 2
     goal_at = (ends[1] // cols, ends[1] % cols)
-    # The corridor of the descent before gives way.
-    for i in range(marks.listed[marks.listed.size - 1]):
-        marks.inside[marks.listed[i] - starts[last]] = False
-    marks.listed[marks.listed.size - 1] = 0
     route, path, told = np.empty(0, np.int32), np.empty((0, 2), np.int64), marks.told
-    told[:] = NO_WAY, number, 0, 0, 0
+    told[:] = NO_WAY, number, 0, 0, 0, 0
 
     chain = np.empty((last + 1, 2), np.int64)
     for side in range(2):
@@ -284,17 +328,16 @@ def descend(fields, marks, ground, number, ends, rings, horizon):
             told[0] = effort
             return route, path
         told[2] += effort
-        n_listed, n_route = _keep(fields, marks, number, chain[k, 1], rings[k])
+        ring = rings[k] if k < last or horizon <= 0 else 0
+        n_listed, n_route = _keep(fields, marks, number, chain[k, 1], ring)
         if k == 0:
             route = marks.listed[:n_route].copy()
+    told[0] = n_listed
     for i in range(n_listed):
-        field = marks.listed[i] - starts[last]
-        marks.inside[field] = True
-        told[4] += fields.areas[field]
-    told[0] = marks.listed[marks.listed.size - 1] = n_listed
+        told[4] += fields.areas[marks.listed[i] - starts[last]]
     if horizon > 0:
-        path, told[1], told[3] = _walk(
-            fields, marks, ground, number, ends, (n_listed, n_route), horizon
+        path, told[1], told[3], told[5] = _walk(
+            fields, marks, ground, number, ends, n_route, horizon
         )
         if path.shape[0] == 0:
             told[0] = told[1]
