@@ -18,6 +18,9 @@ _UNLIMITED = 1 << 62
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
 FARTHEST = 8
 """Horizons that a straight window looks ahead."""
+LAST = 1.5
+"""Horizons within which a window of A* leads to the goal: the end of another one would bend a short
+path much."""
 
 
 class LevelFields(NamedTuple):
@@ -213,9 +216,10 @@ def _walk(fields, marks, ground, number, ends, n_route, horizon):
 
     A window leads from where the path ends to the surviving cell of the first field of the route
     that is so many cells ahead, or to the goal: straight on, of windows of `FARTHEST` times the
-    horizon and less the first for which that is legal; else by A*, `horizon` cells ahead. Four
-    fifths of its shortest path are taken, so that no window's end bends the path much, and the next
-    window begins there. In so short a window A* expands little more than the path.
+    horizon and less the first for which that is legal; else by A*, `horizon` cells ahead, or to a
+    goal not much farther. Four fifths of its shortest path are taken, so that no window's end bends
+    the path much, and the next window begins there. In so short a window A* expands little more
+    than the path.
 
     Parameters
     ----------
@@ -257,6 +261,8 @@ def _walk(fields, marks, ground, number, ends, n_route, horizon):
                 to += 1
         expanded += size
         if size == 0:
+            if marks.cost[marks.listed[0]] < reached + LAST * horizon:
+                target, to = goal, 0
             window += 1
             cost, effort = astar(
                 ground.moves, cols, (cell, target), _UNLIMITED,
