@@ -13,7 +13,14 @@ from scipy.sparse import csgraph
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
-from hybridnav.search.descent import Descent, DescentSettings, levels_of, pack
+from hybridnav.search.descent import (
+    Descent,
+    DescentSettings,
+    blocks_of,
+    layers_of,
+    levels_of,
+    pack,
+)
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.strategies import examples, free_cells, scenes
 
@@ -64,7 +71,7 @@ def test_the_levels_are_packed_as_the_pyramid_has_them(scene: Any, how: Any) -> 
     pyramid = scene.pyramid("radius")
     enterable = scene.classes == CellClass.FREE
     levels = levels_of(pyramid, how)
-    fields = pack(pyramid, levels, enterable=enterable)
+    fields = pack(pyramid[levels[-1]], layers_of(pyramid, levels), enterable=enterable)
     assert levels[0] == pyramid.place_level
     assert (np.diff(levels) < 0).all()
     for k, index in enumerate(levels):
@@ -130,12 +137,52 @@ def test_a_descent_that_runs_out_of_room_begins_anew(monkeypatch: pytest.MonkeyP
             assert recounted(found.cells) <= 2 * optimum
 
 
-def test_small_places_are_planned_from_regions_above_them() -> None:
+@given(scenes(), st.sampled_from([1, 4, 9]))
+@settings(max_examples=examples(100))
+def test_small_places_are_joined_where_arcs_connect_them_inside_a_block(
+    scene: Any, field_cells: int
+) -> None:
+    pyramid = scene.pyramid("radius")
+    places, enterable = pyramid[pyramid.place_level], scene.classes == CellClass.FREE
+    layers = blocks_of(places, enterable, field_cells)
+    fields = pack(places, layers, enterable=enterable)
+    is_open = places.classes == CellClass.FREE
+    for k, side in enumerate((6 * math.isqrt(field_cells), math.isqrt(field_cells))):
+        of = layers[k].of
+        assert ((of >= 0) == is_open).all()
+        block = [tuple(cell) for cell in (places.cells // side).tolist()]
+        same = [u for u, (a, b) in enumerate(places.arcs.tolist()) if block[a] == block[b]]
+        ends = places.arcs[same]
+        ends = ends[is_open[ends].all(axis=1)]
+        graph = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(block),) * 2)
+        parts = csgraph.connected_components(graph, directed=False)[1][is_open]
+        assert (
+            len(set(zip(parts, of[is_open], strict=True)))
+            == len(set(parts))
+            == len(set(of[is_open]))
+        )
+        assert of[layers[k].vertex].tolist() == list(range(len(layers[k].vertex)))
+        joined = {(of[a], of[b]) for a, b in places.arcs.tolist() if is_open[a] and is_open[b]}
+        expected = sorted(
+            (int(a), int(b)) for pair in joined for a, b in (pair, pair[::-1]) if a != b
+        )
+        start = fields.starts[k]
+        packed = []
+        for v in range(fields.starts[k + 1] - start):
+            own = slice(*fields.first[start + v : start + v + 2])
+            packed += [(v, int(w) - start) for w in fields.neighbour[own]]
+        assert sorted(packed) == sorted(set(expected))
+    lower = layers[1].vertex
+    assert (fields.parent[fields.starts[1] :] == layers[0].of[lower]).all()
+
+
+def test_small_places_are_planned_from_blocks_above_them() -> None:
     grid = hn.OccupancyGrid(np.zeros((60, 60), dtype=np.float32), robot_radius_m=0)
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=0.1)
     descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=64))
     found = descent.find((0, 0), (59, 59))
     assert not descent.is_of_places
+    assert not descent.levels
     assert not len(found.places)
     assert found.cells is not None
     assert recounted(found.cells) == pytest.approx(59 * math.sqrt(2))

@@ -29,6 +29,8 @@ from hybridnav.search.kernels.grid_search import BUCKETS
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid
+    from hybridnav.pyramid.level import Level
+    from hybridnav.pyramid.record import Record
 
 Cell = tuple[int, int]
 _ROOM = 1024
@@ -39,8 +41,8 @@ NEARLY = 0.85
 """Part of `step` that is enough: no level has exactly so many fields."""
 MANY_PLACES = 1000
 """Places above which small ones are too many to begin with."""
-REGION_CELLS = 32
-"""Size of the regions above such places, in fields of the last level."""
+REGION_SIDE = 6
+"""Side of the blocks of the first fields above such places, in sides of the last ones."""
 
 
 class DescentSettings(NamedTuple):
@@ -91,60 +93,104 @@ def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]
     return [*([top] if top != levels[-1] else []), *reversed(levels)]
 
 
+class Layer(NamedTuple):
+    """The fields of one level of a descent, made of the vertices of a level of the pyramid."""
+
+    of: LongArray
+    """int64 (vertices,), the field of each; -1 for none."""
+    vertex: LongArray
+    """int64 (n,), the vertex of each field whose surviving cell stands for it."""
+    arcs: LongArray
+    """int64 (m,), the arcs of the pyramid's level that join fields of this one."""
+    costs: FloatArray | None = None
+    """float64 (m,), costs of these arcs, cells; None for octile distances between centres of
+    gravity."""
+
+
+def layers_of(pyramid: DualGraphPyramid, levels: list[int]) -> list[Layer]:
+    """Return the fields of some levels, the highest first, of the vertices of the last one.
+
+    At the top an arc costs its `max_distance_m`, which the source paper has.
+    """
+    lowest, record, cols = pyramid[levels[-1]], pyramid.record, pyramid.grid.shape[1]
+    survivors = lowest.cells[:, 0] * cols + lowest.cells[:, 1]
+    vertex_end, edge_end = record.vertex_end[survivors], record.edge_end[lowest.base_edges]
+    costs: FloatArray | None = pyramid[levels[0]].max_distance_m / pyramid.grid.resolution_m
+    layers = []
+    for level in levels:
+        arcs = np.flatnonzero(edge_end >= min(2 * level + 2, SURVIVES))
+        alive = np.flatnonzero(vertex_end > level)
+        layers.append(Layer(_ancestors(record, survivors, level), alive, arcs, costs))
+        costs = None
+    return layers
+
+
+def blocks_of(places: Level, enterable: BoolArray, field_cells: int) -> list[Layer]:
+    """Return two levels of fields above small places, the higher one first.
+
+    A field is what arcs connect inside a square block of cells: one of `field_cells` cells, or one
+    whose side is `REGION_SIDE` times as long.
+
+    `places`: the level of the places; `enterable`: bool (rows, cols), the cells that paths may use.
+    """
+    is_open = enterable[tuple(places.cells.T)]
+    arcs = np.flatnonzero(is_open[places.arcs].all(axis=1))
+    ends, side = places.arcs[arcs], max(round(math.sqrt(field_cells)), 1)
+    sides = REGION_SIDE * side, side
+    joined = (_kernels.join_in_blocks(places.cells, is_open, ends, each) for each in sides)
+    return [Layer(of, vertex, arcs) for of, vertex in joined]
+
+
 def pack(
-    pyramid: DualGraphPyramid,
-    levels: list[int],
+    level: Level,
+    layers: list[Layer],
     *,
     enterable: BoolArray,
     units: IntArray | None = None,
 ) -> LevelFields:
-    """Return the fields of some levels for kernels.
+    """Return the fields of a descent for kernels.
 
-    At the top an arc costs its `max_distance_m`, which the source paper has, below it the octile
-    distance between the centres of gravity of its two fields (ours), with `units` times the
-    mean of their factors.
+    Where no other cost is given, an arc costs the octile distance between the centres of gravity of
+    its two fields (ours), with `units` times the mean of their factors.
 
-    `levels`: those that are visited, the highest first; `enterable`: bool (rows, cols), the
-    cells that paths may use; `units`: int32 (rows, cols), factor of each cell; None for lengths.
+    `level`: the level of whose vertices fields are made; `layers`: those of the descent, the
+    highest first; `enterable`: bool (rows, cols), the cells that paths may use; `units`: int32
+    (rows, cols), factor of each cell; None for lengths.
     """
-    lowest, record, cols = pyramid[levels[-1]], pyramid.record, pyramid.grid.shape[1]
-    survivors = lowest.cells[:, 0] * cols + lowest.cells[:, 1]
+    cols = enterable.shape[1]
+    survivors = level.cells[:, 0] * cols + level.cells[:, 1]
     flat = None if units is None else np.ascontiguousarray(units).ravel()
-    sums = _kernels.field_sums(lowest.field_of.ravel(), cols, flat, lowest.n_vertices)
-    vertex_end, edge_end = record.vertex_end[survivors], record.edge_end[lowest.base_edges]
+    sums = _kernels.field_sums(level.field_of.ravel(), cols, flat, level.n_vertices)
     starts, parts, n_arcs = [0], [], 0
-    above: LongArray | None = None  # the field of the level above of each of the lowest level
-    for level in levels:
-        alive = np.flatnonzero(vertex_end > level)
-        of_level = _ancestors(record, survivors, level)
-        n_fields = len(alive)
-        total = np.stack([np.bincount(of_level, part, n_fields) for part in sums.T], axis=1)
+    above: LongArray | None = None  # the field of the level above of each vertex
+    total = np.empty((0, 4))
+    for of, vertex, edges, given in layers:
+        n_fields, held = len(vertex), of >= 0
+        total = np.stack([np.bincount(of[held], part[held], n_fields) for part in sums.T], axis=1)
         means = total[:, 1:] / total[:, :1]
-        arcs = of_level[lowest.arcs[edge_end >= min(2 * level + 2, SURVIVES)]]
-        is_open = enterable.flat[survivors[alive]]
+        arcs, is_open = of[level.arcs[edges]], enterable.flat[survivors[vertex]]
         may_pass = is_open[arcs].all(axis=1) & (arcs[:, 0] != arcs[:, 1])
         arcs = arcs[may_pass]
-        if above is None:
-            middle = np.stack(np.divmod(survivors[alive], cols), axis=1)
-            costs = pyramid[level].max_distance_m[may_pass] / pyramid.grid.resolution_m
-            parent = np.full(n_fields, -1)
-        else:
-            middle = means[:, :2]
+        middle = means[:, :2] if given is None else level.cells[vertex].astype(np.float64)
+        if given is None:
             rows_cols = np.abs(middle[arcs[:, 0]] - middle[arcs[:, 1]])
             costs = rows_cols.max(axis=1) + (_ROOT_2 - 1) * rows_cols.min(axis=1)
             if units is not None:
                 costs *= means[arcs, 2].mean(axis=1) / (1 << UNIT_BITS)
-            parent = above[alive] + starts[-2]
+        else:
+            costs = given[may_pass]
+        parent = np.full(n_fields, -1) if above is None else above[vertex] + starts[-2]
         first, neighbour, cost = _neighbours(arcs, costs, n_fields)
         parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle))
         n_arcs += len(neighbour)
         starts.append(starts[-1] + n_fields)
-        above = of_level
+        above = of
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32]
     arrays: list[Any] = [c.astype(dtype) for c, dtype in zip(columns, dtypes, strict=True)]
     arrays[0] = np.append(arrays[0], n_arcs)
-    return LevelFields._make([np.array(starts), *arrays, survivors, lowest.areas])
+    areas = total[:, 0].astype(np.int64)
+    return LevelFields._make([np.array(starts), *arrays, survivors[layers[-1].vertex], areas])
 
 
 def _ancestors(record: Record, cells: LongArray, level: int) -> LongArray:
@@ -205,7 +251,7 @@ class Descent:
     Parameters
     ----------
     pyramid
-        The pyramid; if it has many small places, regions are built above them.
+        The pyramid; if it has many small places, fields are made of them, block by block.
     enterable
         bool (rows, cols), the cells that paths may use.
     settings
@@ -234,18 +280,23 @@ class Descent:
         units: IntArray | None = None,
         corner_cutting: bool = False,
     ) -> None:
-        sizes = pyramid.stats.sizes
-        n_places = sizes[pyramid.place_level].vertices
-        if n_places > MANY_PLACES and sizes[0].vertices < settings.field_cells * n_places:
-            pyramid = pyramid.with_regions(REGION_CELLS * settings.field_cells)
+        n_cells, n_places = (pyramid.stats.sizes[k].vertices for k in (0, pyramid.place_level))
+        is_many = n_places > MANY_PLACES and n_cells < settings.field_cells * n_places
         self.levels = levels_of(pyramid, settings)
-        """The levels that it visits, from the top down."""
-        self.is_of_places = self.levels[0] == pyramid.place_level
+        """The levels that it visits, from the top down; none where places are many and small."""
+        if is_many and self.levels[0] == pyramid.place_level:
+            self.levels = []
+            level = pyramid[pyramid.place_level]
+            layers = blocks_of(level, enterable, settings.field_cells)
+            self.field_of = np.append(layers[-1].of, -1).astype(np.int32)[level.field_of]
+            """int32 (rows, cols), the last field of each cell; -1 for none."""
+        else:
+            level = pyramid[self.levels[-1]]
+            layers, self.field_of = layers_of(pyramid, self.levels), level.field_of
+        self.is_of_places = self.levels[:1] == [pyramid.place_level]
         """Whether its top is the level of the places."""
-        self.fields = pack(pyramid, self.levels, enterable=enterable, units=units)
-        self.field_of = pyramid[self.levels[-1]].field_of
-        """int32 (rows, cols), the last field of each cell."""
-        rings = np.full(len(self.levels), settings.ring)
+        self.fields = pack(level, layers, enterable=enterable, units=units)
+        rings = np.full(len(layers), settings.ring)
         rings[0] += 2 if settings.ring else 0
         self._rings, self._horizon = rings, float(settings.horizon_cells)
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)

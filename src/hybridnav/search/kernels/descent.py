@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import pop, push
+from hybridnav._base.kernels.arrays import find, pop, push
 from hybridnav._base.kernels.moves import BUCKET_FULL, trace
 from hybridnav.search.kernels.grid_search import astar
 
@@ -368,3 +368,37 @@ def field_sums(field_of, cols, units, n_fields):
                 if units is not None:
                     sums[v, 3] += units[row * cols + col]
     return sums
+
+
+@njit(cache=True, nogil=True)
+def join_in_blocks(cells, is_open, arcs, side):
+    """Return the fields that arcs connect inside square blocks of cells: int64 (n_places,), the
+    field of each place, -1 for one that is not open, and int64 (n_fields,), the place of each field
+    that lies nearest to the middle of its block.
+
+    `cells`: int64 (n_places, 2), surviving cells, (row, col); `is_open`: bool (n_places,); `arcs`:
+    int32 (n, 2), between open places; `side`: of a block, in cells.
+    """
+    n = len(cells)
+    root = np.arange(n)
+    for i in range(len(arcs)):
+        u, v = np.int64(arcs[i, 0]), np.int64(arcs[i, 1])
+        in_row = cells[u, 0] // side == cells[v, 0] // side
+        if in_row and cells[u, 1] // side == cells[v, 1] // side:
+            u, v = find(root, u), find(root, v)
+            root[max(u, v)] = min(u, v)
+    of, nearest, least = np.full(n, -1), np.empty(n, np.int64), np.empty(n, np.int64)
+    n_fields = 0
+    for v in range(n):
+        if not is_open[v]:
+            continue
+        off = abs(cells[v, 0] % side * 2 - side) + abs(cells[v, 1] % side * 2 - side)
+        first = find(root, v)
+        if first == v:
+            of[v], least[n_fields], nearest[n_fields] = n_fields, off, v
+            n_fields += 1
+            continue
+        k = of[v] = of[first]
+        if off < least[k]:
+            least[k], nearest[k] = off, v
+    return of, nearest[:n_fields].copy()
