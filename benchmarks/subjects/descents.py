@@ -1,0 +1,192 @@
+"""Random small maps: what `paper` answers down the levels, against Dijkstra's algorithm of scipy.
+
+Maps of noise, rooms and blobs, with unexplored cells, corners that may be cut, closures, costs, and
+changes of the map under a planner; fields, steps, rings and horizons at random, with and without
+blocks above small places. A path is found if and only if there is one, is legal, has the cost that
+it states, and none lies below the optimum; the bound of a plan by lengths is the optimum. Exits
+with 1 at the first answer that is not so, and prints what gives it again.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
+
+import hybridnav as hn
+from benchmarks.common import SEED, option
+from hybridnav.search import descent
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+OPTIONS = [option("--count", type=int, default=100_000, help="maps (100,000)"), SEED]
+PAIRS = 3
+"""Pairs of cells that each map is asked for, before and after its change."""
+SIDES = ((0, 1, 1.0), (1, 0, 1.0), (1, 1, math.sqrt(2)), (1, -1, math.sqrt(2)))
+
+
+class Case(NamedTuple):
+    """What a planner is asked about."""
+
+    grid: hn.OccupancyGrid
+    open: Any
+    """bool (rows, cols), the cells that may be entered: by classes and costs."""
+    factors: Any
+    """float64 (rows, cols), what a metre costs; ones for lengths."""
+
+
+def random_classes(rng: np.random.Generator) -> Any:
+    """Return occupancy of noise, blobs or rooms, NaN where nothing is known."""
+    rows, cols = rng.integers(2, 34, 2).tolist()
+    kind = rng.integers(3)
+    if kind == 0:
+        occupied = rng.random((rows, cols)) < rng.uniform(0, 0.45)
+    elif kind == 1:
+        smooth = ndimage.uniform_filter(rng.random((rows, cols)), int(rng.integers(2, 5)))
+        occupied = smooth < np.quantile(smooth, rng.uniform(0.0, 0.45))
+    else:
+        side = int(rng.integers(3, 9))
+        occupied = np.indices((rows, cols))[0] % side == 0
+        occupied |= np.indices((rows, cols))[1] % side == 0
+        occupied &= rng.random((rows, cols)) < rng.uniform(0.6, 1.0)
+    values = occupied.astype(np.float32)
+    values[rng.random((rows, cols)) < rng.choice([0.0, 0.0, 0.1, 0.3])] = np.nan
+    return values
+
+
+def optimum(case: Case, is_open: Any, start: tuple[int, int]) -> Any:
+    """Return the least cost from a cell to each, cells, infinite without a path."""
+    rows, cols = is_open.shape
+    flat = np.arange(rows * cols).reshape(rows, cols)
+    tails, heads, costs = [], [], []
+    for down, right, length in SIDES:
+        low, high = max(-right, 0), cols - max(right, 0)
+        first = np.s_[: rows - down, low:high]
+        last = np.s_[down:, low + right : high + right]
+        legal = is_open[first] & is_open[last]
+        if down and right and not case.grid.corner_cutting:
+            legal &= is_open[down:, low:high] & is_open[: rows - down, low + right : high + right]
+        tails.append(flat[first][legal])
+        heads.append(flat[last][legal])
+        factor = (case.factors[first] + case.factors[last]) / 2
+        costs.append(length * factor[legal])
+    ends = np.concatenate(tails), np.concatenate(heads)
+    graph = sparse.coo_array((np.concatenate(costs), ends), shape=(flat.size,) * 2).tocsr()
+    least = csgraph.dijkstra(graph, directed=False, indices=[int(flat[start])])
+    return least.reshape(rows, cols)
+
+
+def illegal(case: Case, cells: Any, is_open: Any) -> str:
+    """Return what is illegal about a path of cells, nothing where all is legal."""
+    steps = np.diff(cells, axis=0)
+    sides = is_open[cells[:-1, 0], cells[1:, 1]] & is_open[cells[1:, 0], cells[:-1, 1]]
+    if not is_open[tuple(cells.T)].all():
+        return "the path stands on a closed cell"
+    if (np.abs(steps).max(axis=1, initial=0) > 1).any() or (steps == 0).all(axis=1).any():
+        return "the path jumps"
+    return "" if case.grid.corner_cutting or sides.all() else "the path cuts a corner"
+
+
+def faults(case: Case, result: Any, shut: Any, ends: Any) -> str:
+    """Return what is wrong with an answer, nothing where all is right."""
+    is_open, per_cell = case.open & ~shut, case.grid.resolution_m
+    least_m = float(optimum(case, is_open, tuple(ends[0]))[tuple(ends[1])]) * per_cell
+    if not result.solved or math.isinf(least_m):
+        is_right = result.solved is math.isfinite(least_m)
+        return "" if is_right else f"{result.status}, optimum {least_m}"
+    cells = result.path.cells
+    if cells[[0, -1]].tolist() != ends.tolist():
+        return "the path ends elsewhere"
+    if fault := illegal(case, cells, is_open):
+        return fault
+    factors = case.factors[tuple(cells.T)]
+    lengths = np.hypot(*np.diff(cells, axis=0).T)
+    cost_m = float((lengths * (factors[:-1] + factors[1:]) / 2).sum()) * per_cell
+    bound_m, is_by_length = result.lower_bound, bool((case.factors == 1).all())
+    is_sound = bound_m <= least_m * (1 + 1e-6) and least_m <= cost_m * (1 + 1e-6)
+    is_exact = not is_by_length or math.isclose(bound_m, least_m, rel_tol=1e-9)
+    if is_sound and is_exact and math.isclose(result.cost, cost_m, rel_tol=1e-6, abs_tol=1e-9):
+        return ""
+    return f"states {result.cost}, bound {bound_m}; the path costs {cost_m}, the optimum {least_m}"
+
+
+def topology_of(values: Any, rng: np.random.Generator, *, cutting: bool) -> hn.TopologicalMap:
+    """Return a map with places of a random size."""
+    grid = hn.OccupancyGrid(values, hn.Frame(0.1), robot_radius_m=0, corner_cutting=cutting)
+    merge_m = float(rng.choice([0.15, 0.3, 0.8, 3.0]))
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=merge_m))
+
+
+def asked(case: Case, planner: hn.HybridPlanner, rng: np.random.Generator) -> tuple[int, str]:
+    """Ask for some pairs, and return how many were, and the first fault."""
+    n = 0
+    for _ in range(PAIRS):
+        shut = rng.random(case.open.shape) < rng.choice([0.0, 0.0, 0.05, 0.2])
+        left = np.argwhere(case.open & ~shut)
+        if not len(left):
+            continue
+        ends = rng.choice(left, 2)
+        closed = {"cells": np.argwhere(shut & case.open)} if shut.any() else None
+        result = planner.plan(*case.grid.frame.points_of(ends), blocked=closed)
+        n += 1
+        if fault := faults(case, result, shut, ends):
+            return n, fault
+    return n, ""
+
+
+def checked(seed: int) -> tuple[int, str]:
+    """Check one map; return its plans and its fault."""
+    rng = np.random.default_rng(seed)
+    values, cutting = random_classes(rng), bool(rng.random() < 0.2)
+    topology = topology_of(values, rng, cutting=cutting)
+    unexplored, by_costs = bool(rng.random() < 0.3), bool(rng.random() < 0.2)
+    descent.MANY_PLACES = int(rng.choice([0, 1000]))
+    keys = {
+        "allow_unexplored": str(unexplored).lower(),
+        "field_cells": rng.choice([1, 4, 16, 128]),
+        "step": rng.choice([1.0, 2.0, 8.0]),
+        "ring": rng.integers(3),
+        "horizon_cells": rng.choice([0, 1, 3, 8, 128]),
+    }
+    preset = hn.load_preset("paper", overrides=[f"planner.{k}={v}" for k, v in keys.items()])
+    shape = values.shape
+    factors = rng.integers(4, 13, shape) / 4 if by_costs else np.ones(shape)
+    always = rng.random(shape) < 0.1 if by_costs else np.zeros(shape, np.bool_)
+    costs = hn.CostLayer(factors, closed=always) if by_costs else None
+    planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
+    total = 0
+    for turn in range(2):
+        if turn:
+            low, high = np.sort(rng.integers(0, np.array(shape) + 1, (2, 2)), axis=0)
+            values = values.copy()
+            values[low[0] : high[0], low[1] : high[1]] = rng.choice([0.0, 1.0])
+            topology = topology_of(values, rng, cutting=cutting)
+            planner.update(topology=topology)
+        grid = topology.grid
+        case = Case(grid, grid.enterable(allow_unexplored=unexplored) & ~always, factors)
+        n, fault = asked(case, planner, rng)
+        total += n
+        if fault:
+            return total, f"{fault}; costs {by_costs}, cutting {cutting}, {keys}"
+    return total, ""
+
+
+def main(given: Namespace) -> None:
+    """Check all maps."""
+    began, plans = time.perf_counter(), 0
+    for number in range(given.count):
+        seed = given.seed + number
+        n, fault = checked(seed)
+        plans += n
+        if fault:
+            print(f"map {seed}: {fault}; again by --seed {seed} --count 1")
+            raise SystemExit(1)
+        if (number + 1) % 5_000 == 0:
+            print(f"{number + 1:,} maps, {plans:,} plans", flush=True)
+    took = time.perf_counter() - began
+    print(f"{given.count:,} maps, {plans:,} plans, 0 faults, {took:.0f} s")
