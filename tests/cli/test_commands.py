@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import hybridnav as hn
 from hybridnav.cli import common
@@ -485,6 +485,19 @@ def test_show_goes_on_above_the_places_and_names_the_levels(cli, tmp_path):
     assert picture.stat().st_size > 10_000
     refused = cli("show", OFFICE, "--regions", 0)
     assert refused.refuses(2, "--regions")
+
+
+def test_show_watches_a_descent(cli, tmp_path):
+    moving, strip = tmp_path / "descent.gif", tmp_path / "descent.png"
+    for file in (moving, strip):
+        done = cli("show", OFFICE, "--robot-radius", 0.25, "--watch", "descent", file)
+        assert done.code == 0
+    with Image.open(moving) as animation:
+        assert sum(1 for _ in ImageSequence.Iterator(animation)) >= 3
+    assert strip.stat().st_size > 10_000
+    assert cli("show", OFFICE, "--watch", "growth", moving).refuses(2, "'descent FILE'")
+    refused = cli("show", OFFICE, "--watch", "descent", tmp_path / "descent.mp4")
+    assert refused.refuses(2, "--watch must end in .gif, .png")
 
 
 def test_show_tells_what_the_library_knows(cli):

@@ -224,3 +224,30 @@ def test_paper_is_right_with_closures_costs_and_unexplored_cells(
         assert result.lower_bound <= result.cost * (1 + 1e-12)
         if not by_costs:
             assert result.lower_bound == pytest.approx(optimum * grid.resolution_m, rel=1e-9)
+
+
+@given(scenes(), HOW, st.integers(0, 2**32 - 1))
+@settings(max_examples=examples(100))
+def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) -> None:
+    cells = free_cells(scene.classes, seed, 2)
+    assume(cells)
+    _, descent = made(scene, how)
+    found, watched = descent.find(*cells), descent.watch(*cells)
+    assert (watched is None) == (found.cells is None)
+    if watched is None or found.cells is None:
+        return
+    assert (watched.cells == found.cells).all()
+    above = on_route = np.ones(scene.classes.shape, dtype=np.bool_)
+    for kept in watched.levels:
+        assert kept.kept[kept.route].all()
+        assert [kept.field_of[cell] for cell in cells] == kept.route[[0, -1]].tolist()
+        joined = set(map(tuple, kept.arcs.tolist()))
+        assert joined.issuperset(itertools.pairwise(kept.route.tolist()))
+        on_route = np.isin(kept.field_of, kept.route)
+        assert above[on_route].all()  # sons of what was kept above
+        above = np.append(kept.kept, False)[kept.field_of]
+        if how.ring == 0:
+            assert (above == on_route).all()
+    assert (above == on_route).all()
+    if descent.is_of_places:
+        assert watched.levels[0].route.tolist() == found.places.tolist()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -27,11 +27,14 @@ from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
 from hybridnav.search.kernels.grid_search import BUCKETS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid
     from hybridnav.pyramid.level import Level
     from hybridnav.pyramid.record import Record
 
+T = TypeVar("T")
 Cell = tuple[int, int]
 _ROOM = 1024
 _ROOT_2 = math.sqrt(2)
@@ -91,6 +94,29 @@ def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]
     if len(levels) > 1 and means[top] < settings.step * means[levels[-1]] * NEARLY:
         levels.pop()
     return [*([top] if top != levels[-1] else []), *reversed(levels)]
+
+
+class KeptFields(NamedTuple):
+    """What a descent kept of the fields of one level."""
+
+    field_of: IntArray
+    """int32 (rows, cols), the field of each cell, -1 for none."""
+    arcs: IntArray
+    """int32 (m, 2), fields between which a route may lead, each pair twice."""
+    kept: BoolArray
+    """bool (n,), the fields that were kept: those of the route and, except at the last level, the
+    rings round them. The route of the next level leads through their sons."""
+    route: IntArray
+    """int32 (k,), the fields of the route, from start to goal."""
+
+
+class WatchedDescent(NamedTuple):
+    """A descent, level by level, for pictures."""
+
+    levels: list[KeptFields]
+    """What it kept, from the top down."""
+    cells: LongArray
+    """int64 (k, 2), the cells of the path, (row, col)."""
 
 
 class Layer(NamedTuple):
@@ -318,42 +344,84 @@ class Descent:
 
         `start`, `goal`: cells of places that may be passed, (row, col).
         """
-        found, _ = self._descend(start, goal, self._horizon)
-        return found
+        return self._descend(start, goal, self._horizon, _nothing)[0]
 
     def corridor(self, start: Cell, goal: Cell) -> tuple[Descended, Corridor | None]:
         """Find the last fields alone, with the rings round them, as a corridor; None without a
         route."""
-        found, listed = self._descend(start, goal, 0.0)
+        found, listed = self._descend(start, goal, 0.0, _listed)
         if listed is None:
             return found, None
         inside = np.zeros(len(self.fields.survivor), dtype=np.bool_)
         inside[listed - self.fields.starts[-2]] = True
         return found, Corridor(self.field_of, inside, found.corridor_cells)
 
+    def watch(self, start: Cell, goal: Cell) -> WatchedDescent | None:
+        """Find a path as `find` does, and return what was kept at each level; None without a path.
+
+        `start`, `goal`: cells of places that may be passed, (row, col).
+        """
+        horizon = self._horizon or float(DescentSettings().horizon_cells)
+        found, levels = self._descend(start, goal, horizon, partial(self._kept, goal))
+        if found.cells is None or levels is None:
+            return None
+        return WatchedDescent(levels, found.cells)
+
+    def _kept(self, goal: Cell, marks: Marks, number: int) -> list[KeptFields]:
+        """Return what a descent kept, from the top down."""
+        starts, parent = self.fields.starts, self.fields.parent
+        field_of, at, levels = self.field_of, int(starts[-2] + self.field_of[goal]), []
+        for k in range(len(starts) - 2, -1, -1):
+            low, high = int(starts[k]), int(starts[k + 1])
+            bounds = self.fields.first[low : high + 1]
+            own = slice(int(bounds[0]), int(bounds[-1]))
+            tails = np.repeat(np.arange(high - low, dtype=np.int32), np.diff(bounds))
+            arcs = np.stack([tails, self.fields.neighbour[own] - np.int32(low)], axis=1)
+            route, v = [], at
+            while v >= 0:
+                route.append(v - low)
+                v = int(marks.came[v])
+            kept = marks.kept[low:high] == number
+            levels.append(KeptFields(field_of, arcs, kept, np.array(route[::-1], dtype=np.int32)))
+            if k:
+                above = parent[low:high] - np.int32(starts[k - 1])
+                field_of, at = np.append(above, np.int32(-1))[field_of], int(parent[at])
+        return levels[::-1]
+
     def _descend(
-        self, start: Cell, goal: Cell, horizon: float
-    ) -> tuple[Descended, IntArray | None]:
-        """Return the outcome of a descent, and the last fields where there is a route."""
+        self, start: Cell, goal: Cell, horizon: float, look: Callable[[Marks, int], T]
+    ) -> tuple[Descended, T | None]:
+        """Return the outcome of a descent, and what `look` returns of what it wrote, by its number;
+        None without a route."""
         cols = self._ground.cols
         ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
         work = self._works.take()
         while True:
-            marks = work.marks
+            marks, number = work.marks, work.number + 1
             route, cells = _kernels.descend(
-                self.fields, marks, self._ground, work.number + 1, ends, self._rings, horizon
+                self.fields, marks, self._ground, number, ends, self._rings, horizon
             )
             status, last, *effort, diagonals = marks.told.tolist()
             if status != _kernels.FULL:
                 break
             work.make_room()
             work.number += _WINDOWS  # what the stopped descent stamped counts no more
-        work.number = max(work.number + 1, last)
-        listed = marks.listed[:status].copy() if status >= 0 and horizon <= 0 else None
+        seen = look(marks, number) if status >= 0 else None
+        work.number = max(number, last)
         self._works.give(work)
         n = len(cells)
         places = route[::-1] if self.is_of_places else route[:0]
         length = n - 1 - diagonals + diagonals * _ROOT_2 if n else 0.0
         fields, expanded, corridor = effort
         path = cells if n else None
-        return Descended(places, path, expanded, fields, corridor, length), listed
+        return Descended(places, path, expanded, fields, corridor, length), seen
+
+
+def _nothing(_marks: Marks, _number: int) -> None:
+    """Look at nothing of what a descent wrote."""
+
+
+def _listed(marks: Marks, _number: int) -> IntArray:
+    """Return the last fields."""
+    listed: IntArray = marks.listed[: marks.told[0]].copy()
+    return listed

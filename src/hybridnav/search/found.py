@@ -48,8 +48,8 @@ class PlanStats:
     expanded_intervals: int = 0
     """Number of intervals that the search on the mesh expanded."""
     corridor_cells: int = 0
-    """Number of cells in the corridor; 0 for the whole map. Of a descent in windows, those of the
-    fields along which they lead."""
+    """Number of cells in the corridor; 0 for the whole map. A descent counts the cells of the last
+    fields that its route passes."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds per stage."""
 

@@ -4,6 +4,7 @@ from .charts import (
     plot_speed as plot_speed,
 )
 from .maps import plot_costs as plot_costs
+from .descent import plot_descent as plot_descent, save_descent as save_descent
 from .levels import plot_kernels as plot_kernels
 from .levels import plot_levels as plot_levels
 from .maps import plot_level as plot_level, plot_map as plot_map, plot_places as plot_places

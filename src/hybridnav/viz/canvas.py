@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D, Bbox
+from PIL import Image
 
 from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError
@@ -278,3 +280,42 @@ def picture_bytes(picture: Axes | Figure, suffix: str, *, dpi: float) -> bytes:
             data, format=suffix[1:], dpi=dpi, bbox_inches=box, metadata=_METADATA[suffix]
         )
     return data.getvalue()
+
+
+_FRAME_DPI = 100
+
+
+def checked_animation(path: PathLike) -> Path:
+    """Return the file of an animation.
+
+    Raises `InvalidValueError` when its name does not end in `.gif`.
+    """
+    file = Path(path)
+    if file.suffix.lower() != ".gif":
+        raise InvalidValueError(f"an animation's file name must end in .gif, got '{file}'")
+    return file
+
+
+def save_frames(figures: Iterable[Figure], milliseconds: list[int], file: Path) -> None:
+    """Write figures of one size as an animation, each for some time; an existing file is replaced.
+
+    Raises `InvalidValueError` when the file cannot be written.
+    """
+    first, *others = map(_pixels, figures)
+    data = io.BytesIO()
+    look: dict[str, Any] = {"append_images": others, "duration": milliseconds, "loop": 0}
+    first.save(data, "GIF", save_all=True, optimize=True, **look)
+    try:
+        replace_file(file, data.getvalue())
+    except OSError as error:
+        raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+
+
+def _pixels(figure: Figure) -> Image.Image:
+    """Return a figure as an image of as few colours as a GIF has."""
+    figure.set_dpi(_FRAME_DPI)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    image = Image.fromarray(pixels[..., :3].copy())
+    return image.quantize(colors=128, dither=Image.Dither.NONE)

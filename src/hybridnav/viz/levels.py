@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.viz.canvas import View
     from hybridnav.viz.layout import Entry
 
 GRAPH_UP_TO = 150
@@ -90,7 +91,8 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
             f"expected at least one level and one column, got {len(chosen)} and {columns}"
         )
     if axes is None:
-        axes = _panels(chosen, columns, width_in)
+        view, words = known_view(chosen[0].grid), [_words(level) for level in chosen]
+        axes = panels(view, words, columns, width_in)
     elif len(axes) != len(chosen):
         raise InvalidValueError(f"{len(chosen)} levels need as many axes, got {len(axes)}")
     for ax, level in zip(axes, chosen, strict=True):
@@ -108,20 +110,19 @@ def _words(level: Level) -> list[str]:
     return [f"level {level.index}", f"{level.n_vertices:,} vertices", f"{level.n_arcs:,} arcs"]
 
 
-def _panels(levels: Sequence[Level], columns: int, width_in: float) -> list[Axes]:
-    """Return axes in rows, of the shape of the map, in a new figure with room for their titles."""
-    view = known_view(levels[0].grid)
-    rows = math.ceil(len(levels) / columns)
+def panels(view: View, titles: Sequence[list[str]], columns: int, width_in: float) -> list[Axes]:
+    """Return axes in rows, of the shape of a view, in a new figure with room for their titles."""
+    rows = math.ceil(len(titles) / columns)
     panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns
     tall_in = panel_in * float(view.size[1] / view.size[0])
     font = style.Sizes.fitting(panel_in, 1.0).font
     room = 72 * (panel_in - 2 * PAD_IN)
-    lines = max(wrapped(_words(level), font, room).count("\n") + 1 for level in levels)
+    lines = max(wrapped(words, font, room).count("\n") + 1 for words in titles)
     row_in = tall_in + (0.6 + 1.4 * lines) * font / 72
     height_in = rows * row_in + (rows - 1) * _GAP_IN + 2 * PAD_IN
     figure = Figure(figsize=(width_in, height_in))
     axes = []
-    for number in range(len(levels)):
+    for number in range(len(titles)):
         row, col = divmod(number, columns)
         left_in = PAD_IN + col * (panel_in + _GAP_IN)
         bottom_in = height_in - PAD_IN - (row + 1) * row_in - row * _GAP_IN

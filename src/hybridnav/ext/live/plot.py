@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import io
 from operator import attrgetter
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
-from PIL import Image
 
-from hybridnav._base.files import replace_file
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view, new_figure
+from hybridnav.viz.canvas import (
+    Canvas,
+    View,
+    checked_animation,
+    draw_cells,
+    known_view,
+    new_figure,
+    save_frames,
+)
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.room_map import DOOR_POINTS
 
@@ -33,7 +36,6 @@ _WIDE = 1.6
 """Width over height of a map from which on places and rooms lie one below the other."""
 _LAST_PAUSE = 8
 """Frames for which the last one stays."""
-_DPI = 100
 
 
 class _Frame(NamedTuple):
@@ -134,26 +136,16 @@ class ReplayAnimation:
         InvalidValueError
             When there is no frame, the name has another ending or the file cannot be written.
         """
-        file = Path(path)
-        if file.suffix.lower() != ".gif":
-            raise InvalidValueError(f"an animation's file name must end in .gif, got '{file}'")
+        file = checked_animation(path)
         frames = self._frames
         if self._last is None:
             raise InvalidValueError("an animation without frames cannot be written: add steps")
         if frames[-1].number != self._last.number:
             frames = [*frames, self._last]
         view = known_view(self._last.grid)
-        first, *others = (_pixels(self._drawn(frame, view)) for frame in frames)
         times = [round(1000 * self._seconds)] * len(frames)
         times[-1] *= _LAST_PAUSE
-        data = io.BytesIO()
-        first.save(
-            data, "GIF", save_all=True, append_images=others, duration=times, loop=0, optimize=True
-        )
-        try:
-            replace_file(file, data.getvalue())
-        except OSError as error:
-            raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+        save_frames([self._drawn(frame, view) for frame in frames], times, file)
 
     def _panels(self, frame: _Frame) -> list[_Panel]:
         """Return the maps of a frame, that of the rooms last."""
@@ -261,13 +253,3 @@ class _Colours:
         table = np.concatenate([colours[np.array(chosen, np.int64)], style.rgb(style.FREE)])
         table[:-1][numbers < 0] = style.rgb(style.UNEXPLORED)
         return image, table
-
-
-def _pixels(figure: Figure) -> Image.Image:
-    """Return a figure as an image of as few colours as a GIF has."""
-    figure.set_dpi(_DPI)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-    image = Image.fromarray(pixels[..., :3].copy())
-    return image.quantize(colors=128, dither=Image.Dither.NONE)
