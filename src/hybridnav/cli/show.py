@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,10 +22,6 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption
 from hybridnav.cli.reading import MapOptions, grow_topology, load_model, read_preset, with_map
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.search.grid_search import Cell
 
 LevelOption = Annotated[
     int | None,
@@ -92,36 +88,19 @@ def _watch(pyramid: hn.DualGraphPyramid, file: Path) -> None:
     """Draw the descent between two cells that are far apart by the way between them."""
     from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
     from hybridnav.search.descent import Descent  # noqa: PLC0415
+    from hybridnav.search.grid_search import far_apart  # noqa: PLC0415
 
     grid = pyramid.grid
     enterable = grid.enterable(allow_unexplored=False)
     if not enterable.any():
         raise UsageError(f"--watch: map {printable(grid.name)} has no free cell to plan from")
     descent = Descent(pyramid, enterable, corner_cutting=grid.corner_cutting)
-    watched = descent.watch(*_far_apart(enterable))
+    watched = descent.watch(*far_apart(enterable))
     assert watched is not None  # noqa: S101 - there is a way between both
     if file.suffix.lower() == ".gif":
         viz.save_descent(grid, watched, file)
     else:
         viz.save_figure(viz.plot_descent(grid, watched)[0], file)
-
-
-def _far_apart(enterable: BoolArray) -> tuple[Cell, Cell]:
-    """Return two cells of the largest part of a map: one that is farthest from its first cell, and
-    one that is farthest from that one."""
-    import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
-    from scipy import ndimage  # noqa: PLC0415
-
-    from hybridnav._base.moves import legal_moves  # noqa: PLC0415
-    from hybridnav.search.grid_search import costs_from  # noqa: PLC0415
-
-    labels, _ = ndimage.label(enterable)
-    part = np.flatnonzero(labels == np.bincount(labels[enterable]).argmax())
-    moves, shape, ends = legal_moves(enterable, False), enterable.shape, [int(part[0])]
-    for _ in range(2):
-        cell = divmod(ends[-1], shape[1])
-        ends.append(int(part[costs_from(moves, cell, part)[part].argmax()]))
-    return divmod(ends[1], shape[1]), divmod(ends[2], shape[1])
 
 
 def _describe_map(pyramid: hn.DualGraphPyramid) -> str:

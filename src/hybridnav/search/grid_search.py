@@ -328,3 +328,20 @@ def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> L
     return _waypoint_kernels.spread(moves.ravel(), None, cols, source, start_cost, is_target, True)[
         0
     ]
+
+
+def far_apart(enterable: BoolArray) -> tuple[Cell, Cell]:
+    """Return two cells of the largest part of a map, for examples: one that is farthest from its
+    first cell, and one that is farthest from that one.
+
+    `enterable`: bool (rows, cols), the cells that paths may use; one at least.
+    """
+    from scipy import ndimage  # noqa: PLC0415 - plans do not need it
+
+    labels, _ = ndimage.label(enterable)
+    part = np.flatnonzero(labels == np.bincount(labels[enterable]).argmax())
+    moves, cols, ends = legal_moves(enterable, False), enterable.shape[1], [int(part[0])]
+    for _ in range(2):
+        costs = costs_from(moves, divmod(ends[-1], cols), part)
+        ends.append(int(part[costs[part].argmax()]))
+    return divmod(ends[1], cols), divmod(ends[2], cols)
