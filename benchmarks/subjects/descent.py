@@ -85,7 +85,6 @@ def measured(grid: hn.OccupancyGrid, given: Namespace) -> dict[str, Any]:
     table = np.array(rows)
     return {
         "rows": table, "built": took, "bytes": descent.memory_bytes / grid.classes.size,
-        "levels": descent.levels,
     }  # fmt: skip
 
 

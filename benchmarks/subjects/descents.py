@@ -146,6 +146,7 @@ def checked(seed: int) -> tuple[int, str]:
     topology = topology_of(values, rng, cutting=cutting)
     unexplored, by_costs = bool(rng.random() < 0.3), bool(rng.random() < 0.2)
     descent.MANY_PLACES = int(rng.choice([0, 1000]))
+    descent.MOST_AT_TOP, descent.MOST_BLOCKS = rng.choice([2, 10, 1000], 2).tolist()
     keys = {
         "allow_unexplored": str(unexplored).lower(),
         "field_cells": rng.choice([1, 4, 16, 128]),

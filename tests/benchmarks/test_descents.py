@@ -12,7 +12,8 @@ from tests.strategies import examples
 
 
 def test_no_answer_down_the_levels_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(descent, "MANY_PLACES", descent.MANY_PLACES)  # the subject sets it
+    for limit in ("MANY_PLACES", "MOST_AT_TOP", "MOST_BLOCKS"):  # the subject sets them
+        monkeypatch.setattr(descent, limit, getattr(descent, limit))
     found = [checked(seed) for seed in range(examples(120))]
     assert [fault for _, fault in found if fault] == []
     assert sum(n for n, _ in found) > 5 * len(found)

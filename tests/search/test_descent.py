@@ -16,8 +16,8 @@ from hybridnav.maps import CellClass
 from hybridnav.search.descent import (
     Descent,
     DescentSettings,
-    blocks_of,
     layers_of,
+    layers_within,
     levels_of,
     pack,
 )
@@ -137,43 +137,45 @@ def test_a_descent_that_runs_out_of_room_begins_anew(monkeypatch: pytest.MonkeyP
             assert recounted(found.cells) <= 2 * optimum
 
 
-@given(scenes(), st.sampled_from([1, 4, 9]))
-@settings(max_examples=examples(100))
-def test_small_places_are_joined_where_arcs_connect_them_inside_a_block(
-    scene: Any, field_cells: int
+@given(scenes(), st.sampled_from([1, 4, 9]), st.sampled_from(["small", "many", "few"]))
+@settings(max_examples=examples(150))
+def test_fields_above_are_what_arcs_connect_inside_a_block(
+    scene: Any, field_cells: int, kind: str
 ) -> None:
-    pyramid = scene.pyramid("radius")
-    places, enterable = pyramid[pyramid.place_level], scene.classes == CellClass.FREE
-    layers = blocks_of(places, enterable, field_cells)
-    fields = pack(places, layers, enterable=enterable)
-    is_open = places.classes == CellClass.FREE
-    for k, side in enumerate((6 * math.isqrt(field_cells), math.isqrt(field_cells))):
-        of = layers[k].of
-        assert ((of >= 0) == is_open).all()
-        block = [tuple(cell) for cell in (places.cells // side).tolist()]
-        same = [u for u, (a, b) in enumerate(places.arcs.tolist()) if block[a] == block[b]]
-        ends = places.arcs[same]
-        ends = ends[is_open[ends].all(axis=1)]
-        graph = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(block),) * 2)
-        parts = csgraph.connected_components(graph, directed=False)[1][is_open]
-        assert (
-            len(set(zip(parts, of[is_open], strict=True)))
-            == len(set(parts))
-            == len(set(of[is_open]))
-        )
-        assert of[layers[k].vertex].tolist() == list(range(len(layers[k].vertex)))
-        joined = {(of[a], of[b]) for a, b in places.arcs.tolist() if is_open[a] and is_open[b]}
-        expected = sorted(
-            (int(a), int(b)) for pair in joined for a, b in (pair, pair[::-1]) if a != b
-        )
-        start = fields.starts[k]
-        packed = []
-        for v in range(fields.starts[k + 1] - start):
-            own = slice(*fields.first[start + v : start + v + 2])
-            packed += [(v, int(w) - start) for w in fields.neighbour[own]]
-        assert sorted(packed) == sorted(set(expected))
-    lower = layers[1].vertex
-    assert (fields.parent[fields.starts[1] :] == layers[0].of[lower]).all()
+    pyramid, enterable = scene.pyramid("radius"), scene.classes == CellClass.FREE
+    how = DescentSettings(field_cells=field_cells)
+    limits = {"small": (0, 9, 2), "many": (10**9, 2, 2), "few": (10**9, 10**9, 2)}[kind]
+    with pytest.MonkeyPatch.context() as patch:
+        for name, limit in zip(("MANY_PLACES", "MOST_AT_TOP", "MOST_BLOCKS"), limits, strict=True):
+            patch.setattr(f"hybridnav.search.descent.{name}", limit)
+        level, layers, named = layers_within(pyramid, enterable, how)
+    fields = pack(level, layers, enterable=enterable)
+    is_open = level.classes == CellClass.FREE
+    if kind == "few":
+        assert len(layers) == len(levels_of(pyramid, how))
+    if named >= 0:
+        assert len(layers[named].vertex) == pyramid[pyramid.place_level].n_vertices
+    for k, (above, below) in enumerate(itertools.pairwise(layers)):
+        assert fields.starts[k + 1] - fields.starts[k] == len(above.vertex)
+        assert above.of[above.vertex].tolist() == list(range(len(above.vertex)))
+        parents = fields.parent[fields.starts[k + 1] : fields.starts[k + 2]] - fields.starts[k]
+        held = is_open[below.vertex]
+        assert (parents[held] == above.of[below.vertex][held]).all()
+        # Each field is connected: the sons of a route's fields hold a route.
+        ends = below.of[level.arcs[below.arcs]]
+        ends = ends[(ends >= 0).all(axis=1)]
+        ends = ends[held[ends].all(axis=1)]
+        inside = ends[parents[ends[:, 0]] == parents[ends[:, 1]]]
+        graph = sparse.coo_array((np.ones(len(inside)), tuple(inside.T)), shape=(len(held),) * 2)
+        parts = csgraph.connected_components(graph, directed=False)[1][held]
+        pairs = set(zip(parts.tolist(), parents[held].tolist(), strict=True))
+        assert len(pairs) == len(set(parts.tolist())) == len(set(parents[held].tolist()))
+        beside = {(int(a), int(b)) for a, b in parents[ends].tolist() if a != b}
+        joined = set()
+        for v in range(len(above.vertex)):
+            own = slice(*fields.first[fields.starts[k] + v : fields.starts[k] + v + 2])
+            joined |= {(v, int(w) - int(fields.starts[k])) for w in fields.neighbour[own]}
+        assert joined == beside | {pair[::-1] for pair in beside}
 
 
 def test_small_places_are_planned_from_blocks_above_them() -> None:
@@ -181,12 +183,10 @@ def test_small_places_are_planned_from_blocks_above_them() -> None:
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=0.1)
     descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=64))
     found = descent.find((0, 0), (59, 59))
-    assert not descent.is_of_places
-    assert not descent.levels
     assert not len(found.places)
     assert found.cells is not None
     assert recounted(found.cells) == pytest.approx(59 * math.sqrt(2))
-    assert found.expanded_fields < 60
+    assert found.expanded_fields <= 64  # of 3,600 places
 
 
 @given(scenes(), st.integers(0, 2**32 - 1), st.sampled_from(["", "unexplored", "costs", "both"]))
@@ -249,5 +249,4 @@ def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) 
         if how.ring == 0:
             assert (above == on_route).all()
     assert (above == on_route).all()
-    if descent.is_of_places:
-        assert watched.levels[0].route.tolist() == found.places.tolist()
+    assert watched.levels[0].route.tolist() == found.places.tolist()

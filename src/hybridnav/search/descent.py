@@ -43,9 +43,11 @@ _WINDOWS = 1 << 20
 NEARLY = 0.85
 """Part of `step` that is enough: no level has exactly so many fields."""
 MANY_PLACES = 1000
-"""Places above which small ones are too many to begin with."""
-REGION_SIDE = 6
-"""Side of the blocks of the first fields above such places, in sides of the last ones."""
+"""Places above which small ones are joined in blocks."""
+MOST_BLOCKS, MOST_AT_TOP = 300, 4000
+"""Most fields of the first level, if they are blocks, and if they are places."""
+BLOCK_SIDE = 6
+"""Side of the blocks of a level, in sides of those of the next one."""
 
 
 class DescentSettings(NamedTuple):
@@ -151,20 +153,49 @@ def layers_of(pyramid: DualGraphPyramid, levels: list[int]) -> list[Layer]:
     return layers
 
 
-def blocks_of(places: Level, enterable: BoolArray, field_cells: int) -> list[Layer]:
-    """Return two levels of fields above small places, the higher one first.
+def joined(level: Level, below: Layer, is_open: BoolArray, side: int) -> Layer:
+    """Return the fields of a level above: those that arcs connect inside a square block of cells.
 
-    A field is what arcs connect inside a square block of cells: one of `field_cells` cells, or one
-    whose side is `REGION_SIDE` times as long.
-
-    `places`: the level of the places; `enterable`: bool (rows, cols), the cells that paths may use.
+    `level`: the level of whose vertices fields are made; `below`: the fields that are joined;
+    `is_open`: bool (vertices,), those that paths may pass; `side`: of a block, in cells.
     """
-    is_open = enterable[tuple(places.cells.T)]
-    arcs = np.flatnonzero(is_open[places.arcs].all(axis=1))
-    ends, side = places.arcs[arcs], max(round(math.sqrt(field_cells)), 1)
-    sides = REGION_SIDE * side, side
-    joined = (_kernels.join_in_blocks(places.cells, is_open, ends, each) for each in sides)
-    return [Layer(of, vertex, arcs) for of, vertex in joined]
+    arcs = below.of[level.arcs[below.arcs]]
+    cells, may_pass = level.cells[below.vertex], is_open[below.vertex]
+    arcs = arcs[((arcs >= 0) & may_pass[arcs]).all(axis=1)]
+    of, nearest = _kernels.join_in_blocks(cells, may_pass, arcs, side)
+    return Layer(np.append(of, -1)[below.of], below.vertex[nearest], below.arcs)
+
+
+def layers_within(
+    pyramid: DualGraphPyramid, enterable: BoolArray, settings: DescentSettings
+) -> tuple[Level, list[Layer], int]:
+    """Return the fields of a descent: the level of whose vertices they are made, the layers from
+    the top down, and which of them is that of the places; -1 for none.
+
+    Where places are many and smaller than the last fields, these are blocks of joined places. Where
+    a level has too many fields to be the top, there are blocks of theirs above it.
+    """
+    n_cells, n_places = (pyramid.stats.sizes[k].vertices for k in (0, pyramid.place_level))
+    levels = levels_of(pyramid, settings)
+    is_by_places, most = levels[0] == pyramid.place_level, MOST_AT_TOP
+    level = pyramid[levels[-1]]
+    is_open = enterable[tuple(level.cells.T)]
+    if is_by_places and n_places > MANY_PLACES and n_cells < settings.field_cells * n_places:
+        level, most, is_by_places = pyramid[pyramid.place_level], MOST_BLOCKS, False
+        is_open = enterable[tuple(level.cells.T)]
+        every, side = np.arange(level.n_vertices), max(round(math.sqrt(settings.field_cells)), 1)
+        layers = [joined(level, Layer(every, every, np.arange(level.n_arcs)), is_open, side)]
+    else:
+        layers = layers_of(pyramid, levels)
+        side = math.isqrt(n_cells // max(len(layers[0].vertex), 1)) + 1
+    n_below = len(layers)
+    while len(layers[0].vertex) > most:
+        side *= BLOCK_SIDE
+        layers.insert(0, joined(level, layers[0], is_open, side))
+        if len(layers[0].vertex) > NEARLY * len(layers[1].vertex):
+            layers.pop(0)  # parts that no arc connects
+            break
+    return level, layers, len(layers) - n_below if is_by_places else -1
 
 
 def pack(
@@ -195,7 +226,7 @@ def pack(
         total = np.stack([np.bincount(of[held], part[held], n_fields) for part in sums.T], axis=1)
         means = total[:, 1:] / total[:, :1]
         arcs, is_open = of[level.arcs[edges]], enterable.flat[survivors[vertex]]
-        may_pass = is_open[arcs].all(axis=1) & (arcs[:, 0] != arcs[:, 1])
+        may_pass = ((arcs >= 0) & is_open[arcs]).all(axis=1) & (arcs[:, 0] != arcs[:, 1])
         arcs = arcs[may_pass]
         middle = means[:, :2] if given is None else level.cells[vertex].astype(np.float64)
         if given is None:
@@ -306,24 +337,12 @@ class Descent:
         units: IntArray | None = None,
         corner_cutting: bool = False,
     ) -> None:
-        n_cells, n_places = (pyramid.stats.sizes[k].vertices for k in (0, pyramid.place_level))
-        is_many = n_places > MANY_PLACES and n_cells < settings.field_cells * n_places
-        self.levels = levels_of(pyramid, settings)
-        """The levels that it visits, from the top down; none where places are many and small."""
-        if is_many and self.levels[0] == pyramid.place_level:
-            self.levels = []
-            level = pyramid[pyramid.place_level]
-            layers = blocks_of(level, enterable, settings.field_cells)
-            self.field_of = np.append(layers[-1].of, -1).astype(np.int32)[level.field_of]
-            """int32 (rows, cols), the last field of each cell; -1 for none."""
-        else:
-            level = pyramid[self.levels[-1]]
-            layers, self.field_of = layers_of(pyramid, self.levels), level.field_of
-        self.is_of_places = self.levels[:1] == [pyramid.place_level]
-        """Whether its top is the level of the places."""
+        level, layers, self._named = layers_within(pyramid, enterable, settings)
         self.fields = pack(level, layers, enterable=enterable, units=units)
+        self.field_of = np.append(layers[-1].of, -1).astype(np.int32)[level.field_of]
+        """int32 (rows, cols), the last field of each cell; -1 for none."""
         rings = np.full(len(layers), settings.ring)
-        rings[0] += 2 if settings.ring else 0
+        rings[: max(self._named + 1, 1)] += 2 if settings.ring else 0
         self._rings, self._horizon = rings, float(settings.horizon_cells)
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         successors, _ = move_tables(corner_cutting=corner_cutting)
@@ -399,7 +418,7 @@ class Descent:
         while True:
             marks, number = work.marks, work.number + 1
             route, cells = _kernels.descend(
-                self.fields, marks, self._ground, number, ends, self._rings, horizon
+                self.fields, marks, self._ground, number, ends, self._rings, horizon, self._named
             )
             status, last, *effort, diagonals = marks.told.tolist()
             if status != _kernels.FULL:
@@ -410,7 +429,7 @@ class Descent:
         work.number = max(number, last)
         self._works.give(work)
         n = len(cells)
-        places = route[::-1] if self.is_of_places else route[:0]
+        places = route[::-1]
         length = n - 1 - diagonals + diagonals * _ROOT_2 if n else 0.0
         fields, expanded, corridor = effort
         path = cells if n else None

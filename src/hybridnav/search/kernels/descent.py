@@ -18,6 +18,8 @@ _UNLIMITED = 1 << 62
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
 FARTHEST = 8
 """Horizons that a straight window looks ahead."""
+EAGER = 1.1
+"""Factor of the estimate below the top: without it routes of many fields see all that are kept."""
 LAST = 1.5
 """Horizons within which a window of A* leads to the goal: the end of another one would bend a short
 path much."""
@@ -86,9 +88,9 @@ class MapCells(NamedTuple):
 def _search(fields, marks, number, ends, goal_at, is_limited):
     """Find the cheapest route between two fields of a level (A*).
 
-    The estimate is the straight line at the top, where arcs cost their max-distance, and the octile
-    distance below it. Both are consistent: no arc costs less between its middles. It is 0 at the
-    goal's field, and measured to the goal's cell elsewhere.
+    The estimate is the straight line at the top, where it is consistent: no arc costs less between
+    its middles. Below it is `EAGER` times the octile distance. It is 0 at the goal's field, and
+    measured to the goal's cell elsewhere.
 
     Parameters
     ----------
@@ -134,7 +136,7 @@ def _search(fields, marks, number, ends, goal_at, is_limited):
             cols = abs(fields.middle[w, 1] - goal_at[1])
             left = 0.0
             if w != goal and is_limited:
-                left = max(rows, cols) + _ROOT * min(rows, cols)
+                left = EAGER * (max(rows, cols) + _ROOT * min(rows, cols))
             elif w != goal:
                 left = math.sqrt(rows * rows + cols * cols)
             push(heap, size, cost + left, float(w))
@@ -293,7 +295,7 @@ def _walk(fields, marks, ground, number, ends, n_route, horizon):
 
 @guarded
 @njit(cache=True, nogil=True)
-def descend(fields, marks, ground, number, ends, rings, horizon):
+def descend(fields, marks, ground, number, ends, rings, horizon, named):
     """Plan on the places, then on the sons of what is kept, down to cells.
 
     Parameters
@@ -307,12 +309,14 @@ def descend(fields, marks, ground, number, ends, rings, horizon):
     rings, horizon
         int64 (n_levels,), rings of fields that each level keeps beside its route; cells that a
         window looks ahead, 0 to find the corridor alone.
+    named
+        The level whose route is returned; -1 for none.
 
     Returns
     -------
     tuple
-        int32 (n,), the fields of the route at the top, from goal to start; int64 (k, 2), the cells
-        of the path, none without one. `marks.told` has the rest.
+        int32 (n,), the named fields of the route, from goal to start, counted from 0 in their
+        level; int64 (k, 2), the cells of the path, none without one. `marks.told` has the rest.
     """
     starts, cols = fields.starts, ground.cols
     last = starts.size - 2
@@ -336,8 +340,8 @@ def descend(fields, marks, ground, number, ends, rings, horizon):
         told[2] += effort
         ring = rings[k] if k < last or horizon <= 0 else 0
         n_listed, n_route = _keep(fields, marks, number, chain[k, 1], ring)
-        if k == 0:
-            route = marks.listed[:n_route].copy()
+        if k == named:
+            route = marks.listed[:n_route] - np.int32(starts[k])
     told[0] = n_listed
     for i in range(n_listed):
         told[4] += fields.areas[marks.listed[i] - starts[last]]
