@@ -18,12 +18,12 @@ from benchmarks.subjects._study_data import part_figures
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common
+from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.output import report_of, write_outputs
 from hybridnav.harness.records import query_key, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
-from hybridnav.harness.tables import compare_runs
 from hybridnav.harness.yardstick import OPTIMA, Yardstick, contradiction
 from hybridnav.maps.files import load_map
 from hybridnav.planner import load_preset

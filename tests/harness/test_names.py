@@ -13,12 +13,12 @@ import pytest
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study, to_frame
 from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
-from hybridnav.harness.tables import compare_runs
 from hybridnav.harness.workers import run_local
 from tests.harness.small_runs import ROOMS, write_map
 

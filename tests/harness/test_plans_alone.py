@@ -6,10 +6,10 @@ import pytest
 import hybridnav as hn
 from hybridnav.harness.analysis import load_study, to_frame
 from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import compare_runs
 from hybridnav.maps import CellClass
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_in, write_map

@@ -18,12 +18,12 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.harness import workers
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.scenes import sample_pairs
-from hybridnav.harness.tables import compare_runs
 from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, importable, name_of, write_map

@@ -11,12 +11,12 @@ from hypothesis.extra import numpy as hnp
 from shapely import Polygon, box
 
 import hybridnav as hn
+from hybridnav._base.rows import in_runs, unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.areas import box_of_area
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.geometry import centres, position_of
-from hybridnav.maps.islands import in_runs, unique_rows
 from tests.strategies import examples
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED

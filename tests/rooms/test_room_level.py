@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, RoomLabels
-from hybridnav.maps.files.formats import write_ros_map
+from hybridnav.maps.files.ros import write_ros_map
 from hybridnav.viz import plot_rooms
 from tests.drawn_rooms import write_ros
 from tests.strategies import drawn, examples, labelled, occupancy_grid

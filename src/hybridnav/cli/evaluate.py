@@ -245,7 +245,8 @@ def _run(settings: RunSettings, out: Path) -> None:
 
 def compare(first: RunArgument, second: RunArgument, metric: MetricOption = "both") -> None:
     """Set two runs side by side, pair by pair, with the significance of the difference."""
-    from hybridnav.harness.tables import compare_runs, to_markdown  # noqa: PLC0415 - on demand
+    from hybridnav.harness.compare import compare_runs  # noqa: PLC0415 - on demand
+    from hybridnav.harness.tables import to_markdown  # noqa: PLC0415 - on demand
 
     rows = compare_runs(first, second, metric=_yardstick(metric))
     for over in dict.fromkeys(row["loss over"] for row in rows):

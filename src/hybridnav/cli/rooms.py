@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.room_labels import Point
     from hybridnav.rooms import CarriedNames, Door, Rooms
-    from hybridnav.rooms.files.text import RoomMeasures
+    from hybridnav.rooms.files.measures import RoomMeasures
 
 LeastAreaOption = Annotated[
     float | None,
@@ -185,7 +185,7 @@ def _draw(plot: Path, topology: hn.TopologicalMap, old: Older | None, *, everyth
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
-    from hybridnav.rooms.files.text import measures_of  # noqa: PLC0415 - loads numpy
+    from hybridnav.rooms.files.measures import measures_of  # noqa: PLC0415 - loads numpy
 
     return measures_of(labels, grid)
 

@@ -152,7 +152,7 @@ def _describe_level(level: hn.Level) -> str:
     """Return one line on a level; a simple graph would lose its parallel arcs: second doors."""
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
 
-    from hybridnav.maps.islands import unique_rows  # noqa: PLC0415
+    from hybridnav._base.rows import unique_rows  # noqa: PLC0415
 
     free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
     largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2

@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from hybridnav._base.rows import in_runs
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.maps.islands import in_runs
 from hybridnav.maps.occupancy import extent
 
 if TYPE_CHECKING:

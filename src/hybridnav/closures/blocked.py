@@ -10,9 +10,9 @@ import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.rows import in_runs
 from hybridnav.closures.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.islands import in_runs
 from hybridnav.pyramid import LevelArc
 from hybridnav.rooms import Door
 from hybridnav.topology.map import no_places

@@ -1,5 +1,5 @@
 from .analysis import Study as Study, load_study as load_study, to_frame as to_frame
-from .tables import compare_runs as compare_runs
+from .compare import compare_runs as compare_runs
 from .names import NamedMethod as NamedMethod
 from .output import write_outputs as write_outputs
 from .run import RunSettings as RunSettings, evaluate as evaluate

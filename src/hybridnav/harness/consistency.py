@@ -15,8 +15,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav._base.moves import legal_moves, moves_along
+from hybridnav._base.rows import unique_rows
 from hybridnav.maps import CellClass
-from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.costs.files import read_costs
 from hybridnav.maps.files import load_map
-from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

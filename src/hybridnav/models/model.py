@@ -11,7 +11,7 @@ from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav.errors import ModelError
 from hybridnav.maps import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.maps.files import load_map
-from hybridnav.maps.files.movingai import check_max_cells
+from hybridnav.maps.files.limits import check_max_cells
 from hybridnav.models import parts, structures
 from hybridnav.models.container import read_parts
 from hybridnav.planner import Preset, PyramidSettings, load_preset

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import Frame, OccupancyGrid, RoomLabels, RoomUse
-from hybridnav.maps.files.movingai import check_size
+from hybridnav.maps.files.limits import check_size
 from hybridnav.maps.islands import DroppedIslands
 from hybridnav.models.structures import GRID, PRESET, PYRAMID, ROOMS, refusal
 from hybridnav.planner import Preset

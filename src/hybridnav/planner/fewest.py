@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hybridnav.maps.islands import unique_rows
+from hybridnav._base.rows import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

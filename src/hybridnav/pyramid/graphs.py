@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.rows import unique_rows
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

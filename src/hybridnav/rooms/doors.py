@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import cos, hypots, sin, sines_and_cosines
 from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
-from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
 from hybridnav.pyramid.start import kinds_of
 

@@ -12,8 +12,8 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
-from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM
-from hybridnav.maps.islands import unique_rows
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import MAX_HEIGHT, Canvas, draw_cells, known_view, new_figure

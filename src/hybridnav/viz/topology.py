@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid.graphs import report_of
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.rows import unique_rows
 from hybridnav.ext.graphs.attach import PlacedGraph
 from hybridnav.ext.graphs.gather import MOST_EXAMPLES, Finding, Findings, Point, shown
 from hybridnav.ext.graphs.judge import FreeSpace
@@ -16,7 +17,6 @@ from hybridnav.ext.graphs.waypoint_graph import WaypointGraph, add_components
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
-from hybridnav.maps.islands import unique_rows
 from hybridnav.refine import Sight
 from hybridnav.rooms.listing import FOUND_NAME
 from hybridnav.topology import TopologicalMap

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.cover import Aims, complete
@@ -26,7 +27,6 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.frame import FARTHEST_M
-from hybridnav.maps.islands import unique_rows
 from hybridnav.rooms.cutting import wall_directions
 from hybridnav.topology import TopologicalMap
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.graphs.joining import Nodes
@@ -18,7 +19,6 @@ from hybridnav.ext.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line
-from hybridnav.maps.islands import unique_rows
 from hybridnav.rooms.doors import measured_clearance_m
 from hybridnav.topology import TopologicalMap
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.clock import clock
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.graphs.attach import PlacedGraph
@@ -15,7 +16,6 @@ from hybridnav.ext.graphs.waypoint_graph import WaypointGraph
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.baselines.regions import array_bytes
 from hybridnav.maps.checks import checked_type
-from hybridnav.maps.islands import unique_rows
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:

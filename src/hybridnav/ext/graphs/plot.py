@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
-from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_shades, known_view
 from hybridnav.viz.layout import Entry, finish

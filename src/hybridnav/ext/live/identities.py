@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
-from hybridnav.maps.islands import unique_rows
 from hybridnav.rooms.carrying import Heirs, Overlap, heirs_of
 
 if TYPE_CHECKING:

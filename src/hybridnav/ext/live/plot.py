@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.maps.islands import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import (
     Canvas,

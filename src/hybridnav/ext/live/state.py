@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.near import box_groups
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
-from hybridnav.maps.islands import unique_rows
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.decimation import Criterion, contract_alone, contract_places, squared_limit
 from hybridnav.pyramid.record import SURVIVES, BuildStats

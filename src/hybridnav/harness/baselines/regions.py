@@ -10,9 +10,9 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.maps.islands import unique_rows
 from hybridnav.route.coarse import ArcSearch, Beside, along
 from hybridnav.search.grid_search import GridSearch
 

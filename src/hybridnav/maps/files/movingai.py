@@ -1,61 +1,30 @@
-"""Limits of the size of a map, checked before its cells are read."""
+"""MovingAI benchmarks: octile maps and their scenarios."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._base.files import printable
+from hybridnav._base.files import NewFile, printable
+from hybridnav.errors import MapError
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
+from hybridnav.maps.checks import checked_type
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import ByteArray, PathLike
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, BinaryIO
+
 from hybridnav._base.yaml_file import open_file
-from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, OccupancyGrid
+from hybridnav.errors import MapNotFoundError
+from hybridnav.maps.files.limits import check_max_cells, check_size
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import ByteArray, PathLike
 
-
-_READING_BYTES = 16
-"""Bytes per cell while a map is read and inflated; measured 13 of grey and 16 of colours with
-opacity, on 16 million cells."""
-_PLANNING_BYTES = 300
-"""Most bytes per cell with pyramid and a search structure; measured 240 on 4 million free cells,
-with the costliest one that there has been, exact costs between the border cells of fields."""
-_GB = 1e9
-
-
-def check_max_cells(max_cells: int) -> None:
-    """Refuse a limit that is not a positive number of cells.
-
-    Raises `InvalidValueError` when the limit is not positive.
-    """
-    if max_cells < 1:
-        raise InvalidValueError(f"max_cells must be a positive number of cells, got {max_cells}")
-
-
-def check_size(cols: int, rows: int, *, max_cells: int, where: str) -> None:
-    """Refuse a map with more cells than a grid holds, or than the limit.
-
-    `cols`, `rows`: as the header of the file states them; `where`: the file; the message begins
-    with it. Raises `MapError` when there are more; the message states the cells, their memory, and
-    the option.
-    """
-    cells = cols * rows
-    if cells > MAX_CELLS:
-        raise MapError(f"{where}: {cols} x {rows} cells, a grid holds at most {MAX_CELLS}")
-    if cells > max_cells:
-        raise MapError(
-            f"{where}: {cols} x {rows} = {cells:,} cells, more than the limit of {max_cells:,}; "
-            f"reading them takes about {_READING_BYTES * cells / _GB:.1f} GB of memory, planning "
-            f"up to {_PLANNING_BYTES * cells / _GB:.1f} GB; raise the limit with "
-            f"--max-cells {cells}, in Python max_cells"
-        )
-
-
-# MovingAI benchmarks: octile maps and their scenarios.
 
 _PASSABLE = b".GS"
 _BLOCKED = b"@OTW"
@@ -304,3 +273,40 @@ def _natural(word: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= 9):  # noqa: PLR2004
         raise ValueError(f"expected a whole number, got {word[:30]!a}")
     return int(text)
+
+
+def write_movingai_map(grid: OccupancyGrid, path: PathLike) -> None:
+    """Write a map in the format of the MovingAI benchmarks, as `load_map` reads it.
+
+    Free cells become `.`, all others `@`: the format has no unexplored cells. It has no frame
+    either: a cell is 1 m wide when it is read again, and its corner lies at (0, 0). The robot's
+    radius and dropped islands are no part of such a map: what was measured is written.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    path
+        The file, ending in .map; one that exists is replaced.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map is none.
+    MapError
+        When the name does not end so, or the file cannot be written.
+
+    Examples
+    --------
+    >>> hn.write_movingai_map(hn.example_map("figure1"), "figure1.map")
+    >>> hn.load_map("figure1.map").shape == hn.example_map("figure1").shape
+    True
+    """
+    checked_type("grid", grid, OccupancyGrid)
+    file = NewFile.named(path, "map", "a MovingAI map", (".map",))
+    rows, cols = grid.shape
+    letters = np.full((rows, cols + 1), ord("@"), dtype=np.uint8)
+    letters[:, :-1][grid.measured == CellClass.FREE] = ord(".")
+    letters[:, -1] = ord("\n")
+    head = f"type octile\nheight {rows}\nwidth {cols}\nmap\n".encode()
+    file.write(head + letters[::-1].tobytes())

@@ -1,23 +1,33 @@
-"""ROS maps: the YAML of map_server and the image it names, read as Nav2 reads them."""
+"""ROS maps: the YAML of map_server and the image it names, read as Nav2 reads them, and written."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import yaml
+
+from hybridnav._base.files import printable, replace_file
+from hybridnav.errors import MapError
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
+from hybridnav.maps.checks import checked_type
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import ByteArray, PathLike
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import read_yaml
-from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
-from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
+from hybridnav.errors import InvalidValueError, MapNotFoundError, MapWarning, brief
+from hybridnav.maps import Frame
 from hybridnav.maps.files.image import Raster, read_raster
-from hybridnav.maps.files.movingai import check_max_cells, check_size
+from hybridnav.maps.files.limits import check_max_cells, check_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,6 +41,7 @@ _MODES = ("trinary", "scale", "raw")
 _BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {
     "false": False, "no": False, "off": False, "n": False, "0": False,
 }  # fmt: skip
+_WHITE = 255
 _UNKNOWN_GREY = 205
 """The grey that map_saver and most SLAM tools write for "unknown"."""
 
@@ -389,3 +400,91 @@ def example_map(name: str = "office", *, robot_radius_m: float | None = None) ->
         )
     files = [folder / name / f"{name}.yaml" for folder in _FOLDERS]
     return load_ros_map(next(filter(Path.is_file, files)), robot_radius_m=robot_radius_m)
+
+
+def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
+    """Write a map as map_server, Nav2 and `load_map` read it: a YAML file and a PGM image.
+
+    A cell of occupancy p becomes a pixel of brightness 255 (1 - p), rounded, but never across a
+    threshold: free, occupied and unexplored cells keep their class. Cells that were never measured
+    become grey 205, or the nearest grey that the thresholds call unexplored. A map that was read
+    from grey of 8 bits, in the mode trinary or scale and without `negate`, is written with equal
+    pixels.
+
+    The robot's radius and dropped islands are no part of such a map: what was measured is written.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    path
+        The YAML file, ending in .yaml or .yml; the image gets the same name, ending in .pgm. Files
+        that exist are replaced.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map is none.
+    MapError
+        When the name does not end so, a file cannot be written, or cells are of a class for which
+        the thresholds leave no grey.
+
+    Examples
+    --------
+    >>> hn.write_ros_map(hn.example_map("figure1"), "figure1.yaml")
+    >>> hn.load_map("figure1.yaml").class_counts() == hn.example_map("figure1").class_counts()
+    True
+    """
+    checked_type("grid", grid, OccupancyGrid)
+    target = Path(path)
+    where = f"map {printable(target)}"
+    if target.suffix.lower() not in {".yaml", ".yml"}:
+        raise MapError(f"{where}: a ROS map must be named .yaml or .yml, its image gets .pgm")
+    image = target.with_suffix(".pgm")
+    pixels = _pixels(grid, where)
+    rows, cols = pixels.shape
+    x, y, yaw = (_decimal(value) for value in (*grid.frame.origin_m, grid.frame.yaw_rad))
+    lines = [
+        yaml.safe_dump({"image": image.name}, allow_unicode=True, width=math.inf).strip(),
+        "mode: trinary",
+        f"resolution: {_decimal(grid.resolution_m)}",
+        f"origin: [{x}, {y}, {yaw}]",
+        "negate: 0",
+        f"occupied_thresh: {_decimal(grid.occupied_threshold)}",
+        f"free_thresh: {_decimal(grid.free_threshold)}",
+    ]
+    try:
+        replace_file(image, b"P5\n%d %d\n255\n" % (cols, rows) + pixels.tobytes())
+        replace_file(target, ("\n".join(lines) + "\n").encode())
+    except OSError as error:
+        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+
+
+def _decimal(value: float) -> str:
+    """Return a number in digits: YAML 1.1 takes exponents without a point for text."""
+    return np.format_float_positional(value, trim="0")
+
+
+def _pixels(grid: OccupancyGrid, where: str) -> ByteArray:
+    """Return the image, uint8 (rows, cols), row 0 at the top."""
+    occupancy = occupancy_of_greys()
+    low, high = np.float32(grid.free_threshold), np.float32(grid.occupied_threshold)
+    greys = {
+        CellClass.FREE: np.flatnonzero(occupancy <= low),
+        CellClass.OCCUPIED: np.flatnonzero((occupancy >= high) & (occupancy > low)),
+        CellClass.UNEXPLORED: np.flatnonzero((occupancy > low) & (occupancy < high)),
+    }
+    pixels = np.zeros(grid.shape, dtype=np.uint8)
+    level = np.rint((1.0 - grid.probability.astype(np.float64)) * _WHITE)
+    level[np.isnan(level)] = _UNKNOWN_GREY
+    for kind, allowed in greys.items():
+        cells = grid.measured == kind
+        if not cells.any():
+            continue
+        if not allowed.size:
+            raise MapError(
+                f"{where}: the thresholds {grid.free_threshold:g} and {grid.occupied_threshold:g} "
+                f"leave no grey of 8 bits for {kind.name.lower()} cells: set them wider apart"
+            )
+        pixels[cells] = np.clip(level[cells], allowed[0], allowed[-1])
+    return pixels[::-1]

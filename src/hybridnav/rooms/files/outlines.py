@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from hybridnav._base.rows import unique_rows
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
 from hybridnav.maps.clearance import closing
-from hybridnav.maps.islands import unique_rows
 from hybridnav.rooms.files.straight import straightened
 
 if TYPE_CHECKING:

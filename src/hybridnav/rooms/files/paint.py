@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._base.rows import in_runs, unique_rows
 from hybridnav.errors import RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
-from hybridnav.maps.islands import in_runs, unique_rows
 from hybridnav.rooms.files.entries import NAMELESS, Missed, Outline, Read, Runs
 
 if TYPE_CHECKING:

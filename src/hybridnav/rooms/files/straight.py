@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import atan2, cos, hypots, sin
 from hybridnav._base.trig import directions as directions_of
-from hybridnav.maps.islands import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

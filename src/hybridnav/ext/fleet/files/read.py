@@ -27,7 +27,7 @@ from hybridnav.ext.fleet.files.entries import read_building_entries
 from hybridnav.ext.fleet.floors import BuildingValues, Known
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.checks import checked_radius
-from hybridnav.maps.files.movingai import check_max_cells
+from hybridnav.maps.files.limits import check_max_cells
 from hybridnav.maps.names import place_of_name
 from hybridnav.models import Model, load
 from hybridnav.models.container import FiledPart, parts_within, read_parts
