@@ -492,12 +492,21 @@ def test_show_watches_a_descent(cli, tmp_path):
     for file in (moving, strip):
         done = cli("show", OFFICE, "--robot-radius", 0.25, "--watch", "descent", file)
         assert done.code == 0
-    with Image.open(moving) as animation:
-        assert sum(1 for _ in ImageSequence.Iterator(animation)) >= 3
+
+    def n_frames(file):
+        with Image.open(file) as animation:
+            return sum(1 for _ in ImageSequence.Iterator(animation))
+
+    assert n_frames(moving) >= 3
     assert strip.stat().st_size > 10_000
     assert cli("show", OFFICE, "--watch", "growth", moving).refuses(2, "'descent FILE'")
     refused = cli("show", OFFICE, "--watch", "descent", tmp_path / "descent.mp4")
     assert refused.refuses(2, "--watch must end in .gif, .png")
+    paper = ("show", OFFICE, "--preset", "paper", "--watch", "descent")
+    assert cli(*paper, tmp_path / "two.gif", "--set", "planner.step=2").code == 0
+    assert n_frames(tmp_path / "two.gif") > n_frames(moving)  # a level for each halving
+    refused = cli(*paper, moving, "--set", "planner.levels=places")
+    assert refused.refuses(2, "--watch: the preset has levels: places")
 
 
 def test_show_tells_what_the_library_knows(cli):

@@ -49,13 +49,32 @@ def test_the_route_is_strong_and_what_is_not_kept_is_white(watched: WatchedDesce
         assert {tuple(colour) for colour in image[mask].tolist()} <= colours
 
 
-def test_an_animation_has_a_frame_for_each_level_and_one_for_the_path(
+def test_small_fields_of_the_route_are_seen(watched: WatchedDescent) -> None:
+    """The last fields of a large map have two pixels each, in colours of maps on white."""
+    for ax, kept in zip(plot_descent(GRID, watched), watched.levels, strict=False):
+        (outline,) = ax.collections
+        outlined = outline.get_paths()[0]
+        inside = np.argwhere(np.isin(kept.field_of, kept.route))
+        assert outlined.contains_points(GRID.frame.points_of(inside)).any()
+        box = outlined.get_extents()
+        low, high = (GRID.frame.points_of(end(axis=0)) for end in (inside.min, inside.max))
+        half = GRID.resolution_m / 2
+        np.testing.assert_allclose([box.min, box.max], [low - half, high + half])
+
+
+def test_an_animation_shows_each_level_and_then_the_path_as_it_grows(
     watched: WatchedDescent, tmp_path: Path
 ) -> None:
     save_descent(GRID, watched, tmp_path / "descent.gif")
     with Image.open(tmp_path / "descent.gif") as animation:
-        n_frames = sum(1 for _ in ImageSequence.Iterator(animation))
-    assert n_frames == len(watched.levels) + 1
+        frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(animation)]
+    assert {frame.shape for frame in frames} == {frames[0].shape}
+    red = style.rgb(style.PATH)[0].astype(int)
+    n_red = [int((np.abs(frame - red).max(axis=2) < 24).sum()) for frame in frames]
+    grown = n_red[len(watched.levels) :]
+    assert len(grown) > 4
+    assert grown == sorted(grown)
+    assert grown[-1] > 2 * max(n_red[: len(watched.levels)])  # the marks of start and goal are red
 
 
 def test_what_cannot_be_drawn_is_refused(watched: WatchedDescent, tmp_path: Path) -> None:

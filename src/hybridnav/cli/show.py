@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,6 +23,9 @@ from hybridnav.cli.common import (
 from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption
 from hybridnav.cli.reading import MapOptions, grow_topology, load_model, read_preset, with_map
 
+if TYPE_CHECKING:
+    from hybridnav.search.descent import WatchedDescent
+
 LevelOption = Annotated[
     int | None,
     typer.Option(
@@ -36,7 +39,8 @@ WatchOption = Annotated[
     typer.Option(
         "--watch",
         metavar="descent FILE",
-        help="Draw how `paper` comes down the levels on a long way: .gif, or a strip, .png.",
+        help="Draw how `paper` comes down the levels on a long way, by the preset if it "
+        "is of `paper`: .gif, or a strip, .png.",
     ),
 ]
 ProofArgument = Annotated[
@@ -73,34 +77,42 @@ def show(
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
     if not model.is_filed:
         seconds = {"load": seconds["load"], **pyramid.stats.seconds}
-    shown = pyramid[level]
+    shown, descent = pyramid[level], None if watch is None else _watched(pyramid, settings)
     parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
     if plot is not None:
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
         viz.save_figure(viz.plot_level(shown), plot)
-    if watch is not None:
-        _watch(pyramid, watch[1])
+    if watch is not None and descent is not None:
+        from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
+
+        if watch[1].suffix.lower() == ".gif":
+            viz.save_descent(pyramid.grid, descent, watch[1])
+        else:
+            viz.save_figure(viz.plot_descent(pyramid.grid, descent)[0], watch[1])
 
 
-def _watch(pyramid: hn.DualGraphPyramid, file: Path) -> None:
-    """Draw the descent between two cells that are far apart by the way between them."""
-    from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
+def _watched(pyramid: hn.DualGraphPyramid, preset: hn.Preset) -> WatchedDescent:
+    """Return the descent between two cells that are far apart by the way between them.
+
+    `preset`: one of method `paper`, else that of the package is taken.
+    """
     from hybridnav.search.descent import Descent  # noqa: PLC0415
     from hybridnav.search.grid_search import far_apart  # noqa: PLC0415
 
+    if preset.planner.method != "paper":
+        preset = hn.load_preset("paper")
     grid = pyramid.grid
-    enterable = grid.enterable(allow_unexplored=False)
+    enterable = grid.enterable(allow_unexplored=preset.planner.allow_unexplored)
     if not enterable.any():
         raise UsageError(f"--watch: map {printable(grid.name)} has no free cell to plan from")
-    descent = Descent(pyramid, enterable, corner_cutting=grid.corner_cutting)
+    descent = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=preset).method.prepare()
+    if not isinstance(descent, Descent):
+        raise UsageError("--watch: the preset has levels: places, which is one step, not a descent")
     watched = descent.watch(*far_apart(enterable))
     assert watched is not None  # noqa: S101 - there is a way between both
-    if file.suffix.lower() == ".gif":
-        viz.save_descent(grid, watched, file)
-    else:
-        viz.save_figure(viz.plot_descent(grid, watched)[0], file)
+    return watched
 
 
 def _describe_map(pyramid: hn.DualGraphPyramid) -> str:

@@ -318,4 +318,4 @@ def _pixels(figure: Figure) -> Image.Image:
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     image = Image.fromarray(pixels[..., :3].copy())
-    return image.quantize(colors=128, dither=Image.Dither.NONE)
+    return image.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)

@@ -16,16 +16,19 @@ from hybridnav.viz.levels import panels
 from hybridnav.viz.places import colour_vertices
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-    from hybridnav._base.typing import ByteArray, IntArray, PathLike
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, PathLike
     from hybridnav.maps import OccupancyGrid
     from hybridnav.search.descent import KeptFields, WatchedDescent
 
 _MILLISECONDS = 1200
-"""Time of a frame; the last one stays three times as long."""
+"""Time of a level; the whole path stays three times as long."""
+_PARTS, _PART_MILLISECONDS = 8, 150
+"""Frames in which the path grows, and the time of each."""
 
 
 def plot_descent(
@@ -38,7 +41,8 @@ def plot_descent(
 ) -> tuple[Axes, ...]:
     """Draw what a descent kept at each level, from the top down, and at last its path.
 
-    Fields of the route are in full colours, the others that were kept are pale; the rest is white.
+    Fields of the route are in full colours, outlined; the others that were kept are pale; the rest
+    is white.
 
     Parameters
     ----------
@@ -96,7 +100,7 @@ def save_descent(
     *,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> None:
-    """Write a descent as an animation: a frame for each level, and one for the path.
+    """Write a descent as an animation: a frame for each level, then the path as it grows.
 
     Parameters
     ----------
@@ -122,15 +126,27 @@ def save_descent(
     >>> descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=8))
     >>> save_descent(grid, descent.watch((5, 5), (25, 20)), "descent.gif")
     """
-    file, view, titles = checked_animation(path), known_view(grid), _titles(grid, descent)
-    figures = []
+    file, titles = checked_animation(path), _titles(grid, descent)
+    times = [_MILLISECONDS] * (len(titles) - 1)
+    times += [_PART_MILLISECONDS] * (_PARTS - 1) + [3 * _MILLISECONDS]
+    save_frames(_frames(grid, descent, titles, width_in), times, file)
+
+
+def _frames(
+    grid: OccupancyGrid, descent: WatchedDescent, titles: list[list[str]], width_in: float
+) -> Iterator[Figure]:
+    """Draw one figure after the other; that of the path is drawn on."""
+    view = known_view(grid)
     for number, words in enumerate(titles):
         (ax,) = panels(view, [words], 1, width_in)
-        _draw(Canvas.opened(ax, width_in, view), grid, descent, number, words)
-        figures.append(ax.figure.figure)
-    times = [_MILLISECONDS] * len(figures)
-    times[-1] *= 3
-    save_frames(figures, times, file)
+        line = _draw(Canvas.opened(ax, width_in, view), grid, descent, number, words)
+        if line is not None:
+            points = grid.frame.points_of(descent.cells)
+            for part in range(1, _PARTS):
+                line.set_data(*points[: len(points) * part // _PARTS].T)
+                yield ax.figure.figure
+            line.set_data(*points.T)
+        yield ax.figure.figure
 
 
 def _titles(grid: OccupancyGrid, descent: WatchedDescent) -> list[list[str]]:
@@ -151,21 +167,35 @@ def _titles(grid: OccupancyGrid, descent: WatchedDescent) -> list[list[str]]:
 
 def _draw(
     canvas: Canvas, grid: OccupancyGrid, descent: WatchedDescent, number: int, words: list[str]
-) -> None:
-    """Draw a panel: a level, or after the last one the path."""
+) -> Line2D | None:
+    """Draw a panel: a level, or after the last one the path, whose line is returned."""
     is_path = number == len(descent.levels)
-    kept = descent.levels[number - is_path]
+    kept, line = descent.levels[number - is_path], None
     draw_cells(canvas, grid, *_coloured(grid, kept, is_path=is_path))
-    line, points = canvas.sizes.line, grid.frame.points_of(descent.cells)
+    width, points = canvas.sizes.line, grid.frame.points_of(descent.cells)
     if is_path:
-        drawn = Line2D(*points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
-        canvas.ax.add_line(drawn)
+        line = Line2D(*points.T, color=style.PATH, lw=1.8 * width, zorder=5, gid="path")
+        canvas.ax.add_line(line)
+    else:
+        _outline(canvas, grid, np.isin(kept.field_of, kept.route))
     for point, marker in zip(points[[0, -1]], "os", strict=True):
         canvas.ax.plot(
-            *point, marker, ms=4 * line, mfc=style.FREE, mec=style.PATH, mew=1.4 * line, zorder=7
+            *point, marker, ms=5 * width, mfc=style.FREE, mec=style.PATH, mew=1.8 * width, zorder=7
         )
     frame_axes(canvas)
     add_title(canvas, words)
+    return line
+
+
+def _outline(canvas: Canvas, grid: OccupancyGrid, mask: BoolArray) -> None:
+    """Draw the outline of some cells: the last fields of a large map are specks without it."""
+    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    low = np.array([rows[0], cols[0]]) - 1
+    box = np.pad(mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1], 1)
+    at = np.indices(box.shape).reshape(2, -1).T + low
+    x, y = grid.frame.points_of(at).T.reshape(2, *box.shape)
+    width = 0.7 * canvas.sizes.line
+    canvas.ax.contour(x, y, box, [0.5], colors=style.INK, linewidths=width, zorder=4)
 
 
 def _coloured(
