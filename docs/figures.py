@@ -16,7 +16,7 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav import check_proof
 from hybridnav.ext.fleet import plot_building
-from hybridnav.ext.graphs import build_lane_graph, plot_route_graph
+from hybridnav.graphs import build_lane_graph, plot_route_graph
 from hybridnav.viz import (
     plot_costs,
     plot_level,

@@ -1,7 +1,7 @@
 """A route graph for Nav2: lanes as a person draws them, and what routes on them lose."""
 
 import hybridnav as hn
-from hybridnav.ext.graphs import build_lane_graph, export_nav2, judge_route_graph, plot_route_graph
+from hybridnav.graphs import build_lane_graph, export_nav2, judge_route_graph, plot_route_graph
 from hybridnav.viz import save_figure
 
 grid = hn.example_map("office", robot_radius_m=0.25)

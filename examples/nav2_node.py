@@ -10,7 +10,8 @@ from rclpy.time import Time
 from tf2_ros import Buffer, TransformException, TransformListener
 
 import hybridnav as hn
-from hybridnav.ext.graphs import load_graph, route_messages
+from hybridnav.ext.fleet import load_graph
+from hybridnav.graphs import route_messages
 from hybridnav.messages import fill_message, pose_of, transform_of
 
 USUAL = {"model": "floor.hnm", "graph": "graph.geojson", "preset": "shortest", "base": "base_link"}

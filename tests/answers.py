@@ -18,9 +18,9 @@ from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
 
 import hybridnav as hn
 from benchmarks.subjects.explore import narrow_world, widest_point
-from hybridnav.ext.graphs import build_lane_graph
 from hybridnav.ext.live.explore import explore
 from hybridnav.ext.live.mapping import Mapper, SimulatedLaser
+from hybridnav.graphs import build_lane_graph
 
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]
 """OMPL is a library of others, which takes its sines where it finds them."""

@@ -14,7 +14,7 @@ import shapely
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 
 CORNERS = ((0.9, 0.3), (0.9, -0.3), (-0.9, -0.3), (-0.9, 0.3))
 """A robot of 0.6 x 1.8 m."""

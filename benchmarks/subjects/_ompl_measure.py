@@ -20,8 +20,8 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import environment
 from hybridnav.harness.scenes import map_digest, sample_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.planner import load_preset
-from hybridnav.planner.methods.ompl import OmplPlanner
+from hybridnav.planning import load_preset
+from hybridnav.planning.methods.ompl import OmplPlanner
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.scenes import Pair
-    from hybridnav.planner import PlannerSettings
+    from hybridnav.planning import PlannerSettings
 
 Record = dict[str, Any]
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks.worlds import office_world
-from hybridnav.planner import load_preset
-from hybridnav.planner.methods.ompl import OmplPlanner
+from hybridnav.planning import load_preset
+from hybridnav.planning.methods.ompl import OmplPlanner
 from hybridnav.viz import plot_search
 
 if TYPE_CHECKING:

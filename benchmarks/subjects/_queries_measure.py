@@ -20,7 +20,7 @@ from hybridnav.harness.judges import judge_line, judge_path
 from hybridnav.harness.outcome import loss_of
 from hybridnav.harness.scenes import sample_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

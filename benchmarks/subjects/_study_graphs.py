@@ -20,8 +20,8 @@ from benchmarks.subjects._swagger_like import (
     swagger_like,
 )
 from hybridnav.errors import UnsuitableMapError
-from hybridnav.ext.graphs import WaypointGraph, build_lane_graph
-from hybridnav.ext.graphs.method import GraphMethod
+from hybridnav.graphs import WaypointGraph, build_lane_graph
+from hybridnav.graphs.method import GraphMethod
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 

@@ -18,14 +18,14 @@ from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from benchmarks.subjects._study_maps import StudyMap
-    from hybridnav.planner import Preset
+    from hybridnav.planning import Preset
 
 RUN_FILE = "study-run.json"
 COSTS = ("clearance",)

@@ -36,7 +36,7 @@ from benchmarks.common import (
     read,
     timed,
 )
-from hybridnav.planner.methods.shortest import OverMesh
+from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 
 if TYPE_CHECKING:

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 OLDEST = "numpy==1.26.*"
 TESTS = (
-    *("tests/_base", "tests/planner/test_named_plans.py", "tests/planner/test_results.py"),
+    *("tests/_base", "tests/planning/test_named_plans.py", "tests/planning/test_results.py"),
     *("tests/pyramid/test_invariants.py", "tests/search/test_search.py", "tests/topology"),
     *("tests/cli/test_commands.py", "tests/cli/test_export.py", "tests/maps"),
-    "tests/ext/graphs/test_bundle.py",
+    "tests/graphs/test_bundle.py",
 )
 PACKAGES = ("hypothesis", "pytest", "h11")
 VERSIONS = "import sys, numpy, numba; print(sys.version.split()[0], numpy.__version__)"

@@ -22,7 +22,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option, read
-from hybridnav.ext.graphs.method import GraphMethod
+from hybridnav.graphs.method import GraphMethod
 from hybridnav.harness import AnyAngleOptimum
 from hybridnav.harness.judges import judge_line
 from hybridnav.harness.scenes import sample_pairs
@@ -53,7 +53,7 @@ _CELL_M, _RIM_M, _GAP_M = 0.05, 4.0, 3.0
 
 def drawn_on_walls(
     data: Path, name: str, radius_m: float
-) -> tuple[hn.ext.graphs.WaypointGraph, hn.OccupancyGrid]:
+) -> tuple[hn.graphs.WaypointGraph, hn.OccupancyGrid]:
     """Return a graph of AMRL, and a grid of its walls, unexplored outside."""
     stated, walls = (
         json.loads((data / f"amrl_maps/{name}.{kind}.json").read_text(encoding="utf-8"))
@@ -77,16 +77,16 @@ def drawn_on_walls(
     drawn: nx.Graph[str] = nx.Graph()
     drawn.add_nodes_from((node["id"], node["loc"]) for node in stated["nodes"])
     drawn.add_edges_from((edge["s0_id"], edge["s1_id"]) for edge in stated["edges"])
-    return hn.ext.graphs.WaypointGraph.from_networkx(drawn, name="amrl"), grid
+    return hn.graphs.WaypointGraph.from_networkx(drawn, name="amrl"), grid
 
 
 def rows_of(
-    graph: hn.ext.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
+    graph: hn.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
 ) -> list[Row]:
     """Return the rows of a drawn graph, and of those that are built."""
     graphs = {graph.name if graph.format == "networkx" else graph.format: graph}
-    built = hn.ext.graphs.build_lane_graph(topology)
-    graphs["lanes"] = hn.ext.graphs.WaypointGraph.from_networkx(built.to_networkx(), name="lanes")
+    built = hn.graphs.build_lane_graph(topology)
+    graphs["lanes"] = hn.graphs.WaypointGraph.from_networkx(built.to_networkx(), name="lanes")
     grid = topology.grid
     losses = [
         _losses(GraphMethod(grid, one, clear_edges_only=True), grid, pairs)
@@ -106,12 +106,10 @@ def rows_of(
     return rows
 
 
-def _checked(
-    graph: hn.ext.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]
-) -> Row:
+def _checked(graph: hn.graphs.WaypointGraph, topology: hn.TopologicalMap, pairs: list[Pair]) -> Row:
     """Return figures on a graph as it is."""
     grid = topology.grid
-    check = hn.ext.graphs.check_graph(topology, graph)
+    check = hn.graphs.check_graph(topology, graph)
     at_wall, method = 0, GraphMethod(grid, graph)
     for pair in pairs:
         line = method.solve(pair.start, pair.goal).any_angle
@@ -155,7 +153,7 @@ def main(given: Namespace) -> None:
     rows: list[Row] = []
     data = given.data
     drawn = [
-        (hn.ext.graphs.load_graph(data / file), read(data / map_file, given.radius))
+        (hn.ext.fleet.load_graph(data / file), read(data / map_file, given.radius))
         for file, map_file in GRAPHS.items()
     ]
     drawn += [drawn_on_walls(data, name, given.radius) for name in WALLS]

@@ -29,8 +29,8 @@ from benchmarks.common import (
     read,
     timed,
 )
-from hybridnav.planner import load_preset
-from hybridnav.planner.result import Answer
+from hybridnav.planning import load_preset
+from hybridnav.planning.result import Answer
 from hybridnav.refine import MotionCheck
 from hybridnav.refine.footprint import Footprint
 

@@ -17,8 +17,8 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, OFFICE, maps_of, option, read
-from hybridnav.ext.graphs.attach import Network
-from hybridnav.ext.graphs.judge import FreeSpace
+from hybridnav.graphs.attach import Network
+from hybridnav.graphs.judge import FreeSpace
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def row_of(file: Path, name: str, radius_m: float) -> Row:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
     rooms = topology.rooms
     began = time.process_time()
-    graph = hn.ext.graphs.build_lane_graph(topology)
+    graph = hn.graphs.build_lane_graph(topology)
     seconds = time.process_time() - began
     space = FreeSpace.of(grid)
     is_kept = space.kept(rooms)[space.component_of] & space.free

@@ -28,16 +28,16 @@ from scipy.spatial import KDTree
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, matches, option, read
 from benchmarks.subjects.drawn_graphs import GRAPHS
-from hybridnav.ext.graphs.attach import (
+from hybridnav.graphs.attach import (
     MANY_CANDIDATES,
     Network,
     adjacency,
     placed_points,
     shortest_routes,
 )
-from hybridnav.ext.graphs.judge import FreeSpace, excess_of
-from hybridnav.ext.graphs.kernels import least_along
-from hybridnav.ext.graphs.sketch import settled
+from hybridnav.graphs.judge import FreeSpace, excess_of
+from hybridnav.graphs.kernels import least_along
+from hybridnav.graphs.sketch import settled
 from hybridnav.harness.tables import to_markdown
 from hybridnav.rooms.doors import measured_clearance_m
 
@@ -200,7 +200,7 @@ class Floor:
         far = np.hypot(*(point - first)) * self.grid.resolution_m > least_m
         return nodes[1:] if is_passed and far else nodes
 
-    def kept(self, graph: hn.ext.graphs.RouteGraph, spacing_m: float | None) -> float:
+    def kept(self, graph: hn.graphs.RouteGraph, spacing_m: float | None) -> float:
         """Return the share of nodes that keep their ids on a map with boxes, in percent."""
         grid, rng = self.grid, np.random.default_rng(0)
         classes = np.array(grid.measured)
@@ -219,7 +219,7 @@ class Floor:
         )
         new = hn.OccupancyGrid(values, grid.frame, robot_radius_m=grid.robot_radius_m)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(new, rooms=self.rooms))
-        after = hn.ext.graphs.build_lane_graph(topology, spacing_m=spacing_m, keep=graph)
+        after = hn.graphs.build_lane_graph(topology, spacing_m=spacing_m, keep=graph)
         return 100 * float(np.isin(graph.ids[0], after.ids[0]).mean())
 
 
@@ -238,10 +238,10 @@ def rows_of(
     floor: Floor, drawn: Path | None, spacings: list[float | None], *, steady: bool
 ) -> list[Row]:
     """Return the rows of the graphs of a floor."""
-    graphs = hn.ext.graphs
+    graphs = hn.graphs
     rows = []
     if drawn is not None:
-        rows.append(floor.row("drawn", graphs.load_graph(drawn), float("nan")))
+        rows.append(floor.row("drawn", hn.ext.fleet.load_graph(drawn), float("nan")))
     for spacing_m in spacings:
         began = time.process_time()
         built = graphs.build_lane_graph(floor.topology, spacing_m=spacing_m)
@@ -272,7 +272,7 @@ def main(given: Namespace) -> None:
     files |= {given.data / name: None for name in names}
     if given.data:
         files |= {given.data / file: given.data / drawn for drawn, file in GRAPHS.items()}
-    hn.ext.graphs.build_lane_graph(Floor(OFFICE, 1).topology)  # loads the kernels
+    hn.graphs.build_lane_graph(Floor(OFFICE, 1).topology)  # loads the kernels
     rows: list[Row] = []
     for file, drawn in files.items():
         if given.maps and not matches(file.stem, given.maps):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 EXERCISE = (
     *("tests/product/test_readme.py", "tests/product/test_notebooks.py"),
-    *("tests/planner/test_named_plans.py", "tests/cli/test_commands.py", "tests/cli/test_live.py"),
+    *("tests/planning/test_named_plans.py", "tests/cli/test_commands.py", "tests/cli/test_live.py"),
     *("tests/cli/test_export.py", "tests/cli/test_check.py", "tests/cli/test_evaluate.py"),
     *("tests/ext/page/test_answers.py", "tests/ext/page/test_edits.py", "tests/ext/agent"),
 )

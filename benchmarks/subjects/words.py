@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from hybridnav.planner import Tour
+    from hybridnav.guide import Tour
 
 REPORTED = ("2", "freiburg_building101", "ubremen-cartesium-demo4")
 """The maps of the reported figures: nobody looks at their routes before the words are finished."""

@@ -16,7 +16,7 @@ _named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
-_WING = ("ext.graphs", "ext.fleet", "ext.live")
+_HOMES = ("graphs", "ext.fleet", "ext.live")
 
 
 def __getattr__(name: str) -> object:
@@ -26,7 +26,7 @@ def __getattr__(name: str) -> object:
     except AttributeError:
         if name.startswith("_"):
             raise
-    homes = ("errors", *_WING) if name[0].isupper() else _WING
+    homes = ("errors", *_HOMES) if name[0].isupper() else _HOMES
     for home in homes:
         module = import_module(f"{__name__}.{home}")
         if name in getattr(module, "__all__", dir(module)):

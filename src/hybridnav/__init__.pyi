@@ -1,4 +1,17 @@
-from . import errors as errors, ext as ext, harness as harness, viz as viz
+from . import (
+    errors as errors,
+    ext as ext,
+    graphs as graphs,
+    harness as harness,
+    viz as viz,
+)
+from .guide import (
+    Alternative as Alternative,
+    Alternatives as Alternatives,
+    Tour as Tour,
+    plan_alternatives as plan_alternatives,
+    plan_tour as plan_tour,
+)
 from .closures import (
     Blocked as Blocked,
     Journal as Journal,
@@ -25,10 +38,15 @@ from .maps.files import (
     write_movingai_map as write_movingai_map,
     write_ros_map as write_ros_map,
 )
-from .models import Model as Model, load as load, save as save
-from .planner import (
-    Alternative as Alternative,
-    Alternatives as Alternatives,
+from .models import (
+    Model as Model,
+    export_path as export_path,
+    export_places as export_places,
+    export_rooms as export_rooms,
+    load as load,
+    save as save,
+)
+from .planning import (
     HybridPlanner as HybridPlanner,
     Path as Path,
     PlanBatch as PlanBatch,
@@ -36,13 +54,7 @@ from .planner import (
     PlanStatus as PlanStatus,
     Preset as Preset,
     Profile as Profile,
-    Tour as Tour,
-    export_path as export_path,
-    export_places as export_places,
-    export_rooms as export_rooms,
     load_preset as load_preset,
-    plan_alternatives as plan_alternatives,
-    plan_tour as plan_tour,
     preset_names as preset_names,
 )
 from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc

@@ -10,7 +10,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.planner import MotionLimits
+from hybridnav.planning import MotionLimits
 from hybridnav.refine.curves import shortest_curve
 from tests.strategies import drawn, occupancy_grid
 

@@ -23,7 +23,7 @@ from benchmarks.subjects._swagger_like import (
     skeleton_of,
     swagger_like,
 )
-from hybridnav.ext.graphs.method import GraphMethod
+from hybridnav.graphs.method import GraphMethod
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.judges import segment_faults
@@ -124,10 +124,10 @@ def test_routes_are_those_of_the_exported_file(tmp_path):
     made = RouteGraphMethod(grid)
     scaled = replace(grid, frame=replace(grid.frame, resolution_m=0.1))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(scaled, merge_distance_m=4.0))
-    built = hn.ext.graphs.build_lane_graph(topology)
+    built = hn.graphs.build_lane_graph(topology)
     assert made.n_nodes == built.n_nodes
-    hn.ext.graphs.export_nav2(built, tmp_path / "graph.geojson")
-    graph = hn.ext.graphs.load_graph(tmp_path / "graph.geojson")
+    hn.graphs.export_nav2(built, tmp_path / "graph.geojson")
+    graph = hn.ext.fleet.load_graph(tmp_path / "graph.geojson")
     by_file = GraphMethod(scaled, graph)
     rng = np.random.default_rng(1)
     free = np.argwhere(grid.classes == hn.CellClass.FREE)

@@ -103,7 +103,7 @@ def test_plans_on_tiles_are_as_long_as_scipy_finds(
     """Tiles of a building and its mirror images, joined by streets; as a large map is planned on
     too, whose graphs are built behind the queries."""
     if kind == "large":
-        monkeypatch.setattr("hybridnav.planner.methods.octile.MANY_CELLS", 0)
+        monkeypatch.setattr("hybridnav.planning.methods.octile.MANY_CELLS", 0)
         monkeypatch.setattr("hybridnav.search.mesh.search.MANY_CORNERS", 0)
         monkeypatch.setattr("hybridnav.search.mesh.search._WORTH", 0)
     tile = tile_of(figure1_world().grid(robot_radius_m=0.1), 140)

@@ -34,7 +34,7 @@ from benchmarks.subjects._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width
 from benchmarks.subjects._study_tables import tables_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 from tests.benchmarks.recomputed import REFERENCE, Recomputed
 from tests.harness.small_runs import run_here
 

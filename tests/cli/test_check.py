@@ -7,7 +7,7 @@ from unittest.mock import ANY
 
 import pytest
 
-from hybridnav.ext.graphs import KINDS
+from hybridnav.graphs import KINDS
 from tests.harness.small_runs import run_here, write_map
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"

@@ -10,7 +10,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 import hybridnav as hn
-from hybridnav.ext.graphs.fleet_options import read_points
+from hybridnav.ext.fleet.fleet_options import read_points
 from tests.nav2_reader import read_nav2
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
@@ -308,7 +308,7 @@ def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
         assert done.code == 0
         loss = done.answer["report"]["nearest"]["mean"]
         assert ("warning: routes on the graph of figure1" in done.err) == (loss > 0.1)
-        graph = hn.ext.graphs.load_graph(out)
+        graph = hn.ext.fleet.load_graph(out)
         assert (graph.n_nodes, graph.n_edges) == (done.answer["nodes"], done.answer["edges"])
         assert [floor.name for floor in hn.ext.fleet.load_building_graph(out).floors] == ["0"]
         done = cli("check", FIGURE, out, *SMALL[:2], "--floor", "0", "--json")
@@ -364,7 +364,7 @@ def test_a_map_and_a_building_become_indoorgml(cli, tmp_path, name):
     out = tmp_path / "a.json"
     done = cli("export", FIGURE.parents[1] / name, "-o", out, "--format", "indoorgml", "--json")
     assert (done.code, done.err) == (0, "")
-    layers = hn.ext.graphs.load_indoorgml(out).layers
+    layers = hn.ext.fleet.load_indoorgml(out).layers
     assert done.answer["layers"] == {
         each: {"cells": len(layer), "edges": layer.number_of_edges()}
         for each, layer in layers.items()

@@ -14,7 +14,7 @@ import pytest
 from hybridnav._base.threads import cores
 from hybridnav.cli import warm
 from hybridnav.cli.warm import notice_of_compiling
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 
 ROOT = Path(__file__).parents[2]
 OFFICE = ROOT / "maps" / "office" / "office.yaml"

@@ -11,7 +11,7 @@ import hybridnav as hn
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.maps.costs import cost_along
-from hybridnav.planner import HybridPlanner
+from hybridnav.planning import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 from tests.harness.faulty_methods import length_of

@@ -15,7 +15,7 @@ from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.planner import Preset
+from hybridnav.planning import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.refine.grid import LineOfSight
 from hybridnav.search.grid_search import GridSearch

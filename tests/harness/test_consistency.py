@@ -18,7 +18,7 @@ from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
 from hybridnav.harness.scenes import Pair, sample_pairs
 from hybridnav.maps import CellClass
-from hybridnav.planner import Preset
+from hybridnav.planning import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap

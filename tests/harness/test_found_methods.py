@@ -15,7 +15,7 @@ from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.search.found import Found
 from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
-from tests.planner.test_own_method import ByCells
+from tests.planning.test_own_method import ByCells
 
 if TYPE_CHECKING:
     from pathlib import Path

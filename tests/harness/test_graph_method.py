@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.ext.graphs.method import GraphMethod
+from hybridnav.graphs.method import GraphMethod
 from hybridnav.harness import RunSettings, evaluate, load_study
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
@@ -70,7 +70,7 @@ def test_routes_are_those_of_the_policy(classes, data):
         plain.add_node(node, x=x, y=y)
     pairs = st.tuples(st.integers(0, count - 1), st.integers(0, count - 1))
     plain.add_edges_from(data.draw(st.lists(pairs, max_size=20)))
-    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    graph = hn.graphs.WaypointGraph.from_networkx(plain)
     method = GraphMethod(grid, graph)
     for _ in range(4):
         start, goal = (tuple(free[rng.integers(len(free))].tolist()) for _ in range(2))
@@ -87,8 +87,8 @@ def test_routes_are_those_of_the_policy(classes, data):
 
 
 def house_graph():
-    return hn.ext.graphs.WaypointGraph.from_networkx(
-        _points(hn.ext.graphs.build_lane_graph(topology_of(HOUSE))), name="house"
+    return hn.graphs.WaypointGraph.from_networkx(
+        _points(hn.graphs.build_lane_graph(topology_of(HOUSE))), name="house"
     )
 
 
@@ -110,8 +110,8 @@ def test_a_sound_graph_has_no_counter_examples(tmp_path):
     path = write_map(tmp_path, letters(HOUSE), "house")
     grid = hn.load_map(path, robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=10.0))
-    built = hn.ext.graphs.build_lane_graph(topology)
-    graph = hn.ext.graphs.WaypointGraph.from_networkx(_points(built), name="house")
+    built = hn.graphs.build_lane_graph(topology)
+    graph = hn.graphs.WaypointGraph.from_networkx(_points(built), name="house")
     settings_ = RunSettings(maps=(str(path),), presets=(), graphs=(graph,), pairs=60)
     evaluate(settings_, tmp_path / "run")
     records = [one for one in read_records(tmp_path / "run") if one["method"] == "graph house"]
@@ -122,7 +122,7 @@ def test_a_sound_graph_has_no_counter_examples(tmp_path):
     study = load_study(tmp_path / "run")
     (outcome,) = [one for one in study.outcomes if one.label == "graph house"]
     assert study.faults == []
-    report = hn.ext.graphs.judge_route_graph(built, pairs=2000)
+    report = hn.graphs.judge_route_graph(built, pairs=2000)
     assert outcome.any_angle_losses.min() >= -1e-9
     assert outcome.any_angle_losses.mean() == pytest.approx(report.nearest.mean, abs=0.06)
 
@@ -135,7 +135,7 @@ def test_edges_through_walls_are_counter_examples_unless_they_are_left_out(tmp_p
     for node, (x, y) in enumerate(points):
         graph.add_node(node, x=x, y=y)
     graph.add_edges_from([(0, 1), (0, 2), (2, 3), (3, 4), (1, 5), (4, 5)])
-    mine = hn.ext.graphs.WaypointGraph.from_networkx(graph, name="drawn")
+    mine = hn.graphs.WaypointGraph.from_networkx(graph, name="drawn")
     for only, name in ((False, "graph drawn"), (True, "graph drawn (clear edges)")):
         run = tmp_path / f"run{only}"
         settings_ = RunSettings(
@@ -168,7 +168,7 @@ def test_settings_that_do_not_go_together(tmp_path):
             RunSettings(maps=(path,), presets=(), graphs=(mine,), corner_cutting=True),
             tmp_path / "run",
         )
-    route_graph = hn.ext.graphs.build_lane_graph(topology_of(HOUSE))
+    route_graph = hn.graphs.build_lane_graph(topology_of(HOUSE))
     wrong: Any = (route_graph,)
     with pytest.raises(hn.errors.InvalidValueError, match="expected a WaypointGraph"):
         evaluate(RunSettings(maps=(path,), presets=(), graphs=wrong), tmp_path / "run")
@@ -186,12 +186,12 @@ def test_a_graph_goes_to_a_process_of_its_own_and_its_records_are_kept(tmp_path)
     plain.add_node(1, x=9.5, y=7.5)
     plain.add_node(2, x=14, y=7)
     nx.add_path(plain, [0, 1, 2])
-    mine = hn.ext.graphs.WaypointGraph.from_networkx(plain, name="mine")
+    mine = hn.graphs.WaypointGraph.from_networkx(plain, name="mine")
     settings_ = RunSettings(maps=(path,), presets=(), graphs=(mine,), pairs=5)
     records = evaluate(settings_, tmp_path / "run")
     assert records >= 12
     assert evaluate(settings_, tmp_path / "run") == 0
     plain.add_edge(0, 2)
-    more = hn.ext.graphs.WaypointGraph.from_networkx(plain, name="mine")
+    more = hn.graphs.WaypointGraph.from_networkx(plain, name="mine")
     again = RunSettings(maps=(path,), presets=(), graphs=(more,), pairs=5)
     assert evaluate(again, tmp_path / "run") == records // 2

@@ -26,7 +26,7 @@ from hybridnav.harness.records import query_key, read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from hybridnav.harness.yardstick import OPTIMA, Yardstick, contradiction
 from hybridnav.maps.files import load_map
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import (

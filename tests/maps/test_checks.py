@@ -24,10 +24,10 @@ ONLINE: Any = OnlinePyramid.of(PYRAMID)
 JUDGE: Any = CheapestCost(GRID)
 JUDGES: Any = CheapestCost
 PLANNERS: Any = hn.HybridPlanner
-BUILD: Any = hn.ext.graphs
+BUILD: Any = hn.graphs
 MAPS: Any = hn
 CARRY: Any = carry_costs
-GRAPH = hn.ext.graphs.build_lane_graph(TOPOLOGY)
+GRAPH = hn.graphs.build_lane_graph(TOPOLOGY)
 
 CALLS: dict[str, Callable[[], object]] = {
     "grid is": lambda: JUDGES("office"),

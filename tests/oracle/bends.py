@@ -1,6 +1,6 @@
 """Bends of a line a second time: by chords over lengths of it, and by a recursion on points.
 
-They share nothing with `hybridnav.planner.guide.bends`.
+They share nothing with `hybridnav.guide.words.bends`.
 """
 
 import itertools

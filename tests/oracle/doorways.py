@@ -1,7 +1,7 @@
 """Turns at doors a second time: the path against the right angle of each door that it passes.
 
 Doors are found by the rooms of the cells along the path, and their right angle by the line
-between the two ends of the door. Nothing is shared with `hybridnav.planner`.
+between the two ends of the door. Nothing is shared with `hybridnav.planning`.
 """
 
 import itertools
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridnav as hn
-from hybridnav.planner.guide import Instruction
+from hybridnav.guide.words import Instruction
 
 FloatArray = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from benchmarks.baselines.thrun import ThrunMap
 from hybridnav._base.threads import Pool
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
-from hybridnav.planner.batch import PlanBatch
+from hybridnav.planning.batch import PlanBatch
 from hybridnav.search.grid_search import GridSearch
 from tests.strategies import Scene, examples, scenes
 
@@ -258,7 +258,7 @@ def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
         "import pickle, sys\n"
         f"result = pickle.load(open({str(tmp_path / 'result')!r}, 'rb'))\n"
         "print(result.cost, *result.route.places)\n"
-        "assert 'hybridnav.planner.planner' not in sys.modules and 'numba' not in sys.modules\n"
+        "assert 'hybridnav.planning.planner' not in sys.modules and 'numba' not in sys.modules\n"
     )
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert result.route is not None

@@ -87,7 +87,7 @@ OTHERS = [
     "TopologicalMap.local_grid",
     "TopologicalMap.transform",
     "ext.agent.http.description",
-    "ext.graphs.WaypointGraph.from_networkx",
+    "graphs.WaypointGraph.from_networkx",
     "ext.live.RoomsUpdate.closed_doors",
     "maps.names.folded",
     "maps.names.matching",

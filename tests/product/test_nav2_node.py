@@ -15,7 +15,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 import hybridnav as hn
-from hybridnav.ext.graphs import build_lane_graph, export_bundle, route_messages
+from hybridnav.graphs import build_lane_graph, export_bundle, route_messages
 from hybridnav.messages import fill_message
 from tests import ros_stand_in
 from tests.nav2_reader import read_nav2

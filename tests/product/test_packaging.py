@@ -288,8 +288,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     stubs = {path.relative_to(source).as_posix() for path in source.rglob("*.pyi")}
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
-    pages = {"hybridnav/harness/report.html.j2", "hybridnav/ext/graphs/check.html.j2"} | {
-        f"hybridnav/ext/graphs/bundle_{name}.j2"
+    pages = {"hybridnav/harness/report.html.j2", "hybridnav/graphs/check.html.j2"} | {
+        f"hybridnav/graphs/bundle_{name}.j2"
         for name in ("mask.yaml", "nav2_params.yaml", "poses.yaml", "README.md", "room_names.yaml")
     }
     assets = source / "hybridnav" / "ext" / "page" / "assets"

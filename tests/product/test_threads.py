@@ -17,7 +17,7 @@ from benchmarks.baselines.thrun import ThrunMap
 from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.judges import segment_faults
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 from tests.strategies import occupancy_grid
 
 N_THREADS = 4

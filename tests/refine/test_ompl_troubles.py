@@ -18,7 +18,7 @@ import pytest
 import hybridnav as hn
 from benchmarks.worlds import office_world
 from hybridnav.harness.judges import segment_faults
-from hybridnav.planner import load_preset
+from hybridnav.planning import load_preset
 from hybridnav.refine.ompl import client
 from tests.refine.troubled_query import TroubledQuery
 
@@ -68,7 +68,7 @@ def troubled(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         made = hn.refine.ompl.OmplQuery if trouble is None else partial(
             TroubledQuery, trouble=trouble, after_path=after_path
         )  # fmt: skip
-        monkeypatch.setattr("hybridnav.planner.methods.ompl.OmplQuery", made)
+        monkeypatch.setattr("hybridnav.planning.methods.ompl.OmplQuery", made)
 
     return arm
 
@@ -197,7 +197,7 @@ def test_nothing_outlives_a_planner_that_is_killed(tmp_path: Path) -> None:
 import hybridnav as hn
 from functools import partial
 from benchmarks.worlds import office_world
-from hybridnav.planner.methods import ompl
+from hybridnav.planning.methods import ompl
 from tests.refine.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
 preset = hn.load_preset("ompl", overrides=["{OVER_PLACES}"])

@@ -18,8 +18,8 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import plot_building
-from hybridnav.ext.graphs import plot_graph_check
 from hybridnav.ext.live import ReplayAnimation, ReplayStep, replay
+from hybridnav.graphs import plot_graph_check
 from hybridnav.viz.canvas import known_view
 from hybridnav.viz.style import PATH
 from tests.ext.fleet.test_queries import office
@@ -106,7 +106,7 @@ def checked(points, edges, *, directed=False):
         plain.add_node(node, x=x, y=y)
     plain.add_edges_from(edges)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=8.0))
-    return hn.ext.graphs.check_graph(topology, hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    return hn.graphs.check_graph(topology, hn.graphs.WaypointGraph.from_networkx(plain))
 
 
 def checked_links(nodes, links):
@@ -116,7 +116,7 @@ def checked_links(nodes, links):
     with TemporaryDirectory() as folder:
         path = Path(folder, "graph.json")
         path.write_text(json.dumps(whole))
-        return hn.ext.graphs.check_graph(topology, hn.ext.graphs.load_graph(path))
+        return hn.graphs.check_graph(topology, hn.ext.fleet.load_graph(path))
 
 
 def names(ax):

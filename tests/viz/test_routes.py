@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 import hybridnav as hn
+from hybridnav.guide.alternatives import Alternatives
 from hybridnav.maps import RoomLabels
-from hybridnav.planner.alternatives import Alternatives
 from hybridnav.viz import plot_alternatives, plot_costs, plot_plan, plot_rooms, plot_tour
 from tests.layers import grid_of, layer_of
 from tests.strategies import drawn, occupancy_grid

@@ -222,10 +222,10 @@ def _why_nothing(study: Study) -> str:
     return "the maps have no such pairs of free cells"
 
 
-def _graph(file: Path, floor: str | None) -> str | hn.ext.graphs.WaypointGraph:
+def _graph(file: Path, floor: str | None) -> str | hn.graphs.WaypointGraph:
     if floor is None:
         return str(file)
-    graph: hn.ext.graphs.WaypointGraph = extension("methods", "graph").load_graph(file, floor=floor)
+    graph: hn.graphs.WaypointGraph = extension("formats", "graph").load_graph(file, floor=floor)
     return graph
 
 

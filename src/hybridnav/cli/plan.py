@@ -20,12 +20,12 @@ from hybridnav.cli.request import (
     wanted_of,
 )
 from hybridnav.errors import brief
+from hybridnav.guide.words import check_language, languages
 from hybridnav.maps.names import read_point
-from hybridnav.planner.guide import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.named import At
+    from hybridnav.planning.named import At
 
 Point = tuple[float, ...]
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from hybridnav.cli.options import Closing
-    from hybridnav.planner import Preset
+    from hybridnav.planning import Preset
 
 _SMOOTH = ("none", "line-of-sight", "arcs")
 
@@ -155,7 +155,7 @@ def read_preset(source: str) -> Preset:
     try:
         return hn.load_preset(source)
     except hn.errors.PresetNotFoundError as error:
-        from hybridnav.planner.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
+        from hybridnav.planning.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
 
         if is_preset_name(source):
             raise UsageError(str(error)) from None
@@ -284,7 +284,7 @@ def grow_topology(
         with stage("finding rooms", seconds, "rooms"):
             rooms = hn.find_rooms(grid)
     if rooms is not None:
-        from hybridnav.planner.named import check_waypoints  # noqa: PLC0415 - loads numba
+        from hybridnav.planning.named import check_waypoints  # noqa: PLC0415 - loads numba
 
         check_waypoints(rooms, grid, waypoints)
         for name in closing.rooms if closing is not None else ():

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav.cli.options import Closing, Costs
-    from hybridnav.planner.named import At
+    from hybridnav.planning.named import At
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Request:
         settings = self.settings
         allowed = settings.planner.allow_unexplored
         if settings.planner.underlying.method == "shortest" and not model.is_filed:
-            from hybridnav.planner.methods.shortest import announce_mesh  # noqa: PLC0415 - numba
+            from hybridnav.planning.methods.shortest import announce_mesh  # noqa: PLC0415 - numba
 
             announce_mesh(model.grid.enterable(allow_unexplored=allowed))
         with compiling_beside(settings) as compiled:
@@ -207,7 +207,7 @@ class Request:
         """Explain why there is no path, or, if asked, where a path is tightest."""
         if (outcome.solved and not self.why) or "outside" in outcome.status:
             return {}
-        from hybridnav.planner.why import explain_solved  # noqa: PLC0415 - loads shapely
+        from hybridnav.reasons.why import explain_solved  # noqa: PLC0415 - loads shapely
 
         results = (outcome,) if isinstance(outcome, hn.PlanResult) else outcome.results
         with stage("explaining", seconds, "why"):
@@ -235,7 +235,7 @@ class Request:
         self, topology: hn.TopologicalMap, closed: hn.Blocked | None, costs: hn.CostLayer | None
     ) -> hn.PlanResult:
         # Loads pydantic, which help can do without.
-        from hybridnav.planner import CostSettings, planner_settings  # noqa: PLC0415
+        from hybridnav.planning import CostSettings, planner_settings  # noqa: PLC0415
 
         settings = self.settings
         own, by = settings.planner, CostSettings(clearance=settings.planner.clearance)
@@ -250,7 +250,7 @@ class Request:
         """Return the figures of what was asked for beside a plan that was refused."""
         if self.wanted.count > 1:
             # Loads numba, which help and wrong usage can do without.
-            from hybridnav.planner.alternatives import unplanned  # noqa: PLC0415
+            from hybridnav.guide.alternatives import unplanned  # noqa: PLC0415
 
             return _alternatives_figures(unplanned(refused.status))
         return _compared(refused, None) if self.compare else {}
@@ -312,8 +312,8 @@ def _leaving(
     """Return what reasons call the closures that a plan leaves; nothing of others."""
     if not isinstance(outcome, hn.PlanResult) or outcome.leaves_m is None:
         return {}
-    from hybridnav.planner.why import each_closure  # noqa: PLC0415 - loads shapely
-    from hybridnav.planner.why_words import Closure, closure_words  # noqa: PLC0415
+    from hybridnav.reasons.why import each_closure  # noqa: PLC0415 - loads shapely
+    from hybridnav.reasons.why_words import Closure, closure_words  # noqa: PLC0415
 
     assert outcome.start is not None  # noqa: S101 - every plan has one
     grid, costs = planner.grid, planner.costs
@@ -327,7 +327,7 @@ def _leaving(
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     """Return alternatives with the rooms and doors that they pass, and whether they are all."""
-    from hybridnav.planner import COST_METRICS  # noqa: PLC0415 - loads numpy
+    from hybridnav.planning import COST_METRICS  # noqa: PLC0415 - loads numpy
 
     routes = []
     by_costs = bool(found) and found[0].result.metric in COST_METRICS

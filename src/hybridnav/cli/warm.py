@@ -26,7 +26,7 @@ from hybridnav.cli.common import complain, stage
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from hybridnav.planner import Preset
+    from hybridnav.planning import Preset
 
 # The first start: a second process compiles, and the user is informed.
 
@@ -191,9 +191,9 @@ def compile_search(method: str) -> None:
     """Compile the search of a method, by a search of a small map."""
     import numpy as np  # noqa: PLC0415
 
-    from hybridnav.planner import planner_settings  # noqa: PLC0415 - loads pydantic
-    from hybridnav.planner.methods import make_method  # noqa: PLC0415 - loads numba
-    from hybridnav.planner.methods.grid import KnownMap  # noqa: PLC0415
+    from hybridnav.planning import planner_settings  # noqa: PLC0415 - loads pydantic
+    from hybridnav.planning.methods import make_method  # noqa: PLC0415 - loads numba
+    from hybridnav.planning.methods.grid import KnownMap  # noqa: PLC0415
     from hybridnav.search.found import Query  # noqa: PLC0415
     from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
 
@@ -239,7 +239,7 @@ def compile_rooms() -> None:
 
 def compile_model() -> None:
     """Compile what builds a model with rooms, and what plans on it."""
-    from hybridnav.planner import load_preset  # noqa: PLC0415 - loads pydantic
+    from hybridnav.planning import load_preset  # noqa: PLC0415 - loads pydantic
 
     grid = replace(small_grid(), frame=hn.Frame(resolution_m=0.25))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))

@@ -1,3 +1,3 @@
-from . import fleet as fleet, graphs as graphs, live as live, page as page
+from . import fleet as fleet, live as live, page as page
 
 __all__: list[str]

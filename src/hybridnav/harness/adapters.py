@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.maps import CellClass
-from hybridnav.planner import HybridPlanner, PlanStatus
+from hybridnav.planning import HybridPlanner, PlanStatus
 from hybridnav.search import found as search
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Metric, PlanResult, PlanStats, Preset
+    from hybridnav.planning import Metric, PlanResult, PlanStats, Preset
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]

@@ -15,7 +15,7 @@ from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, close_method
 from hybridnav.harness.names import baseline_name, class_of, own_name, source_hash
-from hybridnav.planner import Preset, load_preset
+from hybridnav.planning import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.names import NamedMethod
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Metric
+    from hybridnav.planning import Metric
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
@@ -211,7 +211,7 @@ def named_spec(
 
 
 def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:
-    """Return the method that follows a graph, or that of a file; see `ext.graphs.GraphMethod`."""
+    """Return the method that follows a graph, or that of a file; see `graphs.GraphMethod`."""
     graph = extension("methods", "graph").checked_graph(given)
     name = f"graph {graph.name}" + (" (clear edges)" if clear_edges_only else "")
     return MethodSpec(name, None, graph=graph, clear_edges_only=clear_edges_only)

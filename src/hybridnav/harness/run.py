@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.records import Record
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.files.movingai import Scenario
-    from hybridnav.planner import Preset
+    from hybridnav.planning import Preset
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.outcome import REGIONS
 from hybridnav.harness.yardstick import OPTIMA
-from hybridnav.planner import Preset
+from hybridnav.planning import Preset
 from hybridnav.refine.ompl import OmplSettings
 
 if TYPE_CHECKING:

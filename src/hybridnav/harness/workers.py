@@ -16,7 +16,7 @@ import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.endpoints import read_points
+from hybridnav.planning.endpoints import read_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.records import Record
     from hybridnav.harness.task import Task
     from hybridnav.harness.timing import TimingTask
-    from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.planning.planner import HybridPlanner
 
     Work: TypeAlias = Task | TimingTask
 

@@ -1,4 +1,4 @@
-"""Models: a map with everything that planners have prepared on it, in one file."""
+"""Files of what was found: models of all that planners prepare on a map, and exported paths."""
 
 import lazy_loader
 

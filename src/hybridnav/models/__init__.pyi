@@ -1,4 +1,9 @@
-from .saving import save as save
+from .export import (
+    export_path as export_path,
+    export_places as export_places,
+    export_rooms as export_rooms,
+)
 from .model import Model as Model, load as load
+from .saving import save as save
 
 __all__: list[str]

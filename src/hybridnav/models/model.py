@@ -14,7 +14,7 @@ from hybridnav.maps.files import load_map
 from hybridnav.maps.files.limits import check_max_cells
 from hybridnav.models import parts, structures
 from hybridnav.models.container import read_parts
-from hybridnav.planner import Preset, PyramidSettings, load_preset
+from hybridnav.planning import Preset, PyramidSettings, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.models.container import FiledPart, Part
-    from hybridnav.planner import HybridPlanner
+    from hybridnav.planning import HybridPlanner
 
 
 class Model:
@@ -164,7 +164,7 @@ class Model:
         """
         # Loads numba, which a grid alone does not need.
         from hybridnav.models.searches import made_for, search_of  # noqa: PLC0415
-        from hybridnav.planner import HybridPlanner  # noqa: PLC0415
+        from hybridnav.planning import HybridPlanner  # noqa: PLC0415
 
         preset = self._own_preset if preset is None else load_preset(preset)
         topology = self.topology if topology is None else topology

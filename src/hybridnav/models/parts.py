@@ -14,7 +14,7 @@ from hybridnav.maps import Frame, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.files.limits import check_size
 from hybridnav.maps.islands import DroppedIslands
 from hybridnav.models.structures import GRID, PRESET, PYRAMID, ROOMS, refusal
-from hybridnav.planner import Preset
+from hybridnav.planning import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, BuildStats, LevelSize, Linkage, Record
 

@@ -29,7 +29,7 @@ class OfFloors(Protocol):
 if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
     from hybridnav.models.container import Part
-    from hybridnav.planner import HybridPlanner
+    from hybridnav.planning import HybridPlanner
 
     Saved = (
         OccupancyGrid | TopologicalMap | HybridPlanner | Model | OfFloors | Iterable[HybridPlanner]
@@ -91,7 +91,7 @@ def parts_of(
         return [parts.grid_part(thing)]
     if isinstance(thing, TopologicalMap):
         return _parts_of_map(thing)
-    from hybridnav.planner import HybridPlanner  # noqa: PLC0415 - loads numba
+    from hybridnav.planning import HybridPlanner  # noqa: PLC0415 - loads numba
 
     several = list(thing) if isinstance(thing, Iterable) else []
     planners = [thing] if isinstance(thing, HybridPlanner) else several

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.models.container import FiledPart, Part
-    from hybridnav.planner import PlannerSettings
+    from hybridnav.planning import PlannerSettings
     from hybridnav.search.found import Prepared
     from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.search.octile import JumpSearch

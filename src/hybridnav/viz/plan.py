@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
-from hybridnav.planner import COST_METRICS
+from hybridnav.planning import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import PlanResult
+    from hybridnav.planning import PlanResult
     from hybridnav.route import Route
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.style import Sizes

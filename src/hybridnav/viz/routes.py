@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
-from hybridnav.planner import COST_METRICS
+from hybridnav.planning import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.closures.blocked import Closable
+    from hybridnav.guide import Tour
+    from hybridnav.guide.alternatives import Alternatives
+    from hybridnav.guide.words.bends import Leg
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planner import Tour
-    from hybridnav.planner.alternatives import Alternatives
-    from hybridnav.planner.guide.bends import Leg
     from hybridnav.rooms import Door, Rooms
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry

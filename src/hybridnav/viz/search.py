@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.planner import Path
+    from hybridnav.planning import Path
     from hybridnav.refine.ompl import Search
     from hybridnav.search.mesh import ConvexMesh
     from hybridnav.viz.layout import Entry

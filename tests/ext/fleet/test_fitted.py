@@ -79,7 +79,7 @@ def drawn_over(building: hn.ext.fleet.Building) -> BuildingGraph:
                 if other in plain:
                     plain.add_edge(f"{row} {col}", other)
         floors.append(
-            FloorGraph(name=floor.name, graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+            FloorGraph(name=floor.name, graph=hn.graphs.WaypointGraph.from_networkx(plain))
         )
     return BuildingGraph(name="drawn", floors=tuple(floors), links=building.links)
 

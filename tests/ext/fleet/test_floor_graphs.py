@@ -40,7 +40,7 @@ def graph_at(*points):
     plain: nx.DiGraph[Any] = nx.DiGraph()
     for node, (x, y) in enumerate(points):
         plain.add_node(node, x=x, y=y)
-    return hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    return hn.graphs.WaypointGraph.from_networkx(plain)
 
 
 def floor(name, *points):
@@ -200,7 +200,7 @@ def test_nodes_of_a_layout_are_joined_exactly_where_the_building_has_a_route(
     except hn.errors.InvalidValueError:
         assume(False)
     file = tmp_path_factory.mktemp("lif") / "layout.json"
-    hn.ext.graphs.export_lif(graph, file, vehicle_types=["Maker.Carrier"])
+    hn.ext.fleet.export_lif(graph, file, vehicle_types=["Maker.Carrier"])
     whole = to_networkx(hn.ext.fleet.load_building_graph(file))
     piece_of = {
         node: number
@@ -237,9 +237,7 @@ def test_doors_that_no_edge_passes_are_not_in_the_graph_of_a_floor():
     rooms = topology_of(NOOK)
     wide = topology_of(NOOK, robot_radius_m=0.6)
     for topology, expected in ((rooms, 3), (wide, 1)):
-        floor = hn.ext.fleet.floor_graph(
-            topology, hn.ext.graphs.build_lane_graph(topology), name="1"
-        )
+        floor = hn.ext.fleet.floor_graph(topology, hn.graphs.build_lane_graph(topology), name="1")
         named = {
             facts["door_name"] for facts in floor.graph.edge_facts.values() if "door_name" in facts
         }

@@ -20,7 +20,7 @@ from hybridnav.ext.fleet import (
     match_graph,
 )
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
-from hybridnav.ext.graphs import BUILDING_KINDS
+from hybridnav.graphs import BUILDING_KINDS
 from tests.houses import LIFT, STAIRS, two_rooms
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def floor(name: str, change: Callable[[nx.Graph[str]], object] | None = None) ->
     plain.add_edges_from(EDGES)
     if change is not None:
         change(plain)
-    return FloorGraph(name=name, graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    return FloorGraph(name=name, graph=hn.graphs.WaypointGraph.from_networkx(plain))
 
 
 def drawn(
@@ -191,7 +191,7 @@ def test_routes_there_and_back_may_lead_over_other_floors(house: hn.ext.fleet.Bu
     plain: nx.DiGraph[str] = nx.DiGraph()
     plain.add_nodes_from((node, {"x": x, "y": y}) for node, (x, y) in NODES.items())
     plain.add_edges_from(EDGES)
-    one_way = FloorGraph(name="2", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    one_way = FloorGraph(name="2", graph=hn.graphs.WaypointGraph.from_networkx(plain))
     whole = drawn(C=second)
     loop = replace(whole, floors=(whole.floors[0], one_way, whole.floors[2]))
     assert found(check_building_graph(match_graph(building, loop))) == {}
@@ -218,7 +218,7 @@ def test_a_node_far_outside_an_open_map_is_never_seen() -> None:
     for node, (x, y) in {"a": (1.5, 1.5), "far": (2e8, 1e8), "b": (7.5, 4.5)}.items():
         plain.add_node(node, x=x, y=y)
     plain.add_edges_from([("a", "far"), ("far", "b")])
-    graph = FloorGraph(name="1", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    graph = FloorGraph(name="1", graph=hn.graphs.WaypointGraph.from_networkx(plain))
     network = BuildingNetwork(match_graph(building, BuildingGraph(name="open", floors=(graph,))))
     leg = np.array([0, 1, 2])
     for point in ((2.5, 2.5), (3.5, 5.5)):
@@ -237,7 +237,7 @@ def test_nodes_are_put_to_corners_and_centres_alone_and_into_no_wall() -> None:
     plain: nx.Graph[int] = nx.Graph()
     for node, (x, y) in enumerate([*stay, *put]):
         plain.add_node(node, x=x, y=y)
-    graph = FloorGraph(name="1", graph=hn.ext.graphs.WaypointGraph.from_networkx(plain))
+    graph = FloorGraph(name="1", graph=hn.graphs.WaypointGraph.from_networkx(plain))
     matched = match_graph(building, BuildingGraph(name="drawn", floors=(graph,)))
     points = matched.floors["1"].graph.points
     assert points == pytest.approx(np.array([*stay, *put.values()]), abs=1e-9)

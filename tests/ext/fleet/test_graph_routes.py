@@ -67,7 +67,7 @@ def drawn(seed: int) -> Drawing:
         for _ in range(3 * len(graph)):
             tail, head = rng.integers(len(graph), size=2).tolist()
             graph.add_edge(tail, head)
-        floors.append(FloorGraph(name=name, graph=hn.ext.graphs.WaypointGraph.from_networkx(graph)))
+        floors.append(FloorGraph(name=name, graph=hn.graphs.WaypointGraph.from_networkx(graph)))
     drawing.graph = BuildingGraph(name="drawn", floors=tuple(floors), links=tuple(links))
     return drawing
 

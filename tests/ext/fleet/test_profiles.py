@@ -14,7 +14,7 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, Link, LinkEnd
-from hybridnav.planner import Profile
+from hybridnav.planning import Profile
 from tests.floors import random_floor
 from tests.strategies import occupancy_grid
 

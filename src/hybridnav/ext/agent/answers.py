@@ -14,14 +14,15 @@ from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
-from hybridnav.planner import HybridPlanner, Tour, plan_tour
-from hybridnav.planner.why import explain_solved
+from hybridnav.guide import Tour, plan_tour
+from hybridnav.reasons.why import explain_solved
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
     from hybridnav.closures import Blocked
     from hybridnav.ext.page.session import Session
+    from hybridnav.planning import HybridPlanner
     from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
 

@@ -23,9 +23,9 @@ from hybridnav.ext.agent.questions import (
 )
 from hybridnav.ext.fleet.building import legs_of, tightest
 from hybridnav.ext.fleet.links import ClosedLink
+from hybridnav.guide.words import check_language
 from hybridnav.maps.names import folded, place_of_name, read_point
-from hybridnav.planner import Profile
-from hybridnav.planner.guide import check_language
+from hybridnav.planning import Profile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -16,13 +16,14 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.agent.questions import UnclearError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key, nearest
-from hybridnav.planner import Explanation, HybridPlanner
-from hybridnav.planner.profile import rebuilt
+from hybridnav.planning import HybridPlanner
+from hybridnav.planning.profile import rebuilt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from hybridnav.ext.agent.questions import ListRooms
+    from hybridnav.reasons import Explanation
     from hybridnav.rooms import Door, Rooms
 
 Point = tuple[float, float]

@@ -26,10 +26,18 @@ from .links import Ride as Ride, Link as Link, LinkEnd as LinkEnd, LinkKind as L
 from .plan import BuildingPlan as BuildingPlan
 from .plot import plot_building as plot_building
 from .files import (
+    Anchor as Anchor,
+    IndoorModel as IndoorModel,
     building_graph as building_graph,
+    export_indoorgml as export_indoorgml,
+    export_lif as export_lif,
+    export_osm as export_osm,
+    export_rmf as export_rmf,
     floor_graph as floor_graph,
     load_building as load_building,
     load_building_graph as load_building_graph,
+    load_graph as load_graph,
+    load_indoorgml as load_indoorgml,
 )
 
 __all__: list[str]

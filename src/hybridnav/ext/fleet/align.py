@@ -48,7 +48,7 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import FloorGraph, moved_floor
     >>> plain = nx.DiGraph()
@@ -97,7 +97,7 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, align_floors
     >>> plain = nx.DiGraph()

@@ -18,9 +18,9 @@ from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
-from hybridnav.planner.private_rooms import Privacy
-from hybridnav.planner.profile import PROFILES, profile_of
-from hybridnav.planner.why import explain_solved
+from hybridnav.planning.private_rooms import Privacy
+from hybridnav.planning.profile import PROFILES, profile_of
+from hybridnav.reasons.why import explain_solved
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
     from hybridnav.closures import Journal
     from hybridnav.models.container import Part
-    from hybridnav.planner import HybridPlanner, Profile
-    from hybridnav.planner.named import At
+    from hybridnav.planning import HybridPlanner, Profile
+    from hybridnav.planning.named import At
 
 FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
 """A floor and a point or name on it, or a name that only one floor has."""
@@ -65,7 +65,7 @@ class Building:
     speed_m_s
         Metres per second that the robot drives: a second of a ride costs as many metres.
     profiles
-        Profiles beside those of `hybridnav.planner.PROFILES`, or in place of one of their names.
+        Profiles beside those of `hybridnav.planning.PROFILES`, or in place of one of their names.
     journal
         Things out of order: closed for all queries until they are opened again. None for none.
 

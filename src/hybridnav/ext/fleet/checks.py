@@ -16,10 +16,10 @@ from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
-from hybridnav.planner import HybridPlanner, PlanStatus, Profile
-from hybridnav.planner.endpoints import places_of_endpoints, read_point, refusal
-from hybridnav.planner.named import check_names
-from hybridnav.planner.profile import ProfiledFloor, forbidden, in_the_way, under_profile
+from hybridnav.planning import HybridPlanner, PlanStatus, Profile
+from hybridnav.planning.endpoints import places_of_endpoints, read_point, refusal
+from hybridnav.planning.named import check_names
+from hybridnav.planning.profile import ProfiledFloor, forbidden, in_the_way, under_profile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

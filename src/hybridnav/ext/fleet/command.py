@@ -17,8 +17,8 @@ from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.plan import checked_at, one_of
 from hybridnav.cli.reading import MapOptions, check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
+from hybridnav.guide.words import check_language
 from hybridnav.maps.names import place_of_name, read_point
-from hybridnav.planner.guide import check_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,7 +16,7 @@ from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
 from hybridnav.models.container import Part, buffers_of
 from hybridnav.models.parts import plain
 from hybridnav.models.structures import BUILDING, FLOOR
-from hybridnav.planner.profile import PROFILES, Profile
+from hybridnav.planning.profile import PROFILES, Profile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import RoomLabels
-    from hybridnav.planner import HybridPlanner, PlanResult
+    from hybridnav.planning import HybridPlanner, PlanResult
     from hybridnav.search.found import ClosedCells
 
 ROUNDED = 1.0 - 1e-12

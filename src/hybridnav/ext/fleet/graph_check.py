@@ -14,10 +14,10 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
-from hybridnav.ext.graphs.check import GraphCheck, check_graph
-from hybridnav.ext.graphs.gather import Finding, Findings, shown
-from hybridnav.ext.graphs.judge import LEAST_AREA_M2, Excess, excess_of
-from hybridnav.ext.graphs.waypoint_graph import (
+from hybridnav.graphs.check import GraphCheck, check_graph
+from hybridnav.graphs.gather import Finding, Findings, shown
+from hybridnav.graphs.judge import LEAST_AREA_M2, Excess, excess_of
+from hybridnav.graphs.waypoint_graph import (
     add_one_way,
     components_of,
     cut_off,
@@ -25,7 +25,7 @@ from hybridnav.ext.graphs.waypoint_graph import (
     one_way_nodes,
 )
 from hybridnav.maps.checks import checked_between, checked_type
-from hybridnav.planner.settings import ShortestSettings
+from hybridnav.planning.settings import ShortestSettings
 from hybridnav.rooms.find import outside_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.align import Pose, moved_floor, moved_point, placed_pose
 from hybridnav.ext.fleet.building import Building
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, Point, join_links
-from hybridnav.ext.graphs.attach import placed_points
+from hybridnav.graphs.attach import placed_points
 from hybridnav.maps.checks import checked_type
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav._base.trig import dist, hypots
 from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink
 from hybridnav.ext.fleet.link_nodes import FloorGraph, Point, node_at
-from hybridnav.ext.graphs import attach
+from hybridnav.graphs import attach
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:

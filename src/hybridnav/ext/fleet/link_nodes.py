@@ -12,7 +12,7 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link
-from hybridnav.ext.graphs.gather import free_name
+from hybridnav.graphs.gather import free_name
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import place_of_name
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.ext.graphs import WaypointGraph
+    from hybridnav.graphs import WaypointGraph
 
 # Graphs of several floors, joined by links, as fleets and map editors exchange them.
 
@@ -81,7 +81,7 @@ class FloorGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import FloorGraph
     >>> plain = nx.DiGraph()
@@ -111,7 +111,7 @@ class BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd
     >>> plain = nx.DiGraph()
@@ -189,7 +189,7 @@ def join_links(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
     >>> plain = nx.DiGraph()
@@ -235,7 +235,7 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import WaypointGraph
+    >>> from hybridnav.graphs import WaypointGraph
     >>> import networkx as nx
     >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, to_networkx
     >>> plain = nx.DiGraph()

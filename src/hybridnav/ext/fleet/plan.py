@@ -14,14 +14,14 @@ from hybridnav.errors import PlanError
 from hybridnav.ext.fleet.floors import ROUNDED, Floor
 from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
 from hybridnav.ext.fleet.search import COUNTS, Endpoint, LinkSearch, stats_of
-from hybridnav.planner import Metric, Path, PlanResult, PlanStats, PlanStatus
-from hybridnav.planner.guide import FloorChange, Instruction, Space, sentences
-from hybridnav.planner.guide.itinerary import Guide, heading_of, waypoint_text
+from hybridnav.guide.words import FloorChange, Instruction, Space, sentences
+from hybridnav.guide.words.itinerary import Guide, heading_of, waypoint_text
+from hybridnav.planning import Metric, Path, PlanResult, PlanStats, PlanStatus
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from hybridnav.planner.result import InstructionSource
+    from hybridnav.planning.result import InstructionSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class BuildingPlan:
         Parameters
         ----------
         language
-            Code of a language, one of `hybridnav.planner.guide.languages`.
+            Code of a language, one of `hybridnav.guide.words.languages`.
 
         Returns
         -------

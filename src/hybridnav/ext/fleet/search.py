@@ -11,8 +11,8 @@ import numpy as np
 
 from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
 from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
-from hybridnav.planner import HybridPlanner, PlanStats, PlanStatus
-from hybridnav.planner.result import PlanDraft
+from hybridnav.planning import HybridPlanner, PlanStats, PlanStatus
+from hybridnav.planning.result import PlanDraft
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray, IntArray
-    from hybridnav.planner.named import At
+    from hybridnav.planning.named import At
     from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000

@@ -8,9 +8,9 @@ from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.closures.blocked import as_blocked
-from hybridnav.planner import PlanStatus
-from hybridnav.planner.why import each_closure
-from hybridnav.planner.why_words import closure_words
+from hybridnav.planning import PlanStatus
+from hybridnav.reasons.why import each_closure
+from hybridnav.reasons.why_words import closure_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
     from hybridnav.ext.fleet.plan import BuildingPlan
     from hybridnav.ext.fleet.search import Endpoint
-    from hybridnav.planner.why import Explanation
-    from hybridnav.planner.why_words import Closure
+    from hybridnav.reasons.why import Explanation
+    from hybridnav.reasons.why_words import Closure
 
 _WORDS = {
     "en": {

@@ -12,19 +12,21 @@ import shapely
 from hybridnav.closures import Blocked
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import requests as ask
+from hybridnav.guide import plan_alternatives
+from hybridnav.guide.tour import tour_of
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.names import natural_key
-from hybridnav.planner import PlanResult, load_preset, plan_alternatives, preset_names
-from hybridnav.planner.tour import tour_of
+from hybridnav.planning import PlanResult, load_preset, preset_names
 from hybridnav.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray
     from hybridnav.closures import Journal
+    from hybridnav.guide import Tour
     from hybridnav.maps.costs import CostLayer
     from hybridnav.models import Model
-    from hybridnav.planner import HybridPlanner, Preset, Tour
+    from hybridnav.planning import HybridPlanner, Preset
     from hybridnav.pyramid import Level
     from hybridnav.rooms import Door, Rooms
     from hybridnav.topology import TopologicalMap

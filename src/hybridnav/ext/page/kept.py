@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from hybridnav.ext.page.requests import ClosingChange, Favour, Find
     from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.planner import Profile
+    from hybridnav.planning import Profile
 
 # The profiles, and what is out of order until it is opened again.
 

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
-from hybridnav.ext.graphs import build_lane_graph
-from hybridnav.ext.graphs.files import export_nav2
 from hybridnav.ext.page.drawing import map_facts
 from hybridnav.ext.page.tiles import TILE, Layer, Theme, hex_colours, map_layer
-from hybridnav.models import save
-from hybridnav.planner import export_path, export_rooms
-from hybridnav.planner.guide import languages
+from hybridnav.graphs import build_lane_graph
+from hybridnav.graphs.files import export_nav2
+from hybridnav.guide.words import languages
+from hybridnav.models import export_path, export_rooms, save
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
+from hybridnav.guide.words import Instruction, sentences
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
-from hybridnav.planner import PlanResult
-from hybridnav.planner.guide import Instruction, sentences
+from hybridnav.planning import PlanResult
 from hybridnav.rooms.files.outlines import Outlines
 from hybridnav.rooms.files.paint import cells_inside
 

@@ -13,7 +13,7 @@ from hybridnav.ext.page.drawing import PagePlanning, level_graph, map_facts, roo
 from hybridnav.ext.page.requests import changed, checked_change, in_grid, in_metres, rings_of
 from hybridnav.ext.page.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 from hybridnav.maps.names import natural_key
-from hybridnav.planner.named import check_names
+from hybridnav.planning.named import check_names
 from hybridnav.rooms.choices import free_point, room_near
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.models import Model
-    from hybridnav.planner import Preset
+    from hybridnav.planning import Preset
     from hybridnav.rooms import Rooms
     from hybridnav.topology import TopologicalMap
 

@@ -16,8 +16,9 @@ from hybridnav.ext.fleet.plan import GuidedRoute
 from hybridnav.ext.page.kept import Closings, Named, RoomsFile
 from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, lines_of
 from hybridnav.ext.page.session import Session
+from hybridnav.guide import Tour
 from hybridnav.models import Model
-from hybridnav.planner import PROFILES, Tour, load_preset, preset_names
+from hybridnav.planning import PROFILES, load_preset, preset_names
 from hybridnav.rooms import Rooms, find_rooms
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
     from hybridnav.ext.page.drawing import PagePlanning
     from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
-    from hybridnav.planner import HybridPlanner
+    from hybridnav.planning import HybridPlanner
 
 _MOST_DIGITS = 3
 _NO_FILE = (

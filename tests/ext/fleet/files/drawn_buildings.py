@@ -32,7 +32,7 @@ def floors(draw, name, number):
         if lines and draw(st.booleans()):
             facts["door_name"] = lines[0].name
         plain.add_edge(tail, head, **facts)
-    graph = hn.ext.graphs.WaypointGraph.from_networkx(plain)
+    graph = hn.graphs.WaypointGraph.from_networkx(plain)
     return FloorGraph(name=name, graph=graph, doors=lines, elevation_m=3.5 * number)
 
 

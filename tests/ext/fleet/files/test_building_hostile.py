@@ -105,7 +105,7 @@ def test_what_is_no_building_ends_in_one_line(read, name, content, words):
 @pytest.mark.parametrize("name", ["a.osm", "a.graphml"])
 def test_another_encoding_of_xml_ends_in_one_line(tmp_path, name, encoding):
     (tmp_path / name).write_text(f'<?xml version="1.0" encoding="{encoding}"?><osm>{PLACE}</osm>')
-    load = hn.ext.fleet.load_building_graph if name == "a.osm" else hn.ext.graphs.load_graph
+    load = hn.ext.fleet.load_building_graph if name == "a.osm" else hn.ext.fleet.load_graph
     with pytest.raises(hn.errors.MapError) as refused:
         load(tmp_path / name)
     assert f"{name}: declares the encoding {encoding[:20]!r}"[:-1] in str(refused.value)
@@ -203,10 +203,10 @@ def test_values_of_any_kind_at_any_place(read, tmp_path, one, other, third):
         for content in contents:
             building = read(name, json.dumps(content))
             if not isinstance(building, str):
-                hn.ext.graphs.export_osm(
-                    building, tmp_path / "b.osm", anchor=hn.ext.graphs.Anchor(0, 0)
+                hn.ext.fleet.export_osm(
+                    building, tmp_path / "b.osm", anchor=hn.ext.fleet.Anchor(0, 0)
                 )
-                hn.ext.graphs.export_lif(building, tmp_path / "b.lif", vehicle_types=["A.B"])
+                hn.ext.fleet.export_lif(building, tmp_path / "b.lif", vehicle_types=["A.B"])
 
 
 OSM = st.sampled_from(
@@ -228,6 +228,4 @@ def test_elements_in_any_order(read, tmp_path, parts):
     for text in ("".join(parts), f"<osm>{PLACE}{ROUTE}{''.join(parts)}</osm>"):
         building = read("a.osm", text)
         if not isinstance(building, str):
-            hn.ext.graphs.export_osm(
-                building, tmp_path / "b.osm", anchor=hn.ext.graphs.Anchor(0, 0)
-            )
+            hn.ext.fleet.export_osm(building, tmp_path / "b.osm", anchor=hn.ext.fleet.Anchor(0, 0))

@@ -10,7 +10,7 @@ import hybridnav as hn
 from hybridnav.ext.fleet import BuildingGraph, Link, LinkEnd
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
-from tests.ext.graphs.files.rmf_reader import read_rmf
+from tests.ext.fleet.files.rmf_reader import read_rmf
 
 LIFT = Link(name="lift", kind="lift", ends=(LinkEnd("1", (3.1, 3.3)), LinkEnd("2", (3.1, 3.3))))
 
@@ -18,7 +18,7 @@ LIFT = Link(name="lift", kind="lift", ends=(LinkEnd("1", (3.1, 3.3)), LinkEnd("2
 @pytest.fixture(scope="module")
 def floors():
     topology = topology_of(HOUSE)
-    graph = hn.ext.graphs.build_lane_graph(topology)
+    graph = hn.graphs.build_lane_graph(topology)
     return topology, [
         hn.ext.fleet.floor_graph(topology, graph, name=name, links=[LIFT]) for name in ("1", "2")
     ]
@@ -72,7 +72,7 @@ def test_the_end_of_a_link_is_joined_to_what_it_sees(floors, tmp_path):
         ends = graph.points[graph.edges[edge]]
         assert segment_faults(topology.grid, ends) == ()
     building = BuildingGraph(name="house", floors=tuple(both), links=(LIFT,))
-    hn.ext.graphs.export_rmf(building, tmp_path / "house.yaml")
+    hn.ext.fleet.export_rmf(building, tmp_path / "house.yaml")
     found = read_rmf(tmp_path / "house.yaml")
     assert len(found.lift_of) == 2
     assert {"1 kitchen", "2 kitchen"} <= set(found.keys)
@@ -94,7 +94,7 @@ def test_the_end_of_a_link_is_joined_to_what_it_sees(floors, tmp_path):
 )
 def test_an_end_in_a_wall_is_refused(floors, at, words):
     topology, _ = floors
-    graph = hn.ext.graphs.build_lane_graph(topology, spacing_m=20)
+    graph = hn.graphs.build_lane_graph(topology, spacing_m=20)
     lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", at), LinkEnd("2", at)))
     with pytest.raises(hn.errors.InvalidValueError, match=words):
         hn.ext.fleet.floor_graph(topology, graph, name="1", links=[lift])
@@ -105,5 +105,5 @@ def test_a_graph_of_another_map_is_refused(floors):
     other = topology_of(HOUSE)
     with pytest.raises(hn.errors.InvalidValueError, match="expected one of the topological map's"):
         hn.ext.fleet.floor_graph(
-            other, hn.ext.graphs.build_lane_graph(topology, spacing_m=20), name="1"
+            other, hn.graphs.build_lane_graph(topology, spacing_m=20), name="1"
         )

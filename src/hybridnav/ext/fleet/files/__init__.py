@@ -1,4 +1,4 @@
-"""Files of buildings."""
+"""Files of buildings, and of graphs: Open-RMF, OpenStreetMap, LIF, IndoorGML; `load_graph`."""
 
 import lazy_loader
 

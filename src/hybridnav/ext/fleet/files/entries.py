@@ -10,7 +10,7 @@ from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import Limits, Marked, read_marked
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.ext.fleet import LinkKind
-from hybridnav.planner import Profile
+from hybridnav.planning import Profile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,18 +14,18 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph, Link
+from hybridnav.ext.fleet.files.indoorgml import is_indoorgml, read_indoor_floors
+from hybridnav.ext.fleet.files.lif import is_lif, read_lif
+from hybridnav.ext.fleet.files.osm_read import read_osm
+from hybridnav.ext.fleet.files.osm_xml import Anchor, is_osm
+from hybridnav.ext.fleet.files.rmf_editor import is_drawn, read_drawn
+from hybridnav.ext.fleet.files.rmf_read import is_rmf, read_rmf
 from hybridnav.ext.fleet.link_nodes import Stub, node_at, with_stubs
-from hybridnav.ext.graphs import RouteGraph, WaypointGraph, build_lane_graph
-from hybridnav.ext.graphs.attach import Network, placed_points
-from hybridnav.ext.graphs.files import graphml_yaml as graph_yaml
-from hybridnav.ext.graphs.files import json_graphs as graph_json
-from hybridnav.ext.graphs.files.indoorgml import is_indoorgml, read_indoor_floors
-from hybridnav.ext.graphs.files.lif import is_lif, read_lif
-from hybridnav.ext.graphs.files.osm_read import read_osm
-from hybridnav.ext.graphs.files.osm_xml import Anchor, is_osm
-from hybridnav.ext.graphs.files.rmf_editor import is_drawn, read_drawn
-from hybridnav.ext.graphs.files.rmf_read import is_rmf, read_rmf
-from hybridnav.ext.graphs.lanes import edge_metadata, node_metadata
+from hybridnav.graphs import RouteGraph, WaypointGraph, build_lane_graph
+from hybridnav.graphs.attach import Network, placed_points
+from hybridnav.graphs.files import graphml_yaml as graph_yaml
+from hybridnav.graphs.files import json_graphs as graph_json
+from hybridnav.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
 from hybridnav.refine import Sight
 from hybridnav.rooms.find import outside_of
@@ -196,7 +196,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
 
     Examples
     --------
-    >>> from hybridnav.ext.graphs import build_lane_graph
+    >>> from hybridnav.graphs import build_lane_graph
     >>> from hybridnav.ext.fleet import floor_graph
     >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))

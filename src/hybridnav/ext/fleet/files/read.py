@@ -25,6 +25,7 @@ from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
 from hybridnav.ext.fleet.checks import FloorParts, check_ends, check_reach
 from hybridnav.ext.fleet.files.entries import read_building_entries
 from hybridnav.ext.fleet.floors import BuildingValues, Known
+from hybridnav.guide.words.landmarks import Landmarks
 from hybridnav.maps import DEFAULT_MAX_CELLS
 from hybridnav.maps.checks import checked_radius
 from hybridnav.maps.files.limits import check_max_cells
@@ -34,8 +35,7 @@ from hybridnav.models.container import FiledPart, parts_within, read_parts
 from hybridnav.models.model import is_model, model_of
 from hybridnav.models.parts import values_of
 from hybridnav.models.structures import BUILDING, FLOOR, refusal
-from hybridnav.planner import HybridPlanner, Preset, load_preset
-from hybridnav.planner.guide.landmarks import Landmarks
+from hybridnav.planning import HybridPlanner, Preset, load_preset
 from hybridnav.rooms import Rooms, find_rooms
 from hybridnav.rooms.files.read import load_rooms
 

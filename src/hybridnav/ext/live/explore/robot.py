@@ -17,7 +17,7 @@ from hybridnav.ext.live.explore import goals as plans
 from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
 from hybridnav.ext.live.mapping.sensors import in_sight
 from hybridnav.maps import CellClass, OccupancyGrid
-from hybridnav.planner import HybridPlanner
+from hybridnav.planning import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import costs_from
 from hybridnav.topology import TopologicalMap

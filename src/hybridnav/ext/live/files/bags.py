@@ -19,10 +19,11 @@ from hybridnav.ext.live.files import bag_files
 from hybridnav.ext.live.files.bag_files import check_rosbags
 from hybridnav.ext.live.files.scan_log import ScanLog
 from hybridnav.ext.live.mapping import LaserScan
+from hybridnav.guide import Tour
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_between, checked_radius, checked_thresholds, checked_type
 from hybridnav.messages import number_of, stamp_ns_of, value_of
-from hybridnav.planner import PlanResult, Tour
+from hybridnav.planning import PlanResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

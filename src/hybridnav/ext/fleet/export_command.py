@@ -1,0 +1,342 @@
+"""`hybridnav export`: a route graph of a map, its rooms or its places, for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybridnav as hn
+from hybridnav._base.clock import clock
+from hybridnav._base.files import printable
+from hybridnav.cli import common, options
+from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
+from hybridnav.ext.fleet import fleet_options as given
+from hybridnav.ext.fleet.command import load_floors
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav.ext.fleet import Building
+    from hybridnav.graphs import Excess, GraphReport, RouteGraph
+
+_ENDINGS = {
+    "nav2": (".geojson", ".json"),
+    **given.ENDINGS,
+    "rooms": (".csv", ".geojson"),
+    "places": (".csv", ".geojson"),
+    "indoorgml": (".json",),
+}
+"""Endings of the file of each format."""
+_PARTS = ("rooms", "places", "indoorgml")
+"""Formats without a graph."""
+_SHOWN = 8
+"""Ids in a line about changes."""
+
+FormatOption = Annotated[
+    str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
+]
+SpacingOption = Annotated[
+    float | None,
+    typer.Option(
+        "--spacing",
+        metavar="D",
+        help="Distance in metres between the lanes of a hall, by default 4, less in arenas.",
+    ),
+]
+
+
+@with_map(
+    before="as_json",
+    over_floors=lambda: _export_over_floors,
+    reads=("preset", "robot_radius_m", "seed", "max_cells"),
+)
+def export(
+    map_file: options.MapOrBuildingArgument,
+    out: options.OutOption[Path | None] = None,
+    force: options.ForceOption = False,
+    bundle: given.BundleOption = None,
+    costs: options.CostsOption = None,
+    operations: given.OperationsOption = False,
+    kind: FormatOption = "nav2",
+    points: given.PointsOption = None,
+    keep: given.KeepOption = None,
+    spacing_m: SpacingOption = None,
+    lanes_m: given.LanesOption = None,
+    frame: options.FrameOption[str] = "map",
+    floor: options.GraphFloorOption = None,
+    anchor: given.AnchorOption = None,
+    vehicles: given.VehiclesOption = None,
+    no_doors: given.NoDoorsOption = False,
+    report: given.ReportOption = None,
+    rooms_file: options.RoomsOption = None,
+    as_json: options.JsonOption = False,
+    plot: options.PlotOption = None,
+    *,
+    reading: MapOptions,
+) -> None:
+    """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
+    5050, its rooms or places, or both as IndoorGML.
+
+    The file ends in .geojson; for rmf in .yaml, for osm in .osm, for lif and indoorgml in .json;
+    that of rooms and places in .geojson or .csv. In rmf, osm and lif the floor is called 0 without
+    --floor.
+
+    MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050, or as IndoorGML.
+    """
+    others = {"--out": out, f"--format {kind}": kind != "nav2"}
+    robot = given.Bundle.checked(bundle, given.Bundle(tuple(costs or ()), operations), others)
+    out = bundle or _checked_out(kind, out, force=force)
+    common.check_picture(plot)
+    fleet = given.Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    of_graphs = {
+        "--points": points,
+        "--keep": keep,
+        "--spacing": spacing_m,
+        "--lanes": lanes_m,
+        "--report": report,
+        "--plot": plot,
+    }
+    homes = [each for each in _ENDINGS if each not in _PARTS]
+    given.check_homes(of_graphs, homes, f"--format {kind}")
+    named, lifts = given.read_points(points) if points else ({}, ())
+    settings = reading.settings(map_file)
+    seconds: dict[str, float] = {}
+    model = load_model(map_file, settings, seconds, reading)
+    check_room_to_be(model.grid)
+    topology = grow_topology(
+        model, settings, seconds, rooms_file=rooms_file, find_rooms=kind != "places"
+    )
+    if kind in _PARTS:
+        with common.stage(f"writing {out}", seconds, "write"):
+            parts = _write_parts(topology, kind, (out, map_file), frame)
+        given.respond(*parts, seconds, as_json=as_json)
+        return
+    own = floor if keep is not None and keep.suffix in given.ENDINGS.get(kind, ()) else None
+    before = None if keep is None else hn.ext.fleet.load_graph(keep, floor=own)
+    began = clock()
+    with common.progress_bar("building the graph") as advance:
+        graph = hn.graphs.build_lane_graph(
+            topology, spacing_m=spacing_m, points=named, keep=before, progress=advance
+        )
+        if lanes_m is not None:
+            graph = hn.graphs.keep_right(topology, graph, apart_m=lanes_m)
+    seconds["graph"] = round(clock() - began, 6)
+    with common.stage(f"writing {out}", seconds, "write"):
+        aim = fleet or (robot and robot._replace(lifts=lifts))
+        missing = list(_write_graph(topology, graph, aim, out, frame))
+        graph, keepout = given.opened(graph, robot)  # as the file holds it
+        missing += given.left_out(topology, graph)
+    pairs = given.LOSS_PAIRS if report is None and fleet is not None else report
+    judged = None
+    if pairs is not None:
+        with common.stage("comparing routes", seconds, "report"):
+            judged = hn.graphs.judge_route_graph(graph, pairs=pairs)
+    figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
+    ids = _ids_line(graph) if fleet is None else []
+    lines = [*_summary(out, graph, judged), *_left_out_lines(missing), *ids]
+    changes = {} if before is None else hn.graphs.graph_changes(before, graph)
+    figures |= {"left_out": missing} | ({"changes": changes} if changes else {})
+    given.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
+    given.warn_of_loss({graph.grid.name: judged} if judged is not None and fleet else {})
+    given.draw(graph, keepout, plot)
+
+
+def _export_over_floors(
+    *,
+    map_file: Path,
+    out: Path | None,
+    force: bool,
+    kind: str,
+    spacing_m: float | None,
+    anchor: str | None,
+    vehicles: list[str] | None,
+    no_doors: bool,
+    as_json: bool,
+    reading: MapOptions,
+) -> None:
+    """Write the graph of a building, and print a summary; see `export`."""
+    out = _checked_out(kind, out, force=force)
+    fleet = given.Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
+    if fleet is None and kind != "indoorgml":
+        raise common.UsageError(
+            f"--format {kind} is for one map, and this is a building: take rmf, osm, lif or "
+            "indoorgml"
+        )
+    from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
+
+    seconds: dict[str, float] = {}
+    building = load_floors(map_file, reading, seconds)
+    if fleet is None:
+        with common.stage(f"writing {out}", seconds, "write"):
+            parts = _write_indoorgml(building, out, map_file)
+        given.respond(*parts, seconds, as_json=as_json)
+        return
+    reports: list[GraphReport] = []
+    bare: list[str] = []
+
+    def judging(topology: hn.TopologicalMap) -> RouteGraph:
+        built = hn.graphs.build_lane_graph(topology, spacing_m=spacing_m)
+        bare.extend(f"{topology.grid.name}: {each}" for each in given.left_out(topology, built))
+        reports.append(hn.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
+        return built
+
+    began = clock()
+    with common.progress_bar("building the graphs") as advance:
+        graph = hn.ext.fleet.building_graph(
+            building, name=map_file.stem, build=judging, progress=advance
+        )
+    judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
+    seconds["graph"] = round(clock() - began, 6)
+    with common.stage(f"writing {out}", seconds, "write"):
+        left_out = [*fleet.write_building(align_floors(graph), out), *bare]
+    figures = {
+        "graph": str(out),
+        "map": str(map_file),
+        "floors": {
+            floor.name: {"nodes": floor.graph.n_nodes, "edges": floor.graph.n_edges}
+            for floor in graph.floors
+        },
+        "links": [link.name for link in graph.links],
+        "left_out": left_out,
+        "report": {name: asdict(each) for name, each in judged.items()},
+    }
+    lines = [f"graph      {printable(out)}"]
+    for number, floor in enumerate(graph.floors):
+        counts = f"{floor.graph.n_nodes:,} nodes, {floor.graph.n_edges:,} edges"
+        lines.append(f"{'' if number else 'floors':<10} {printable(floor.name)}: {counts}")
+        lines.append(f"{'nearest':>10} {_line(judged[floor.name].nearest)}")
+    links = ", ".join(printable(link.name) for link in graph.links) or "none"
+    lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
+    given.respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
+    given.warn_of_loss(judged)
+
+
+def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
+    """Return the lines of a summary about changes, none where no graph was given."""
+    lines = []
+    for kind, ids in changes.items():
+        for what, names in ids.items():
+            more = ", ..." if len(names) > _SHOWN else ""
+            listed = ", ".join(printable(str(name)) for name in names[:_SHOWN]) + more
+            lines += [f"{what:<10} {len(names):,} {kind}: {listed}"] if names else []
+    return lines or ["changed    nothing"] * bool(changes)
+
+
+def _left_out_lines(left_out: Iterable[str]) -> list[str]:
+    return [f"left out   {printable(each)}" for each in left_out]
+
+
+def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
+    """Refuse formats that are none, files of other ones, and to write over a file."""
+    if out is None:
+        raise common.UsageError("--out is missing: give a file, or a folder with --bundle")
+    if kind not in _ENDINGS:
+        raise common.UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    common.check_output(out, "--out", _ENDINGS[kind])
+    if out.is_file() and not force:
+        raise common.UsageError(f"{printable(out)} exists: add --force to write over it")
+    return out
+
+
+def _write_graph(
+    topology: hn.TopologicalMap,
+    graph: RouteGraph,
+    aim: given.Fleet | given.Bundle | None,
+    out: Path,
+    frame: str,
+) -> tuple[str, ...]:
+    """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
+    if isinstance(aim, given.Fleet):
+        return aim.write(topology, graph, out)
+    if aim is not None:
+        return hn.graphs.export_bundle(topology, graph, out, frame=frame, **aim._asdict())
+    hn.graphs.export_nav2(graph, out, frame=frame)
+    return ()
+
+
+def _write_parts(
+    topology: hn.TopologicalMap, kind: str, files: tuple[Path, Path], frame: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Write rooms or places, and return the figures and lines that are printed of them."""
+    out, map_file = files
+    if kind == "rooms":
+        rooms = topology.rooms
+        hn.export_rooms(rooms, out, frame=frame)
+        counts = {"rooms": int(rooms.is_listed.sum()), "doors": len(rooms.listed_doors)}
+    elif kind == "indoorgml":
+        return _write_indoorgml(topology, *files)
+    else:
+        hn.export_places(topology, out, frame=frame)
+        counts = {"places": topology.n_places, "arcs": topology.n_arcs}
+    grid = topology.grid
+    counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    lines = [
+        f"file       {printable(out)}, {counted}",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+    ]
+    return counts | {"file": str(out), "map": str(map_file)}, lines
+
+
+def _write_indoorgml(
+    source: hn.TopologicalMap | Building, out: Path, map_file: Path
+) -> tuple[dict[str, Any], list[str]]:
+    """Write IndoorGML, and return the figures and lines that are printed of it."""
+    left_out = hn.ext.fleet.export_indoorgml(source, out)
+    layers = hn.ext.fleet.load_indoorgml(out).layers
+    counts = {name: (len(each), each.number_of_edges()) for name, each in layers.items()}
+    lines = [f"file       {printable(out)}"]
+    lines += [f"{name:<10} {n:,} cells, {m:,} edges" for name, (n, m) in counts.items()]
+    layers_of = {name: {"cells": n, "edges": m} for name, (n, m) in counts.items()}
+    figures = {"file": str(out), "map": str(map_file), "layers": layers_of}
+    return figures | {"left_out": list(left_out)}, [*lines, *_left_out_lines(left_out)]
+
+
+def _summary(out: Path, graph: RouteGraph, judged: GraphReport | None) -> list[str]:
+    grid, counts = graph.grid, _counts(graph)
+    lines = [
+        f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+        f"nodes      {', '.join(f'{count:,} {kind}' for kind, count in counts.items())}",
+    ]
+    if judged is not None:
+        lines += [
+            f"pairs      {judged.pairs:,}, {judged.in_sight:.1%} of them in sight of each other",
+            f"best       {_line(judged.best)}",
+            f"nearest    {_line(judged.nearest)}",
+        ]
+    return lines
+
+
+def _ids_line(graph: RouteGraph) -> list[str]:
+    """Return a line if Nav2's messages cannot hold all ids of a graph."""
+    from hybridnav.messages import MOST_ID  # noqa: PLC0415 - on demand
+
+    most = max(int(ids.max(initial=0)) for ids in graph.ids)
+    if most <= MOST_ID:
+        return []
+    held = f"messages of ComputeRoute hold {MOST_ID:,}"
+    return [f"ids        up to {most:,}; {held}: for these, give a larger --spacing"]
+
+
+def _line(excess: Excess) -> str:
+    return (
+        f"routes longer by {excess.mean:.2%} on average, {excess.p95:.1%} at the 95th percentile, "
+        f"{excess.greatest:.1%} at most; {excess.solved:.1%} solved"
+    )
+
+
+def _counts(graph: RouteGraph) -> dict[str, int]:
+    return {kind: graph.kinds.count(kind) for kind in dict.fromkeys(graph.kinds)}
+
+
+def _figures(graph: RouteGraph, judged: GraphReport | None) -> dict[str, Any]:
+    report = None if judged is None else asdict(judged)
+    return {
+        "nodes": graph.n_nodes,
+        "edges": graph.n_edges,
+        "kinds": _counts(graph),
+        "report": report,
+    }

@@ -1,0 +1,175 @@
+"""Paths by rooms and doors: their legs, and instructions for a person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.trig import hypots
+from hybridnav.guide.words.bends import Leg
+from hybridnav.guide.words.instructions import instructions_of
+from hybridnav.guide.words.landmarks import Landmarks
+from hybridnav.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
+from hybridnav.route import RouteFinder
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import LongArray
+    from hybridnav.guide.words import Instruction
+    from hybridnav.guide.words.instruction import Shape
+    from hybridnav.planning import Path
+    from hybridnav.rooms import Rooms
+
+_SLIVER_M = 0.5
+_LEAST_ROOM_M2 = 6.0
+_LEAST_HALL_M2 = 60.0
+_LONG_SHAPE = 3.0
+"""Length over breadth from which a space is no room."""
+
+
+def waypoint_text(waypoint: ArrayLike | str) -> str:
+    """Return what sentences call a waypoint: its name, or its coordinates in metres."""
+    if isinstance(waypoint, str):
+        return waypoint
+    x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
+    return f"({x:.10g}, {y:.10g})"
+
+
+def heading_of(start: Sequence[float] | None) -> float | None:
+    """Return the heading of a start `(x, y, yaw)`, None if it has none."""
+    return None if start is None or len(start) < 3 else start[2]  # noqa: PLR2004
+
+
+class Guide:
+    """Descriptions of paths on a map with rooms.
+
+    `rooms`: the rooms; the crossings of their doors are computed once.
+    """
+
+    def __init__(self, rooms: Rooms) -> None:
+        self._rooms = rooms
+        self._route_finder = RouteFinder(rooms)
+        self._landmarks = Landmarks(rooms)
+
+    def legs(self, path: Path, *, waypoint: str | None = None) -> list[Leg]:
+        """Divide a path into its legs.
+
+        `path`: a cell path, or an any-angle one, whose length is divided in the proportions of its
+        cell path; `waypoint`: waypoint at the end of the path. Result: at least one leg; the
+        lengths sum to that of the path.
+        """
+        rooms, cells = self._rooms, path.cells
+        vertices, arcs, steps = self._route_finder.crossings(cells)
+        along = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
+        scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
+        labels = rooms.label_of_vertex[vertices].tolist()
+        crossed = [number for number in range(len(arcs)) if labels[number] != labels[number + 1]]
+        legs: list[Leg] = []
+        begun, from_step = 0.0, 0
+        for number in crossed:
+            step = steps[number]
+            # A diagonal past the corner of a third room crosses two boundaries, both at its middle.
+            ended = (along[step] + along[step + 1]) / 2
+            x, y = rooms.grid.frame.points_of(cells[step : step + 2]).mean(axis=0).tolist()
+            legs.append(
+                Leg(
+                    rooms.name_of(labels[number]),
+                    float((ended - begun) * scale),
+                    rooms.door_of_arc.get(arcs[number]),
+                    endpoint=(x, y),
+                    shape=self._shape(vertices[number], cells[from_step : step + 1]),
+                )
+            )
+            begun, from_step = ended, step + 1
+        x, y = path.points[-1].tolist()
+        last = Leg(
+            rooms.name_of(labels[-1]),
+            float((along[-1] - begun) * scale),
+            waypoint=waypoint,
+            endpoint=(x, y),
+            shape=self._shape(vertices[-1], cells[from_step:]),
+        )
+        return _without_grazes([*legs, last])
+
+    def instructions(
+        self,
+        paths: Sequence[Path],
+        legs: Sequence[Sequence[Leg]],
+        *,
+        heading_rad: float | None = None,
+    ) -> tuple[Instruction, ...]:
+        """Return the instructions for a person who walks along paths.
+
+        `paths`: those of a tour in order, at least one; `heading_rad`: heading at the start,
+        radians counter-clockwise from the x axis; None if there is none.
+        """
+        told = [[self._told(leg) for leg in each] for each in legs]
+        return tuple(instructions_of(paths, told, self._landmarks, heading_rad))
+
+    def of(self, path: Path, waypoint: ArrayLike | str, start: Sequence[float]) -> GuidedPath:
+        """Return what the instructions of one path are found from.
+
+        `waypoint`: the goal, as it was given; `start`: `(x, y)`, or `(x, y, yaw)` of a robot with a
+        heading.
+        """
+        return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
+
+    def _told(self, leg: Leg) -> Leg:
+        """Return a leg as words tell it: a room that nobody has named has the shape of its kind."""
+        if leg.room is None or not FOUND_NAME.fullmatch(leg.room):
+            return leg
+        kind = self._rooms.kinds[self._rooms.labels.index(leg.room)]
+        return leg if kind is None else replace(leg, shape=kind.name)
+
+    def _shape(self, vertex: int, cells: LongArray) -> Shape:
+        """Return the shape of a vertex of the room level, for a path in it."""
+        rooms, level = self._rooms, self._rooms.level
+        if rooms.label_of_vertex[vertex] >= 0:
+            return "room"
+        area_m2 = float(level.areas[vertex]) * rooms.grid.cell_area_m2
+        if area_m2 < _LEAST_ROOM_M2:
+            return "passage"
+        field = level.receptive_field(vertex)
+        breadth_m = 2 * float(rooms.clearance_m[tuple(field.T)].max())
+        if area_m2 >= _LONG_SHAPE * breadth_m * breadth_m:
+            nearby_m = 2 * float(np.quantile(rooms.clearance_m[tuple(cells.T)], 0.75))
+            if min(breadth_m, nearby_m) <= WIDEST_CORRIDOR_M:
+                return "corridor"
+        return "hall" if area_m2 >= _LEAST_HALL_M2 else "room"
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedPath:
+    """A path whose instructions are found when somebody reads them."""
+
+    guide: Guide
+    path: Path
+    waypoint: str
+    heading_rad: float | None
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions."""
+        legs = self.guide.legs(self.path, waypoint=self.waypoint)
+        return self.guide.instructions([self.path], [legs], heading_rad=self.heading_rad)
+
+
+def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
+    """Join the legs on both sides of a leg that only touches a room.
+
+    Such a leg enters by a door and returns by the same one within half a metre.
+    """
+    kept: list[Leg] = []
+    for leg in legs:
+        kept.append(leg)
+        while len(kept) > 2:  # noqa: PLR2004
+            before, within, behind = kept[-3:]
+            if before.door is None or before.door != within.door or within.length_m > _SLIVER_M:
+                break
+            length_m = before.length_m + within.length_m + behind.length_m
+            kept[-3:] = [replace(behind, length_m=length_m)]
+    return kept

@@ -1,5 +1,0 @@
-"""The planner that the presets configure, its results, and words for people."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,5 @@
+"""Plans: map + preset + query -> PlanResult; presets, settings, methods, the planner."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

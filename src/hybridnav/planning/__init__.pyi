@@ -1,0 +1,28 @@
+from .batch import PlanBatch as PlanBatch
+from .path import Path as Path
+from .planner import HybridPlanner as HybridPlanner
+from .preset import (
+    LimitSettings as LimitSettings,
+    Preset as Preset,
+    load_preset as load_preset,
+    planner_settings as planner_settings,
+    preset_names as preset_names,
+)
+from .profile import PROFILES as PROFILES, Profile as Profile
+from .result import (
+    COST_METRICS as COST_METRICS,
+    Metric as Metric,
+    PlanResult as PlanResult,
+    PlanStats as PlanStats,
+    PlanStatus as PlanStatus,
+    Refinement as Refinement,
+)
+from .settings import (
+    ClearanceSettings as ClearanceSettings,
+    CostSettings as CostSettings,
+    PlannerSettings as PlannerSettings,
+    PyramidSettings as PyramidSettings,
+)
+from .speed import MotionLimits as MotionLimits, SpeedMap as SpeedMap, SpeedProfile as SpeedProfile
+
+__all__: list[str]

@@ -1,0 +1,142 @@
+"""Checks of starts and goals."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.maps import CellClass
+from hybridnav.maps.geometry import classes_at
+from hybridnav.planning import PlanStatus
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planning.settings import Finish
+    from hybridnav.search.found import ClosedCells, KeptLine
+
+Cell = tuple[int, int]
+Position = tuple[float, float]
+Points = tuple["FloatArray", "FloatArray"]
+
+_FREE, _UNEXPLORED = int(CellClass.FREE), int(CellClass.UNEXPLORED)
+_OUTSIDE = PlanStatus.START_OUTSIDE, PlanStatus.GOAL_OUTSIDE
+_REFUSED = (
+    {
+        CellClass.OCCUPIED: PlanStatus.START_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.START_UNEXPLORED,
+    },
+    {
+        CellClass.OCCUPIED: PlanStatus.GOAL_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
+    },
+)
+
+
+class PlanRequest(NamedTuple):
+    """What a caller wants to know, read."""
+
+    poses: tuple[FloatArray, FloatArray]
+    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
+    smooth: Finish
+    """What is done with the path that the method finds."""
+    closed: ClosedCells | None
+    """Cells that are closed for this query; None for none."""
+    goal: ArrayLike | str
+    """The goal as it was given."""
+    kept: KeptLine | None
+    """The line to stay on; None for none."""
+    began: float
+    """The time at which reading began, of `clock`."""
+
+
+def check_at(at: str) -> None:
+    """Refuse a position in a room that is none of the two.
+
+    Raises `InvalidValueError` when it is another word.
+    """
+    if at not in {"anywhere", "point"}:
+        raise InvalidValueError(f"at must be 'anywhere' or 'point', got {brief(at)}")
+
+
+def places_of_endpoints(
+    grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
+) -> tuple[tuple[Cell, Cell], tuple[Position, Position]] | PlanStatus:
+    """Return the cells of start and goal and their positions, (row, col) in grid units, or the
+    status of one that is not valid."""
+    ends = (*points[0].tolist(), *points[1].tolist())
+    start, goal = classes_at(ends, grid.classes, grid.frame.for_kernels)
+    if start[0] == _FREE == goal[0]:
+        return (start[1], goal[1]), (start[2], goal[2])
+    if start[0] < 0 or goal[0] < 0:
+        return _OUTSIDE[start[0] >= 0]
+    for (of_class, *_), refused in ((start, _REFUSED[0]), (goal, _REFUSED[1])):
+        if of_class != _FREE and not (allow_unexplored and of_class == _UNEXPLORED):
+            return refused[CellClass(of_class)]
+    return (start[1], goal[1]), (start[2], goal[2])
+
+
+def refusal(
+    closed: ClosedCells, cells: tuple[Cell, Cell], shape: tuple[int, int]
+) -> PlanStatus | None:
+    """Return the status of a query whose start or goal is closed, None if neither is."""
+    shut = closed.holds(np.array(cells) @ [shape[1], 1])
+    if not shut.any():
+        return None
+    return PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
+
+
+def _numbers(given: ArrayLike) -> FloatArray:
+    """Convert to float64; a single NaN for a value that is not numeric."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.full(1, np.nan)
+
+
+def read_point(name: str, point: ArrayLike) -> FloatArray:
+    """Return a position, float64 (2,)."""
+    xy = _numbers(point)
+    if xy.shape != (2,) or not (math.isfinite(xy[0]) and math.isfinite(xy[1])):
+        raise InvalidValueError(
+            f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
+        )
+    return xy
+
+
+def read_end(name: str, given: ArrayLike, needs_heading: bool) -> FloatArray:  # noqa: FBT001 - hot
+    """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
+    pose = _numbers(given)
+    if pose.shape == (2,) and not needs_heading:
+        x, y = pose.tolist()
+        if math.isfinite(x) and math.isfinite(y):
+            return pose
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
+        raise InvalidValueError(
+            f"{name} must be {pair}three finite numbers (x, y, yaw) in metres and radians, "
+            f"got {given!r:.80}"
+        )
+    return pose
+
+
+def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
+    """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0.
+
+    Headings that are given and not needed are left out: nothing of a batch depends on them.
+    """
+    rows, width = _numbers(points), 3 if needs_heading else 2
+    if rows.shape in {(0,), (0, 2), (0, 3)}:
+        return np.empty((0, width))
+    if rows.ndim != 2 or rows.shape[1] not in {width, 3} or not np.isfinite(rows).all():  # noqa: PLR2004
+        pair = "" if needs_heading else "coordinates (x, y) in metres, shape (n, 2), or "
+        raise InvalidValueError(
+            f"{name} must be finite {pair}poses (x, y, yaw) in metres and radians, shape (n, 3), "
+            f"got {points!r:.80}"
+        )
+    return rows[:, :width]

@@ -1,0 +1,180 @@
+"""Method `paper`: from a route of places to a path of cells, our reading of the source paper.
+
+That paper has arcs with a maximum attribute, and neither a planner nor a cost of routes. The
+cheapest coarse route by the max-distance attribute of the arcs is found first. It comes down the
+pyramid to small fields, in which grid A* finds the path; or its places are the corridor at once.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from hybridnav import route as routes
+from hybridnav._base.clock import clock
+from hybridnav._base.copies import copies_alike, filled
+from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
+from hybridnav._base.progress import Progress, no_progress
+from hybridnav.planning.methods.grid import KnownMap, WholeMap, on_cells, round_closed
+from hybridnav.route.route import Route, RouteOfPlaces
+from hybridnav.search.descent import Descent, DescentSettings
+from hybridnav.search.found import Found, Method, PlanStats
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import IntArray, LongArray
+    from hybridnav.planning.settings import PaperSettings
+    from hybridnav.route import MaxDistanceSearch
+    from hybridnav.route.route import Corridor
+    from hybridnav.search.found import Metric, Query
+
+
+@copies_alike
+class MaxDistance(Method):
+    """The cheapest coarse route by max-distance arcs, and a path of cells along it.
+
+    If corners may be cut, a path can pass between fields that no arc joins, so that a missing route
+    proves nothing; nor does a missing path where costs close cells. Then the whole map is searched.
+
+    `known`: the map with its places, and its costs; `settings`: whether unexplored cells may be
+    entered, how the route becomes a corridor, and the refiner.
+    """
+
+    def __init__(self, known: KnownMap, settings: PaperSettings) -> None:
+        assert known.topology is not None  # noqa: S101 - no method of places is made without
+        self.metric: Metric = "octile" if known.costs is None else "weighted"
+        self._topology, self._settings = known.topology, settings
+        self._whole_map = WholeMap(known, settings)
+        self._refiner, self._own = self._whole_map.refiners
+        self._is_plain = self._own is None and known.costs is None
+        self._search: MaxDistanceSearch | Descent | None = None
+        self._building = threading.RLock()  # a progress callback may plan
+
+    def prepare(self, progress: Progress = no_progress) -> MaxDistanceSearch | Descent:
+        """Pack the levels, or compute the attributes of the arcs; see `Method`."""
+        if self._search is None:
+            with self._building:
+                if self._search is None:
+                    by_places = self._settings.levels == "places"
+                    self._search = self._over_places() if by_places else self._descent()
+                    progress(1, 1)
+        return self._search
+
+    def _over_places(self) -> MaxDistanceSearch:
+        allowed = self._settings.allow_unexplored
+        return routes.MaxDistanceSearch(self._topology, allow_unexplored=allowed)
+
+    def _descent(self) -> Descent:
+        settings, costs = self._settings, self._refiner.costs
+        return Descent(
+            self._topology.pyramid,
+            self._topology.grid.enterable(allow_unexplored=settings.allow_unexplored),
+            DescentSettings(
+                settings.field_cells, settings.step, settings.ring, settings.horizon_cells
+            ),
+            units=None if costs is None else costs.units,
+            corner_cutting=self._topology.grid.corner_cutting,
+        )
+
+    def find(self, query: Query) -> Found:
+        """Find a path along the route; see `Method`."""
+        began, search = clock(), self.prepare()
+        if not isinstance(search, Descent):
+            found = self._along(search, query, began)
+        elif self._is_plain and self._settings.horizon_cells:
+            found = self._in_one(search, query, began)
+        else:
+            found = self._down(search, query, began)
+        if found is None:
+            return self._over_whole_map(query, {"coarse": clock() - began})
+        if query.closed is None or not found.has_path:
+            return found
+        return round_closed(found, query, self._refiner)
+
+    def _in_one(self, descent: Descent, query: Query, began: float) -> Found | None:
+        """Return the path that a descent finds down to the cells, None to search the whole map."""
+        places, cells, expanded, fields, corridor_cells, length = descent.find(*query.cells)
+        seconds = {"descent": clock() - began}
+        stats = filled(
+            PlanStats,
+            expanded=expanded,
+            expanded_places=fields,
+            corridor_cells=corridor_cells,
+            seconds=seconds,
+        )
+        if cells is None:
+            # Fields of one class that meet by sides are joined by arcs: no route, no path.
+            return None if self._topology.grid.corner_cutting else Found(None, stats=stats)
+        per_cell = self._topology.grid.resolution_m
+        return filled(
+            Found,
+            passed=cells,
+            cost=length * per_cell,
+            lower_bound_m=octile_distance_in_cells(*query.cells) * per_cell,
+            route=self._route_of(places),
+            optimum=partial(self._optimum_m, query, cells),
+            stats=stats,
+        )
+
+    def _route_of(self, places: IntArray) -> RouteOfPlaces | None:
+        """Return the route of some places, None for none."""
+        return (
+            filled(RouteOfPlaces, topology=self._topology, places=places) if len(places) else None
+        )
+
+    def _down(self, descent: Descent, query: Query, began: float) -> Found | None:
+        """Return the path in the last fields of a descent, None to search the whole map."""
+        down, corridor = descent.corridor(*query.cells)
+        route = self._route_of(down.places)
+        found = self._refined(query, began, corridor, route, down.expanded_fields)
+        if found is None or not found.has_path or not self._is_plain:
+            return found
+        return replace(found, optimum=partial(self._optimum_m, query, found.cells))
+
+    def _optimum_m(self, query: Query, cells: LongArray) -> float:
+        """Return the length of a shortest path of cells, metres, by A* on the whole map."""
+        search = self._refiner.search.search
+        closed = None if query.closed is None else query.closed.flat
+        best = search(*query.cells, blocked=closed)
+        lengths = [path_length_in_cells(each) for each in (cells, best.cells) if each is not None]
+        return min(lengths) * self._topology.grid.resolution_m
+
+    def _along(self, search: MaxDistanceSearch, query: Query, began: float) -> Found | None:
+        """Return the path in the fields of the places, None to search the whole map."""
+        topology = self._topology
+        found = search.search(*map(topology.place_at, query.cells))
+        if found is None:
+            return self._refined(query, began, None, None, 0)
+        beside, enterable = self._settings.corridor, search.enterable
+        corridor = routes.corridor_of(topology, found.places, beside=beside, enterable=enterable)
+        places, arcs = topology.place_ids[found.places], topology.arc_ids[found.arcs]
+        route = Route(tuple(places.tolist()), tuple(arcs.tolist()))
+        return self._refined(query, began, corridor, route, found.expanded)
+
+    def _refined(
+        self,
+        query: Query,
+        began: float,
+        corridor: Corridor | None,
+        route: Route | RouteOfPlaces | None,
+        expanded_places: int,
+    ) -> Found | None:
+        """Return the path in a corridor, None to search the whole map."""
+        seconds = {"coarse": clock() - began}
+        if corridor is None:
+            is_whole = self._topology.grid.corner_cutting
+            stats = PlanStats(expanded_places=expanded_places, seconds=seconds)
+            return None if is_whole else Found(None, stats=stats)
+        cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
+        seconds["refine"] = clock() - began - seconds["coarse"]
+        if cells is None and self._refiner.costs is not None:  # cells that the layer closes
+            return None
+        stats = PlanStats(expanded, expanded_places, 0, corridor.n_cells, seconds)
+        bound = octile_distance_in_cells(*query.cells)
+        return replace(on_cells(self._refiner, cells, bound_cells=bound, stats=stats), route=route)
+
+    def _over_whole_map(self, query: Query, seconds: dict[str, float]) -> Found:
+        """Return the answer on the whole map, with the seconds spent before."""
+        whole = self._whole_map.find(query)
+        return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))

@@ -1,0 +1,542 @@
+"""Plans of one map by one method: a query in, a path found, refined, and a result out."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from hybridnav._base.clock import clock
+from hybridnav._base.copies import copies_alike, filled
+from hybridnav._base.moves import path_length_in_cells
+from hybridnav.errors import InvalidValueError
+from hybridnav.maps.checks import checked_type
+from hybridnav.maps.geometry import polyline_length
+from hybridnav.planning import Path, PlanResult, PlanStatus
+from hybridnav.planning.batch import plan_many
+from hybridnav.planning.costs import CostFinish
+from hybridnav.planning.endpoints import (
+    PlanRequest,
+    check_at,
+    places_of_endpoints,
+    read_end,
+    refusal,
+)
+from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
+from hybridnav.planning.path import path_of
+from hybridnav.planning.result import PlanDraft
+from hybridnav.refine import LineOfSight
+from hybridnav.route.route import RouteFinder, RouteOfCells
+from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
+from hybridnav.topology.map import no_places
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._base.typing import FloatArray
+    from hybridnav.closures.blocked import Closable
+    from hybridnav.guide.words.itinerary import Guide
+    from hybridnav.maps import OccupancyGrid
+    from hybridnav.planning import PlanBatch, Preset
+    from hybridnav.planning.costs import PlannerCosts
+    from hybridnav.planning.methods.ompl import OmplPlanner
+    from hybridnav.planning.named import At
+    from hybridnav.refine import CostLine
+    from hybridnav.search.found import Found, Method
+    from hybridnav.topology import TopologicalMap
+
+Smooth = Literal["none", "line-of-sight", "arcs"]
+_SMOOTH = get_args(Smooth)
+
+_KEEPING = ("cheapest", "shortest", "octile")
+"""Methods whose paths may stay on earlier ones."""
+_KEEP_WITHIN = 0.02
+"""Share by which a kept path may be longer than a shortest one; `keep_within` of `cheapest`."""
+_KEPT = 16
+"""Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class Planning:
+    """How a planner plans, by the map and the costs of now.
+
+    It knows no locks: the caller sees to it that costs do not change during a query.
+    """
+
+    preset: Preset
+    grid: OccupancyGrid
+    """The map."""
+    built: TopologicalMap
+    """The places that were built last, of this grid or of one before."""
+    method: Method
+    """Finds paths."""
+    costs: PlannerCosts
+    """The costs that the method plans by."""
+    ompl: OmplPlanner | None = None
+    """Refines the paths in the robot's space; None for those of the method."""
+    closures: dict[object, ClosedCells] = field(default_factory=dict)
+    """The cells of the last closures, by their keys."""
+
+    @property
+    def topology(self) -> TopologicalMap | None:
+        """The places of the map; None if it changed since they were built."""
+        return self.built if self.built.grid is self.grid else None
+
+    # Reading: names to points, closures to cells.
+
+    def read(  # noqa: PLR0913, PLR0917 - as `HybridPlanner.plan`
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        smooth: Smooth | None,
+        blocked: Closable | ClosedCells | None,
+        at: At,
+        keep: PlanResult | None = None,
+    ) -> PlanRequest:
+        """Read a query; see `HybridPlanner.plan`."""
+        began, waypoint = clock(), goal
+        if at != "anywhere":
+            check_at(at)
+        if isinstance(start, str) or isinstance(goal, str):
+            start, goal = self.points_of([start, goal], at, blocked)
+        closed = None if blocked is None else self.closed(blocked)
+        turns = self.ompl is not None and self.needs_headings
+        poses = read_end("start", start, turns), read_end("goal", goal, turns)
+        kept = None if keep is None else self._kept(keep, poses[1])
+        finish = self._finish if smooth is None else self._checked(smooth)
+        return PlanRequest(poses, finish, closed, waypoint, kept, began)
+
+    def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
+        """Return the line of a result, None if it ends elsewhere or there is none."""
+        planner, name = self.preset.planner, self.preset.name
+        if self.ompl is not None or planner.method not in _KEEPING:
+            known = ", ".join(_KEEPING)
+            raise InvalidValueError(
+                f"keep goes with presets of methods {known} without OMPL, and {name} is none: "
+                "take one of these, or leave it out"
+            )
+        points, path = checked_type("keep", keep, PlanResult).line, keep.path
+        within = getattr(planner, "keep_within", _KEEP_WITHIN)
+        if planner.method == "octile":
+            cells = None if path is None else path.cells
+            if cells is None or tuple(cells[-1].tolist()) != self.grid.frame.cell_of(*goal[:2]):
+                return None
+            return KeptLine(self.grid.frame.points_of(cells), within, cells)
+        if points is None and path is not None and not path.is_curved:
+            points = path.points
+        if points is None or len(points) == 1 or not np.array_equal(points[-1], goal[:2]):
+            return None
+        return KeptLine(points, within)
+
+    @property
+    def needs_headings(self) -> bool:
+        """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
+        return self.ompl is not None and self.ompl.ompl.has_heading
+
+    def points_of(
+        self, waypoints: Sequence[ArrayLike | str], at: At, blocked: Closable | ClosedCells | None
+    ) -> list[ArrayLike]:
+        """Return a point for each waypoint, so that the path through all of them is cheapest."""
+        check_at(at)
+        if not any(isinstance(waypoint, str) for waypoint in waypoints):
+            return list(waypoints)
+        if self.topology is None:
+            no_places()
+        # Loads modules that plans between points do not need.
+        from hybridnav.planning.named import check_names, points_of_waypoints  # noqa: PLC0415
+
+        check_names(self.topology, waypoints)
+        closed, costs = self.closed_for_all(self.closed(blocked)), self.costs.layer
+        return points_of_waypoints(
+            self.topology, self.preset.planner, waypoints, at=at, closed=closed, costs=costs
+        )
+
+    def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
+        """Return the cells of a closure, None for no closure; the last ones are kept."""
+        if blocked is None or isinstance(blocked, ClosedCells):
+            return blocked
+        known = self.closures
+        with suppress(TypeError):  # a mapping has to be read; areas and doors are found as given
+            if (given := known.pop(blocked, None)) is not None:
+                known[blocked] = given  # the last one now
+                return given
+        # Loads shapely, which most queries do not need.
+        from hybridnav.closures.blocked import as_blocked  # noqa: PLC0415
+
+        closure = as_blocked(blocked)
+        # Without a lock: two threads may compute the same cells.
+        found = known.pop(closure.key, None)
+        if found is None:
+            is_solid = self.ompl is not None and self.ompl.body is not None
+            solid = closure.solid_on(self.grid) if is_solid else None
+            found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
+        known[closure.key] = found
+        with suppress(TypeError):
+            known[blocked] = found
+        for old in list(known)[:-_KEPT]:
+            known.pop(old, None)
+        return found
+
+    def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
+        """Return the closed cells of a query with those that the costs close for all queries."""
+        always = self.costs.closed
+        return closed | always if closed and always else closed or always
+
+    @cached_property
+    def _finish(self) -> Smooth:
+        """The finish of the preset."""
+        return self._checked(None)
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether the cost of a plan is that of the path that the method finds."""
+        is_kept = self._finish == "none" or self.method.metric == "any-angle"
+        return is_kept and self.ompl is None
+
+    def _checked(self, smooth: Smooth | None) -> Smooth:
+        """Return the finish asked for, or that of the preset for None."""
+        chosen = self.preset.planner.finish if smooth is None else smooth
+        if chosen not in _SMOOTH:
+            known = ", ".join(map(repr, _SMOOTH))
+            raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
+        if chosen == "arcs" and (self._by_costs is None or self.ompl is not None):
+            raise InvalidValueError(
+                "smooth 'arcs' rounds bends of paths by costs without OMPL, and this planner plans "
+                "no such paths: give it costs, or take 'line-of-sight'"
+            )
+        return chosen
+
+    def query(self, request: PlanRequest) -> Query | PlanStatus:
+        """Return the query for the method, or the status that refuses start or goal."""
+        (first, last), _, closed, _, kept, _ = request
+        points, allowed = (first[:2], last[:2]), self.preset.planner.allow_unexplored
+        places = places_of_endpoints(self.grid, points, allow_unexplored=allowed)
+        if isinstance(places, PlanStatus):
+            return places
+        cells, positions = places
+        shut = self.closed_for_all(closed)
+        if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
+            return refused
+        return Query(cells, points, closed, kept, positions)
+
+    # Planning: a path found by the method, then refined.
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Plan a path."""
+        query = self.query(request)
+        if isinstance(query, PlanStatus):
+            return self._answer(query, request)
+        found = self.method.find(query)
+        if query.kept is not None and found.has_path and self.preset.planner.method != "cheapest":
+            from hybridnav.planning.keeping import staying  # noqa: PLC0415 - loads the lattice
+
+            line = self._open if query.closed is None else self._open.closing(query.closed.flat)
+            found = staying(self.grid, line, query, found)
+        return self.result(request, query, found)
+
+    @cached_property
+    def _open(self) -> CostLine:
+        """The cells that may be entered, for paths by lengths that stay on earlier ones."""
+        from hybridnav.maps.costs import CostLayer  # noqa: PLC0415 - most queries keep nothing
+        from hybridnav.refine import CostLine  # noqa: PLC0415
+
+        layer = CostLayer(np.ones(self.grid.shape, np.float32))
+        allowed = self.preset.planner.allow_unexplored
+        return CostLine(self.grid, layer, allow_unexplored=allowed)
+
+    def leaving(
+        self, request: PlanRequest, within_m: float | None
+    ) -> tuple[PlanRequest, float | None, list[int]]:
+        """Return a request whose closed start may leave the closed cells, and how long the way out
+        is. The request is as it was, and the length None, where nothing closes the start alone, or
+        no way leads out.
+        """
+        if self.ompl is not None or within_m is not None:
+            given = (
+                "within_m" if self.ompl is None else f"OMPL, which preset {self.preset.name} has"
+            )
+            raise InvalidValueError(f"leave_zone does not go with {given}: leave one out")
+        stays, closed, always = (request, None, list[int]()), request.closed, self.costs.closed
+        cells = self.grid.frame.cells_of(np.stack([pose[:2] for pose in request.poses]))
+        if not ((cells >= 0) & (cells < self.grid.shape)).all():
+            return stays
+        ends = cells @ np.array([self.grid.shape[1], 1])
+        may_enter = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
+        zone: ClosedCells | None = None
+        for each in filter(None, (closed, always)):
+            if each.holds(ends[:1])[0] and not each.holds(ends[1:])[0]:
+                zone = each if zone is None else zone | each
+            else:
+                may_enter.ravel()[each.flat] = False
+        if zone is None or not may_enter.ravel()[ends].all():
+            return stays
+        way = way_out(may_enter, zone, int(ends[0]), corner_cutting=self.grid.corner_cutting)
+        if way is None:
+            return stays
+        if closed is not None:
+            left = ClosedCells(np.setdiff1d(closed.flat, way[0]), closed.solid)
+            request = request._replace(closed=left)
+        opened = [] if always is None or not always.holds(ends[:1])[0] else way[0]
+        return request, way[1] * self.grid.resolution_m, opened
+
+    def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
+        """Return a result, or where its goal cannot be reached one to the nearest point that can
+        be; see `HybridPlanner.plan`."""
+        check_within(within_m)
+        if self.ompl is not None:
+            raise InvalidValueError(
+                f"within_m goes with presets without OMPL, and {self.preset.name} has it: take "
+                "another preset, or leave it out"
+            )
+        if result.path is not None or result.status.value.startswith("start"):
+            return result
+        shut = self.closed_for_all(request.closed)
+        is_open = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
+        if shut is not None:
+            is_open.ravel()[shut.flat] = False
+        first, last = request.poses
+        point = nearest_reachable(
+            self.grid, is_open, first[:2].tolist(), last[:2].tolist(), within_m
+        )
+        if point is None:
+            return result
+        poses = first, np.array([*point, *last[2:]])
+        found = self.plan(request._replace(poses=poses, goal=point, kept=None))
+        return replace(found, status=PlanStatus.NEAR_GOAL, goal=tuple(last.tolist()))
+
+    def draft(self, request: PlanRequest) -> PlanDraft:
+        """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
+        query = self.query(request)
+        if isinstance(query, PlanStatus):
+            return PlanDraft.of(self._answer(query, request))
+        found = self.method.find(query)
+        made = partial(self.result, request, query, found)
+        if not found.has_path or self.ompl is not None or request.smooth != "none":
+            return PlanDraft.of(made())
+        bound = self._bound(query, found, found.cost_m)
+        return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
+
+    def result(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
+        """Refine a path that was found, and return its result."""
+        metric = self.method.metric
+        if not found.has_path:
+            bound, stats = found.lower_bound_m, found.stats
+            status, how = PlanStatus.NO_PATH, None if self.ompl is None else self.ompl.no_path
+            return self._answer(
+                status, request, metric=metric, bound_source=bound, stats=stats, refinement=how
+            )
+        if self.ompl is not None:
+            result = self._by_ompl(self.ompl, request, query, found)
+        elif self._by_costs is not None:
+            by_cells = metric == "weighted"
+            finished = self._cheapest if by_cells else self._rounded
+            result = finished(self._by_costs, request, query, found)
+        elif metric == "octile" and request.smooth == "line-of-sight":
+            result = self._in_sight(request, query, found)
+        else:
+            path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
+            least = self._bound(query, found, path.length_m)
+            result = self._solved(request, found, path, least, metric=metric)
+        if result.path is None or not result.solved or self.guide is None:
+            return result
+        source = self.guide.of(result.path, request.goal, request.poses[0].tolist())
+        return replace(result, instruction_source=source)
+
+    def _in_sight(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
+        """Return the result of a path of cells that is shortened by line of sight."""
+        began, sight, closed = clock(), self._sight, request.closed
+        if closed is not None:  # one for this query
+            allowed = self.preset.planner.allow_unexplored
+            sight = LineOfSight(self.grid, allow_unexplored=allowed, closed=closed.flat)
+        points = sight.shorten(found.cells, *query.points)
+        found.stats.seconds["smooth"] = clock() - began
+        length_m = polyline_length(points)
+        path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
+        return self._solved(request, found, path, query.straight_m, metric="any-angle")
+
+    @cached_property
+    def _sight(self) -> LineOfSight:
+        return LineOfSight(self.grid, allow_unexplored=self.preset.planner.allow_unexplored)
+
+    @cached_property
+    def _by_costs(self) -> CostFinish | None:
+        """The last step of plans by costs; None for plans by lengths."""
+        layer = self.costs.layer
+        return None if layer is None else CostFinish(self.grid, layer, self.preset.planner)
+
+    def _cheapest(
+        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a cheapest path of cells."""
+        solved = partial(self._solved, request, found)
+        if request.smooth == "none":
+            points = self.grid.frame.points_of(found.cells)
+            length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
+            path, cost_m = Path(found.cells, points, length_m), found.cost_m
+            return solved(path, found.lower_bound_m, metric="weighted", weighted_cost=cost_m)
+        began = clock()
+        finish = costs.arcs if request.smooth == "arcs" else costs.line
+        path, cost_m = finish(found.cells, request.poses, request.closed)
+        found.stats.seconds["smooth"] = clock() - began
+        bound, of_cells = self._cost_bound(query, cost_m), found.lower_bound_m
+        metric: Any = "any-angle-weighted"
+        return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
+
+    def _rounded(
+        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a cheapest any-angle path, with arcs if the request says so."""
+        points = found.points
+        assert points is not None  # noqa: S101 - any-angle methods state them
+        if request.smooth == "arcs":
+            began = clock()
+            path, cost_m = costs.arcs_along(found.cells, points, request.closed)
+            found.stats.seconds["arcs"] = clock() - began
+        else:
+            length_m, cost_m = polyline_length(points), found.cost_m
+            path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
+        bound = self._cost_bound(query, cost_m)
+        metric, weighted = self.method.metric, cost_m
+        return self._solved(
+            request, found, path, bound, metric=metric, weighted_cost=weighted, line=points
+        )
+
+    def _bound(self, query: Query, found: Found, cost_m: float) -> float | Callable[[], float]:
+        """Return the bound of a path, or how to find it where it takes a search of its own."""
+        if self.method.metric == "any-angle-weighted":
+            return self._cost_bound(query, cost_m)
+        return found.optimum or min(found.lower_bound_m, cost_m)
+
+    def _cost_bound(self, query: Query, cost_m: float) -> Callable[[], float]:
+        """Return how to find a bound on the cost of all any-angle paths, when somebody reads it."""
+        costs = self._by_costs
+        assert costs is not None  # noqa: S101 - the plan is by costs
+        return partial(costs.bound, query, cost_m)
+
+    def _by_ompl(
+        self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
+    ) -> PlanResult:
+        """Return the result of a path refined by OMPL, with the bound of the method too."""
+        now = clock()
+        first, last = (
+            pose if len(pose) > 2 else np.append(pose, 0.0)  # noqa: PLR2004
+            for pose in request.poses
+        )
+        is_any_angle = self.method.metric == "any-angle"
+        refined = ompl.plan(
+            found.cells,
+            (first, last),
+            self.closed_for_all(request.closed),
+            spent_s=now - request.began,
+            least_m=found.lower_bound_m if is_any_angle else query.straight_m,
+            along=found,
+        )
+        found.stats.seconds["ompl"] = clock() - now
+        bound, path = refined.lower_bound, refined.path
+        if path is not None and refined.status is PlanStatus.SOLVED:
+            path = path if path.headings_rad is not None else path.turned_at_ends(*request.poses)
+        return self._answer(
+            refined.status,
+            request,
+            metric=refined.metric,
+            path=path,
+            route_source=self._route_of(path),
+            bound_source=bound,
+            weighted_cost=refined.weighted_cost,
+            refinement=refined.refinement,
+            stats=found.stats,
+        )
+
+    # Results: with their routes, and the settings that they were planned by.
+
+    def _solved(
+        self,
+        request: PlanRequest,
+        found: Found,
+        path: Path,
+        bound: float | Callable[[], float],
+        **outcome: Any,
+    ) -> PlanResult:
+        """Return the result of a path, whose bound is at most its cost."""
+        cost_m = outcome.get("weighted_cost", path.length_m)
+        return self._answer(
+            PlanStatus.SOLVED,
+            request,
+            path=path.turned_at_ends(*request.poses),
+            route_source=found.route or self._route_of(path),
+            bound_source=bound if callable(bound) else min(bound, cost_m),
+            stats=found.stats,
+            **outcome,
+        )
+
+    def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
+        """Return a result that records endpoints, preset and settings of the pyramid."""
+        first, last = request.poses
+        made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
+        made |= {"proof_source": (self.grid, self.costs, request.closed), "status": status}
+        made |= {"start": tuple(first.tolist()), "goal": tuple(last.tolist())}
+        return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
+
+    def _route_of(self, path: Path | None) -> RouteOfCells | None:
+        """Return what the route of a path is found from, None for no path or no places."""
+        if path is None or self._route_finder is None:
+            return None
+        cells = partial(getattr, path, "cells")
+        return filled(RouteOfCells, topology=self.built, finder=self._route_finder, cells=cells)
+
+    @cached_property
+    def _route_finder(self) -> RouteFinder | None:
+        return None if self.topology is None else RouteFinder(self.topology)
+
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        pyramid, layer = self.built.pyramid, self.costs.layer
+        costs = {} if layer is None else {"costs": layer.source}
+        limits = self.preset.limits
+        return {
+            "preset": self.preset.name,
+            "planner": self.preset.planner.model_dump(),
+            "pyramid": {
+                "merge_distance_m": pyramid.merge_distance_m,
+                "linkage": pyramid.linkage,
+                "seed": pyramid.seed,
+                "robot_radius_m": self.grid.robot_radius_m,
+            },
+            **({} if limits is None else {"limits": limits.model_dump()}),
+            **costs,
+        }
+
+    @cached_property
+    def guide(self) -> Guide | None:
+        """The source of descriptions for a person; None on a map without rooms."""
+        if self.topology is None or self.topology.pyramid.rooms is None:
+            return None
+        # Loads modules that plans without rooms do not need.
+        from hybridnav.guide.words.itinerary import Guide  # noqa: PLC0415
+
+        return Guide(self.topology.rooms)
+
+    # Many queries at once: those that look-ups answer in one kernel, the others one by one.
+
+    def plan_many(
+        self,
+        pairs: tuple[FloatArray, FloatArray],
+        smooth: Smooth | None,
+        blocked: Closable | ClosedCells | None,
+    ) -> PlanBatch:
+        """Plan paths between many pairs of points; see `HybridPlanner.plan_many`."""
+        finish, closed, method = self._checked(smooth), self.closed(blocked), self.method
+        is_kept = finish == "none" or method.metric == "any-angle"
+        at_once = method if self.ompl is None and is_kept else None
+
+        def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
+            return self.plan(self.read(start, goal, finish, closed, "anywhere"))
+
+        return plan_many(self.grid, at_once, pairs, closed, alone)
