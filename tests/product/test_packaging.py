@@ -288,7 +288,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     stubs = {path.relative_to(source).as_posix() for path in source.rglob("*.pyi")}
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
-    pages = {"hybridnav/harness/report.html.j2", "hybridnav/graphs/check.html.j2"} | {
+    pages = {"hybridnav/harness/report.html.j2", "hybridnav/ext/fleet/check.html.j2"} | {
         f"hybridnav/graphs/bundle_{name}.j2"
         for name in ("mask.yaml", "nav2_params.yaml", "poses.yaml", "README.md", "room_names.yaml")
     }

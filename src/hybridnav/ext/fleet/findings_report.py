@@ -225,7 +225,7 @@ def _page(
 ) -> str:
     from hybridnav.harness.report import page_template  # noqa: PLC0415 - loads matplotlib
 
-    source = resources.files("hybridnav.graphs").joinpath("check.html.j2")
+    source = resources.files("hybridnav.ext.fleet").joinpath("check.html.j2")
     return page_template(source.read_text(encoding="utf-8")).render(
         title=title, facts=facts, parts=parts, rows=rows, lines=lines, most=_SHOWN
     )
