@@ -15,11 +15,13 @@ from benchmarks.common import NEEDED_DATA, Refused
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+ROOT = Path(__file__).parents[1]
 SUBJECTS = {
     file.stem: file
-    for file in sorted((Path(__file__).parent / "subjects").glob("*.py"))
-    if not file.stem.startswith("_")
+    for folder in ("benchmarks/subjects", "research", "tools")
+    for file in sorted((ROOT / folder).glob("[!_]*.py"))
 }
+"""Measurements, then what trains and judges the finding of rooms, then what makes releases."""
 
 
 def about(file: Path) -> str:
@@ -36,7 +38,8 @@ def main(words: Sequence[str] | None = None) -> int:
         out.write(f"{__doc__}\n\n" if is_asked else f"no subject is called {name}; there are\n")
         out.writelines(f"  {key:18}{about(file)}\n" for key, file in SUBJECTS.items())
         return 0 if is_asked else 2
-    subject = import_module(f"benchmarks.subjects.{name}")
+    home = SUBJECTS[name].relative_to(ROOT).with_suffix("")
+    subject = import_module(".".join(home.parts))
     parser = argparse.ArgumentParser(
         prog=f"python -m benchmarks {name}",
         description=subject.__doc__,

@@ -52,6 +52,7 @@ class RouteGraphMethod(GraphMethod):
         built = build_lane_graph(topology)
         graph = _graph_of("our graph", grid, built.positions, built.edges)
         super().__init__(grid, graph)
+        self.settings = "lanes, as by default"
 
 
 class SwaggerLike(GraphMethod):

@@ -68,10 +68,9 @@ def page(data: Data) -> str:
     text = f"""# The study: consistency, loss, efficiency
 
 Thrun's three questions, asked of every method on {_maps_in_words(data)}.
-`make study` asks them anew and writes this page, its charts, a PDF, an HTML report and an archive
-of all records. This is {_how_much(data)}. Every number below comes from
-`docs/data/study.json`, which a script fills from the records. [The harness](harness.md) describes
-the checks and the columns.
+`make study` asks them anew and writes this page and its charts. This is {_how_much(data)}.
+Every number below comes from `docs/data/study.json`, which a script fills from the records.
+[The harness](harness.md) describes the checks and the columns.
 
 ## The answers on one page
 

@@ -27,7 +27,6 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, matches, option, read
-from benchmarks.subjects.drawn_graphs import GRAPHS
 from hybridnav.graphs.attach import (
     MANY_CANDIDATES,
     Network,
@@ -48,6 +47,15 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
     from hybridnav.harness.tables import Row
 
+GRAPHS = {
+    "nav2/graphs/nav2_bringup/depot_graph.geojson": "nav2/maps/depot.yaml",
+    "nav2/graphs/nav2_bringup/turtlebot3_graph.geojson": "nav2/maps/tb3_sandbox.yaml",
+    "nav2/graphs/nav2_route/aws_graph.geojson": "aws_small_warehouse/005/map.yaml",
+    "strands/g4s/g4s_sim.tplg": "strands/g4s/g4s_sim_cropped.yaml",
+    "strands/g4s/g4s_y2.tmap": "strands/g4s/g4s_y2.yaml",
+    "strands/tsc_y3/tsc_y3_final.tplg": "strands/tsc_y3/tsc20160523.yaml",
+    "strands/tsc_y4/tsc_y4_final.tplg.tpl": "strands/tsc_y4/tsc_1701.yaml",
+}
 BUILDINGS = (
     "bwi_gdc/2/2.yaml",
     "bwi_gdc/3/3.yaml",

@@ -3,12 +3,8 @@
 `make study` runs the quarter, `make study STUDY=whole` the whole. Twelve ROS maps and four raw maps
 of SLAM (robot radius 0.25 m, merge distance 4 m, sampled pairs), and twelve MovingAI maps (cells of
 1 m, a point robot, merge distance 40 m, pairs of their scenario files, whose optima are an oracle).
-A run that was stopped goes on where it was. DIR, else out/study or out/study-whole, gets
-
-* a folder of records for each part: lengths, costs, OMPL;
-* `report.html`, which draws the worst cases on their maps, so it belongs in no repository;
-* `study.pdf`, a few pages without maps;
-* `study-records.zip` with all records and figures, and its SHA-256 beside it.
+A run that was stopped goes on where it was. DIR, else out/study or out/study-whole, gets a folder
+of records for each part: lengths, costs, OMPL.
 
 The checkout gets `docs/data/study.json` with the figures of all tables, and from these
 `docs/study.md`, the charts in `docs/images`, and every quoted figure in the README, the
@@ -28,17 +24,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import DATA, ROOT, Refused, option
-from benchmarks.subjects._study_archive import write_archive
+from benchmarks.subjects._study_charts import charts_of, write_charts
 from benchmarks.subjects._study_data import collect
 from benchmarks.subjects._study_maps import lost_of, maps_of
 from benchmarks.subjects._study_page import page
-from benchmarks.subjects._study_pdf import charts_of, write_charts, write_pdf
 from benchmarks.subjects._study_quotes import QUOTES, quoted, update
-from benchmarks.subjects._study_report import write_report
-from benchmarks.subjects._study_run import PLANS, RUN_FILE, parts_of, run
+from benchmarks.subjects._study_run import PLANS, parts_of, run
 from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError
-from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -58,7 +51,7 @@ def write_all(folder: Path, root: Path, kinds: Mapping[str, str], docs: Path) ->
     Parameters
     ----------
     folder
-        The study's folder; gets the report, the PDF and the archive.
+        The study's folder.
     root
         Maps are named by their paths from here.
     kinds
@@ -67,20 +60,11 @@ def write_all(folder: Path, root: Path, kinds: Mapping[str, str], docs: Path) ->
         Folder of the page, its charts and its figures.
     """
     data = collect(folder, root, kinds)
-    charts = charts_of(folder, root)
     for made in (docs / FIGURES, docs / "images"):
         (made.parent if made.suffix else made).mkdir(parents=True, exist_ok=True)
-    text = figures_text(data)
-    replace_file(docs / FIGURES, text.encode())
-    replace_file(folder / FIGURES.name, text.encode())
+    replace_file(docs / FIGURES, figures_text(data).encode())
     write_pages(docs)
-    write_charts(charts, docs / "images")
-    write_pdf(data, charts, folder / "study.pdf")
-    write_report(data, folder, root, folder / "report.html")
-    records = [folder / name / file for name in data["parts"] for file in (RECORDS_FILE, RUNS_FILE)]
-    files = [*records, folder / RUN_FILE, folder / FIGURES.name]
-    digest = write_archive(folder / "study-records.zip", folder, files)
-    sys.stderr.write(f"{folder / 'study-records.zip'}: SHA-256 {digest}\n")
+    write_charts(charts_of(folder, root), docs / "images")
     return data
 
 

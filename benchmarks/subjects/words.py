@@ -13,8 +13,8 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, SEED, option, print_head, print_row
-from benchmarks.subjects._rooms_buildings import Building
 from benchmarks.subjects._words_walker import Lost, Place, Walker
+from research._rooms_buildings import Building
 
 if TYPE_CHECKING:
     from argparse import Namespace

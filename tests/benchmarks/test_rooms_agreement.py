@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.subjects._rooms_agreement import compare_rooms
+from research._rooms_agreement import compare_rooms
 
 
 @given(

@@ -1,23 +1,18 @@
-"""The study on two maps of our own: its figures, its page, its PDF, its archive."""
+"""The study on two maps of our own: its figures, its page, its runs."""
 
 import copy
-import hashlib
 import json
 import re
-import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import hybridnav as hn
 from benchmarks.__main__ import main
 from benchmarks.subjects import study
-from benchmarks.subjects._study_archive import write_archive
 from benchmarks.subjects._study_data import collect
 from benchmarks.subjects._study_maps import StudyMap
 from benchmarks.subjects._study_page import page
-from benchmarks.subjects._study_pdf import MOST_PAGES, charts_of, sheets_of
 from benchmarks.subjects._study_run import (
     GRAPHS,
     PLANS,
@@ -30,7 +25,6 @@ from benchmarks.subjects._study_run import (
     rivals,
     run,
 )
-from benchmarks.subjects._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
 from benchmarks.subjects._study_tables import tables_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES
@@ -124,7 +118,6 @@ def test_the_study_says_how_many_any_angle_optima_were_checked(folder, data):
     assert [data["parts"][name]["checked any-angle"] for name in FIGURES] == found
     words = "checked any-angle: Lengths {}, Costs {}, OMPL {} optima".format(*found)
     assert words in page(data)
-    assert words.partition(": ")[2] in (folder / "report.html").read_text(encoding="utf-8")
     older = copy.deepcopy(data)
     for part in older["parts"].values():
         del part["checked any-angle"]
@@ -219,108 +212,6 @@ def test_a_contradiction_stands_on_the_page(data):
     assert "* Contradictions: 3 in " in text
     assert "3 contradictions" in text
     assert "office: a wall" in text
-
-
-# --- PDF ----------------------------------------------------------------------------------------
-
-
-def test_the_pdf_is_short_legible_and_shows_no_map(folder, data):
-    raw = (folder / "study.pdf").read_bytes()
-    count = len(re.findall(rb"/Type /Page\b", raw))
-    assert 1 <= count <= MOST_PAGES
-    assert b"/Subtype /Image" not in raw
-    assert b"/CreationDate" not in raw
-    sheets = sheets_of(data, charts_of(folder, MAPS))
-    assert len(sheets.pages) == count
-    for sheet in sheets.pages:
-        assert sheet.get_size_inches().tolist() == [WIDTH_IN, HEIGHT_IN]
-        sheet.draw_without_rendering()
-        for text in _texts(sheet):
-            assert text.get_fontsize() >= 8, text.get_text()
-            box = text.get_window_extent().transformed(sheet.dpi_scale_trans.inverted())
-            assert box.x0 >= 0.2, text.get_text()
-            assert box.x1 <= WIDTH_IN - 0.2, text.get_text()
-            assert box.y0 >= 0.2, text.get_text()
-
-
-def test_texts_of_the_pdf_do_not_overlap(folder, data):
-    for sheet in sheets_of(data, charts_of(folder, MAPS)).pages:
-        sheet.draw_without_rendering()
-        boxes = np.array([text.get_window_extent().extents for text in sheet.texts])
-        low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
-        high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
-        both = np.triu(((high - low) > 0.5).all(axis=2), 1)
-        pairs = [
-            (sheet.texts[i].get_text(), sheet.texts[j].get_text()) for i, j in np.argwhere(both)
-        ]
-        assert pairs == []
-
-
-def _texts(sheet):
-    own = list(sheet.texts)
-    for axes in sheet.axes:
-        legend = axes.get_legend()
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            own += [axis.label]
-            own += [t.label1 for t in axis.get_major_ticks() if low <= t.get_loc() <= high]
-        own += legend.get_texts() if legend else []
-    return [text for text in own if text.get_text() and text.get_visible()]
-
-
-def test_a_table_goes_on_on_the_next_page_and_a_wide_one_is_refused():
-    sheets = Sheets("foot")
-    sheets.table("many", ("method", "n"), [(f"m{at}", f"{at}") for at in range(120)])
-    assert len(sheets.pages) == 2
-    heads = [sum(text.get_text() == "method" for text in page.texts) for page in sheets.pages]
-    assert heads == [1, 1]
-    shown = {text.get_text() for page in sheets.pages for text in page.texts}
-    assert {f"m{at}" for at in range(120)} <= shown
-    wide = [[f"{at}" * 12 for at in range(1, 10)]]
-    with pytest.raises(InvalidValueError, match="does not fit"):
-        sheets.table("wide", [f"column {at}" for at in range(9)], wide)
-
-
-@pytest.mark.parametrize("rows", range(64, 71))
-def test_no_row_of_a_table_stands_alone_on_a_page(rows):
-    sheets = Sheets("foot")
-    sheets.table("some", ("method", "n"), [(f"m{at}", f"{at}") for at in range(rows)])
-    shown = [{text.get_text() for text in page.texts} for page in sheets.pages]
-    last = [sum(f"m{at}" in texts for at in range(rows)) for texts in shown]
-    assert sum(last) == rows
-    assert len(last) == 1 or last[-1] >= 3
-
-
-def test_lines_are_no_wider_than_asked_for():
-    text = "a line of words and averyveryveryverylongwordwithoutablank at its end"
-    lines = wrapped(text, 1.0, 9.0)
-    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
-    assert all(width_of(line, 9.0) <= 1.0 + 1e-6 for line in lines)
-
-
-# --- report and archive -------------------------------------------------------------------------
-
-
-def test_the_report_has_all_parts_and_needs_no_network(folder):
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    assert re.findall(r"(?:src|href)=\"(?!data:|#)[^\"]*\"", text) == []
-    for words in ("Lengths: Loss over the any-angle optimum", "Costs: ", "OMPL: ", "(costs)"):
-        assert words in text
-    ids = re.findall(r"id=\"(case-\d+-\d+)\"", text)
-    assert len(ids) == len(set(ids)) > 0
-
-
-def test_the_archive_has_equal_bytes_and_a_checksum(folder, data, tmp_path):
-    archive = folder / "study-records.zip"
-    digest = hashlib.sha256(archive.read_bytes()).hexdigest()
-    beside = archive.with_name("study-records.zip.sha256").read_text()
-    assert beside == f"{digest}  study-records.zip\n"
-    with zipfile.ZipFile(archive) as opened:
-        names = opened.namelist()
-        assert json.loads(opened.read("study.json")) == data
-        assert opened.read("costs/records.jsonl") == (folder / "costs/records.jsonl").read_bytes()
-    again = write_archive(tmp_path / "again.zip", folder, [folder / name for name in names[::-1]])
-    assert again == digest
 
 
 # --- runs ---------------------------------------------------------------------------------------

@@ -28,7 +28,6 @@ from hybridnav.harness.yardstick import KINDS, contradiction
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import (
     ROOMS,
-    ROOT,
     importable,
     label_of,
     name_of,
@@ -144,12 +143,6 @@ def test_every_column_of_the_report_is_explained(folder, study):
     assert columns - by_distance == explained
     assert explained <= MEANINGS.keys()
     assert study.labels
-
-
-def test_the_page_on_the_harness_explains_the_same_columns():
-    page = (ROOT / "docs" / "reference" / "harness-columns.md").read_text()
-    for column, meaning in MEANINGS.items():
-        assert f"| {column} | {meaning} |" in page
 
 
 def test_counter_examples_can_be_pasted_and_lead_to_their_pictures(folder, study):

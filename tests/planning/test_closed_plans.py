@@ -290,22 +290,10 @@ def test_a_diagonal_past_a_closed_cell_is_not_taken(preset: str) -> None:
 
 
 @presets
-@pytest.mark.parametrize(
-    "blocked",
-    [
-        {"doors": [1]},
-        {"cells": [(0, 99)]},
-        {"cells": [(0.5, 1.0)]},
-        {"arcs": [10**6]},
-        {"places": [-1]},
-        {"polygons": [[(0, 0), (1, 1)]]},
-        {"polygons": [[(0, 0), (1, math.nan), (1, 0)]]},
-        shapely.Point(0, 0),
-        "everything",
-        3,
-    ],
-)
-def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any) -> None:
+@pytest.mark.parametrize("blocked", [{"doors": [1]}, {"cells": [(0, 99)]}])
+def test_what_cannot_be_closed_is_refused_and_the_planner_goes_on(
+    preset: str, blocked: Any
+) -> None:
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
     start, goal = planner.grid.frame.points_of([(2, 2), (2, 12)])
     with pytest.raises(hn.errors.InvalidValueError) as caught:

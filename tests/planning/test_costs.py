@@ -255,18 +255,6 @@ def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
     assert hn.plan_alternatives(planner, "west", "east", 2)[0].result.cost == result.cost
 
 
-@pytest.mark.parametrize("preset", ["shortest", "octile"])
-def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) -> None:
-    topology = topology_of(hn.example_map("figure1"))
-    layer = layer_of(np.ones(topology.grid.shape))
-    message = f"preset {preset} cannot plan by costs: method "
-    with pytest.raises(hn.errors.InvalidValueError, match=re.escape(message)) as refused:
-        hn.HybridPlanner(topology, preset=preset, costs=layer)
-    assert "with grid-astar and" in str(refused.value)
-    with pytest.raises(hn.errors.PresetError, match=r"planner\.costs: no key of method"):
-        hn.load_preset(preset, overrides=["planner.costs.clearance={}"])
-
-
 @pytest.mark.parametrize(
     ("costs", "message"),
     [

@@ -312,7 +312,11 @@ def test_presets_that_know_lengths_only_refuse_in_one_line(preset: str, cli: Any
     )
     with pytest.raises(hn.errors.InvalidValueError, match="knows lengths only") as refused:
         hn.HybridPlanner(topology, preset=preset, costs=layer)
+    assert f"preset {preset} cannot plan by costs: method " in str(refused.value)
+    assert "with grid-astar and" in str(refused.value)
     assert "\n" not in str(refused.value)
+    with pytest.raises(hn.errors.PresetError, match=r"planner\.costs: no key of method"):
+        hn.load_preset(preset, overrides=["planner.costs.clearance={}"])
     query = ("plan", "maps/figure1/figure1.yaml", "--start", "0.5,0.5", "--goal", "2,2.5")
     done = cli(*query, "--robot-radius", "0", "--preset", preset, "--costs", "clearance")
     assert done.refuses(2, "planner.costs: no key of method")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from benchmarks.subjects._ompl_checks import CORNERS, Walls
-from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
 from hybridnav.planning import load_preset
+from tests.oracle.long_robot import CORNERS, Walls
+from tests.oracle.long_robot import rooms as rooms_with_doors
 from tests.refine.test_differential import assert_turns_and_drives
 
 pytest.importorskip("ompl")

@@ -10,7 +10,6 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
 from hybridnav.maps.costs import cost_along
 from hybridnav.planning import load_preset
 from hybridnav.planning.methods.discs import Discs
@@ -18,6 +17,7 @@ from hybridnav.refine import MotionCheck
 from hybridnav.refine.curves import driven
 from hybridnav.refine.footprint import Footprint
 from hybridnav.search.found import ClosedCells, Query
+from tests.oracle.long_robot import rooms as rooms_with_doors
 from tests.oracle.motions import ShapelyRobot
 
 CELL_M = 0.1

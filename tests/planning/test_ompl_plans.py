@@ -15,12 +15,12 @@ import pytest
 import shapely
 
 import hybridnav as hn
-from benchmarks.subjects._ompl_checks import CORNERS, Walls
-from benchmarks.subjects._ompl_checks import rooms as rooms_with_doors
 from benchmarks.worlds import office_world
 from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from hybridnav.planning import load_preset
 from hybridnav.search.found import Query
+from tests.oracle.long_robot import CORNERS, Walls
+from tests.oracle.long_robot import rooms as rooms_with_doors
 from tests.strategies import drawn, occupancy_grid
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from benchmarks.__main__ import main
-from benchmarks.subjects import fetch, release
 from benchmarks.subjects._study_maps import lost_of, maps_of
 from hybridnav.errors import InvalidValueError
+from tools import fetch, release
 
 ROOT = Path(__file__).parents[2]
 FILES = ("pyproject.toml", "CITATION.cff", "codemeta.json", "CHANGELOG.md", "paper/paper.md")

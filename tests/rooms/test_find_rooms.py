@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from benchmarks.subjects._rooms_agreement import compare_rooms
 from hybridnav.maps import CellClass
 from hybridnav.rooms.find import divide_rooms
+from research._rooms_agreement import compare_rooms
 from tests.strategies import class_grids, occupancy_grid
 
 RESOLUTION_M = 0.1

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.subjects._rooms_buildings import Building
 from hybridnav.rooms.listing import kinds_of
+from research._rooms_buildings import Building
 
 SEEN = {
     "2": ({2, 4, 5, 6, 8, 12, 13}, {9}),

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import ROOT, option
-from benchmarks.subjects.wheels import Environment
+from tools.wheels import Environment
 
 if TYPE_CHECKING:
     from argparse import Namespace

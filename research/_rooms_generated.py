@@ -10,7 +10,7 @@ from numba import njit
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.subjects._rooms_buildings import Building
+from research._rooms_buildings import Building
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks.common import print_head, print_row
-from benchmarks.subjects._rooms_agreement import compare_rooms
-from benchmarks.subjects._rooms_buildings import SITES, Building
-from benchmarks.subjects.train_rooms import Training, of_generated
 from hybridnav.rooms.find import judged_rooms
+from research._rooms_agreement import compare_rooms
+from research._rooms_buildings import SITES, Building
+from research.train_rooms import Training, of_generated
 
 if TYPE_CHECKING:
     from pathlib import Path

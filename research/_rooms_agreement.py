@@ -69,7 +69,7 @@ def compare_rooms(true: AnyArray, found: AnyArray) -> RoomAgreement:
 
     Examples
     --------
-    >>> from benchmarks.subjects._rooms_agreement import compare_rooms
+    >>> from research._rooms_agreement import compare_rooms
     >>> compare_rooms(np.array([0, 0, 0, 1]), np.array([5, 5, 6, 6])).partners
     array([5, 6])
     """

@@ -10,9 +10,9 @@ import numpy as np
 from PIL import Image
 
 import hybridnav as hn
-from benchmarks.subjects._rooms_truth import FLOORS, Floor
 from hybridnav.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
 from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
+from research._rooms_truth import FLOORS, Floor
 
 if TYPE_CHECKING:
     from pathlib import Path

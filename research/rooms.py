@@ -19,9 +19,9 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option, print_head, print_row
-from benchmarks.subjects._rooms_measures import measures_table
-from benchmarks.subjects._rooms_truth import FLOORS, Floor
 from hybridnav.route import MaxDistanceSearch
+from research._rooms_measures import measures_table
+from research._rooms_truth import FLOORS, Floor
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -19,9 +19,6 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import DATA, Refused, option
-from benchmarks.subjects._rooms_boost import Boosting, Examples, averaged, boost
-from benchmarks.subjects._rooms_buildings import SITES, Building
-from benchmarks.subjects._rooms_generated import generated
 from hybridnav.rooms import merging
 from hybridnav.rooms.cutting import Ground, fine_segments
 from hybridnav.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
@@ -33,6 +30,9 @@ from hybridnav.rooms.merging import (
     Small,
     least_cells,
 )
+from research._rooms_boost import Boosting, Examples, averaged, boost
+from research._rooms_buildings import SITES, Building
+from research._rooms_generated import generated
 
 if TYPE_CHECKING:
     from argparse import Namespace
