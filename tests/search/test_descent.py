@@ -137,6 +137,31 @@ def test_a_descent_that_runs_out_of_room_begins_anew(monkeypatch: pytest.MonkeyP
             assert recounted(found.cells) <= 2 * optimum
 
 
+def test_long_routes_are_found_part_by_part() -> None:
+    """Routes of more fields than a part has: their costs add up, and no field comes twice."""
+    rng = np.random.default_rng(6)
+    walls = (rng.random((120, 120)) < 0.3).astype(np.float32)
+    walls[:, 30::30] = 1
+    walls[[3, 116, 3], [30, 60, 90]] = 0
+    grid = hn.OccupancyGrid(walls, robot_radius_m=0)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0)
+    graph = move_graph(grid.enterable())
+    descent = Descent(pyramid, grid.enterable(), DescentSettings(field_cells=2, step=2.0))
+    reached = distances(graph, grid.shape, (3, 29))
+    free, longest = np.argwhere(np.isfinite(reached)), 0
+    for _ in range(40):
+        start, goal = (tuple(cell) for cell in rng.choice(free, 2).tolist())
+        watched = descent.watch(start, goal)
+        assert watched is not None
+        for kept in watched.levels[1:]:
+            assert len(set(kept.route.tolist())) == len(kept.route)
+            longest = max(longest, len(kept.route))
+        assert_legal(watched.cells, grid.enterable())
+        optimum = distances(graph, grid.shape, start)[goal]
+        assert recounted(watched.cells) <= 1.15 * optimum
+    assert longest > 100
+
+
 @given(scenes(), st.sampled_from([1, 4, 9]), st.sampled_from(["small", "many", "few"]))
 @settings(max_examples=examples(150))
 def test_fields_above_are_what_arcs_connect_inside_a_block(

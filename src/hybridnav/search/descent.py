@@ -166,6 +166,15 @@ def joined(level: Level, below: Layer, is_open: BoolArray, side: int) -> Layer:
     return Layer(np.append(of, -1)[below.of], below.vertex[nearest], below.arcs)
 
 
+def _by_fields_above(layer: Layer, above: Layer) -> Layer:
+    """Return a layer with its fields in the order of those above: neighbours lie close in memory,
+    which saves a descent a fourth of its time at the levels of large maps."""
+    order = np.argsort(above.of[layer.vertex], kind="stable")
+    rank = np.full(len(order) + 1, -1)
+    rank[order] = np.arange(len(order))
+    return layer._replace(of=rank[layer.of], vertex=layer.vertex[order])
+
+
 def layers_within(
     pyramid: DualGraphPyramid, enterable: BoolArray, settings: DescentSettings
 ) -> tuple[Level, list[Layer], int]:
@@ -195,7 +204,10 @@ def layers_within(
         if len(layers[0].vertex) > NEARLY * len(layers[1].vertex):
             layers.pop(0)  # parts that no arc connects
             break
-    return level, layers, len(layers) - n_below if is_by_places else -1
+    named = len(layers) - n_below if is_by_places else -1
+    for k in range(max(named, 0) + 1, len(layers)):
+        layers[k] = _by_fields_above(layers[k], layers[k - 1])
+    return level, layers, named
 
 
 def pack(
@@ -225,19 +237,24 @@ def pack(
         n_fields, held = len(vertex), of >= 0
         total = np.stack([np.bincount(of[held], part[held], n_fields) for part in sums.T], axis=1)
         means = total[:, 1:] / total[:, :1]
-        arcs, is_open = of[level.arcs[edges]], enterable.flat[survivors[vertex]]
-        may_pass = ((arcs >= 0) & is_open[arcs]).all(axis=1) & (arcs[:, 0] != arcs[:, 1])
-        arcs = arcs[may_pass]
+        ends, is_open = of[level.arcs[edges].T], np.append(enterable.flat[survivors[vertex]], False)
+        may_pass = is_open[ends[0]] & is_open[ends[1]] & (ends[0] != ends[1])
         middle = means[:, :2] if given is None else level.cells[vertex].astype(np.float64)
+        ends = ends[:, may_pass]
+        keys = ends * n_fields + ends[::-1]
+        pairs = np.sort(keys, axis=None)  # several times faster than np.unique
+        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
+        tails, neighbour = np.divmod(pairs, max(n_fields, 1))
+        first = np.searchsorted(tails, np.arange(n_fields))
         if given is None:
-            rows_cols = np.abs(middle[arcs[:, 0]] - middle[arcs[:, 1]])
-            costs = rows_cols.max(axis=1) + (_ROOT_2 - 1) * rows_cols.min(axis=1)
+            rows_cols = np.abs(middle[tails] - middle[neighbour])
+            cost = rows_cols.max(axis=1) + (_ROOT_2 - 1) * rows_cols.min(axis=1)
             if units is not None:
-                costs *= means[arcs, 2].mean(axis=1) / (1 << UNIT_BITS)
+                cost *= (means[tails, 2] + means[neighbour, 2]) / (2 << UNIT_BITS)
         else:
-            costs = given[may_pass]
+            cost = np.empty(len(pairs))  # arcs between the same two fields cost the same
+            cost[np.searchsorted(pairs, keys)] = given[may_pass]
         parent = np.full(n_fields, -1) if above is None else above[vertex] + starts[-2]
-        first, neighbour, cost = _neighbours(arcs, costs, n_fields)
         parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle))
         n_arcs += len(neighbour)
         starts.append(starts[-1] + n_fields)
@@ -256,20 +273,6 @@ def _ancestors(record: Record, cells: LongArray, level: int) -> LongArray:
     while (gone := record.vertex_end[holder] <= level).any():
         holder[gone] = record.vertex_parent[holder[gone]]
     return np.searchsorted(cells[record.vertex_end[cells] > level], holder)
-
-
-def _neighbours(
-    arcs: LongArray, costs: FloatArray, n_fields: int
-) -> tuple[LongArray, LongArray, FloatArray]:
-    """Return where the neighbours of each field begin, the neighbours, each once, and their costs.
-
-    Arcs between the same two fields cost the same.
-    """
-    ends = np.concatenate([arcs, arcs[:, ::-1]])
-    keys, chosen = np.unique(ends[:, 0].astype(np.int64) * n_fields + ends[:, 1], return_index=True)
-    tails, heads = np.divmod(keys, max(n_fields, 1))
-    first = np.searchsorted(tails, np.arange(n_fields))
-    return first, heads, np.tile(costs, 2)[chosen]
 
 
 class _Work:

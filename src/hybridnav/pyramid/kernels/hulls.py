@@ -38,13 +38,14 @@ def field_hulls(field_of, cols, boxes):
         first_row[v + 1] = first_row[v] + boxes[v, 2] - boxes[v, 0] + 1
     left = np.full(first_row[n_vertices], np.int64(-1), np.int64)
     right = np.empty(first_row[n_vertices], np.int64)
-    for cell in range(field_of.size):
-        v = field_of[cell]
-        if v >= 0:
-            at = first_row[v] + cell // cols - boxes[v, 0]
-            if left[at] < 0:
-                left[at] = cell % cols
-            right[at] = cell % cols
+    for row in range(field_of.size // cols):
+        for col in range(cols):
+            v = field_of[row * cols + col]
+            if v >= 0:
+                at = first_row[v] + row - boxes[v, 0]
+                if left[at] < 0:
+                    left[at] = col
+                right[at] = col
     start = np.zeros(n_vertices + 1, np.int64)
     rows = np.empty(first_row[n_vertices], np.int64)
     points = np.empty((2 * first_row[n_vertices], 2), np.int32)

@@ -21,8 +21,10 @@ FARTHEST = 8
 EAGER = 1.1
 """Factor of the estimate below the top: without it routes of many fields see all that are kept."""
 LAST = 1.5
-"""Horizons within which a window of A* leads to the goal: the end of another one would bend a short
-path much."""
+"""Horizons, or parts, within which a window of A* leads to the goal: the end of another one would
+bend a short path much."""
+PART = 8
+"""Fields that a part of a route looks ahead along the route above it."""
 
 
 class LevelFields(NamedTuple):
@@ -54,14 +56,14 @@ class Marks(NamedTuple):
     came: np.ndarray
     """int32 (n,), the field before it on that route, -1 for the first."""
     seen: np.ndarray
-    """int64 (n,), the descent that wrote both, negative once the field is expanded."""
+    """int64 (n,), the search that wrote both, negative once the field is expanded."""
     kept: np.ndarray
     """int64 (n,), the descent that kept the field."""
     listed: np.ndarray
     """int32 (n,), fields in the order in which they are kept."""
     told: np.ndarray
     """int64 (6,), status: `NO_WAY`, `FULL`, or how many of the last fields are listed; the number
-    of the last window; fields expanded at all levels; cells expanded; cells of the fields that are
+    of the last search; fields expanded at all levels; cells expanded; cells of the fields that are
     listed; diagonal moves of the path."""
     heap: np.ndarray
     """float64 (room, 2), open list of fields: estimates, and the fields."""
@@ -85,63 +87,135 @@ class MapCells(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _search(fields, marks, number, ends, goal_at, is_limited):
-    """Find the cheapest route between two fields of a level (A*).
+def _search(fields, marks, numbers, start, aim, is_limited):
+    """Find the cheapest route from a field to another one of its level, or into a field above (A*).
 
     The estimate is the straight line at the top, where it is consistent: no arc costs less between
-    its middles. Below it is `EAGER` times the octile distance. It is 0 at the goal's field, and
-    measured to the goal's cell elsewhere.
+    its middles. Below it is `EAGER` times the octile distance. It is 0 where the route may end. The
+    cost of the start is what `marks` has.
 
     Parameters
     ----------
-    fields, marks, number
-        The levels, what is written, and the number of this descent.
-    ends, goal_at
-        The fields of start and goal; the row and column of the goal.
+    fields, marks
+        The levels, and what is written.
+    numbers
+        The number of this descent, and that of this search.
+    start, aim
+        The field of the start. The field of the goal, or -1; the field above any of whose sons is a
+        goal, or -1; and the row and column to which the estimate leads.
     is_limited
         Whether a route may pass only sons of fields that were kept above.
 
     Returns
     -------
-    int
-        Fields expanded; `NO_WAY` or `FULL` without a route.
+    tuple
+        Fields expanded, `NO_WAY` or `FULL` without a route; and the field where it ends.
     """
-    start, goal = ends
+    number, stamp = numbers
+    goal, above, goal_row, goal_col = aim
     heap, size, expanded = marks.heap, 1, 0
     heap[0, 0], heap[0, 1] = 0.0, start
-    marks.cost[start], marks.came[start], marks.seen[start] = 0.0, -1, number
+    marks.came[start], marks.seen[start] = -1, stamp
     while size > 0:
         v = np.int64(pop(heap, size))
         size -= 1
         if marks.seen[v] < 0:
             continue  # an entry from before it was improved
-        marks.seen[v] = -number
-        if v == goal:
-            return expanded
+        marks.seen[v] = -stamp
+        if v == goal or (above >= 0 and fields.parent[v] == above):
+            return expanded, v
         expanded += 1
         if size + fields.first[v + 1] - fields.first[v] > heap.shape[0]:
-            return FULL
+            return FULL, v
         for at in range(fields.first[v], fields.first[v + 1]):
             w = np.int64(fields.neighbour[at])
             seen = marks.seen[w]
-            if seen == -number:
+            if seen == -stamp:
                 continue
-            if is_limited and marks.kept[fields.parent[w]] != number:
+            parent = fields.parent[w]
+            if is_limited and marks.kept[parent] != number:
                 continue
             cost = marks.cost[v] + fields.cost[at]
-            if seen == number and cost >= marks.cost[w]:
+            if seen == stamp and cost >= marks.cost[w]:
                 continue
-            marks.cost[w], marks.came[w], marks.seen[w] = cost, v, number
-            rows = abs(fields.middle[w, 0] - goal_at[0])
-            cols = abs(fields.middle[w, 1] - goal_at[1])
+            marks.cost[w], marks.came[w], marks.seen[w] = cost, v, stamp
+            rows = abs(fields.middle[w, 0] - goal_row)
+            cols = abs(fields.middle[w, 1] - goal_col)
             left = 0.0
-            if w != goal and is_limited:
+            if is_limited and w != goal and parent != above:
                 left = EAGER * (max(rows, cols) + _ROOT * min(rows, cols))
-            elif w != goal:
+            elif w != goal and not is_limited:
                 left = math.sqrt(rows * rows + cols * cols)
             push(heap, size, cost + left, float(w))
             size += 1
-    return NO_WAY
+    return NO_WAY, start
+
+
+@njit(cache=True, nogil=True)
+def _search_below(fields, marks, numbers, ends, goal_at, n_above):
+    """Find a route among the sons of what is kept, part by part along the route above it.
+
+    A part leads into the field of the route above that is `PART` fields ahead, or to the goal. Four
+    fifths of it are taken, and the next one begins there, so that effort grows with the route: a
+    search of all of it at once expands most of what is kept where the route is long.
+
+    Parameters
+    ----------
+    fields, marks, numbers
+        As in `_search`; the second number is that of the first part.
+    ends, goal_at
+        The fields of start and goal; the row and column of the goal.
+    n_above
+        How many fields the route above has; they are listed first.
+
+    Returns
+    -------
+    tuple
+        Fields expanded, `NO_WAY` or `FULL` without a route; and the number of the last part.
+    """
+    number, stamp = numbers
+    v, goal = ends
+    listed, last, size, expanded = marks.listed, marks.listed.size - 1, 1, 0
+    listed[last], marks.kept[v], marks.cost[v] = v, -number, 0.0  # the route, backwards at the end
+    at = n_above - 1
+    while v != goal:
+        to = at - PART if at > PART * LAST else 0
+        above = np.int64(listed[to])
+        aim = (goal, np.int64(-1), float(goal_at[0]), float(goal_at[1]))
+        if to > 0:
+            row, col = float(fields.middle[above, 0]), float(fields.middle[above, 1])
+            aim = (np.int64(-1), above, row, col)
+        stamp += 1
+        effort, w = _search(fields, marks, (number, stamp), v, aim, True)
+        if effort < 0:
+            return effort, stamp
+        expanded += effort
+        n_part, following = 0, -1
+        while w != v:
+            before = np.int64(marks.came[w])
+            marks.came[w], following, w = following, w, before
+            n_part += 1
+        marks.came[v], u = following, v
+        for _ in range(n_part if to == 0 else max(n_part * 4 // 5, min(n_part, 1))):
+            u = np.int64(marks.came[u])
+            if marks.kept[u] != -number:
+                listed[last - size], marks.kept[u] = u, -number
+                size += 1
+            while listed[last - size + 1] != u:  # where it meets itself, a loop is left out
+                size -= 1
+                marks.kept[listed[last - size]] = 0
+        v = u
+        at -= max((at - to) * 4 // 5, 1)
+    came, cost = np.int64(-1), 0.0
+    for i in range(last, last - size, -1):
+        v = np.int64(listed[i])
+        if came >= 0:
+            arc = fields.first[came]
+            while fields.neighbour[arc] != v:
+                arc += 1
+            cost += fields.cost[arc]
+        marks.came[v], marks.cost[v], came = came, cost, v
+    return expanded, stamp
 
 
 @njit(cache=True, nogil=True)
@@ -213,7 +287,7 @@ def _straight(ground, cell, target, path, at):
 
 
 @njit(cache=True, nogil=True)
-def _walk(fields, marks, ground, number, ends, n_route, horizon):
+def _walk(fields, marks, ground, window, ends, n_route, horizon):
     """Find a path along the route of the last fields, window by window.
 
     A window leads from where the path ends to the surviving cell of the first field of the route
@@ -225,8 +299,10 @@ def _walk(fields, marks, ground, number, ends, n_route, horizon):
 
     Parameters
     ----------
-    fields, marks, ground, number
+    fields, marks, ground
         As in `descend`.
+    window
+        The number before that of the first window.
     ends
         Flat cells of start and goal.
     n_route
@@ -245,7 +321,7 @@ def _walk(fields, marks, ground, number, ends, n_route, horizon):
     path, n_path, expanded = np.empty(1024, np.int32), 1, 0
     path[0] = start
     base = fields.starts[fields.starts.size - 2]
-    cell, at, window = np.int64(start), n_route - 1, np.int64(number)
+    cell, at = np.int64(start), n_route - 1
     while cell != goal:
         # The route is listed backwards.
         reached, ahead, to = marks.cost[marks.listed[at]], FARTHEST * horizon, at
@@ -330,10 +406,17 @@ def descend(fields, marks, ground, number, ends, rings, horizon, named):
         for k in range(last, 0, -1):
             chain[k - 1, side] = fields.parent[chain[k, side]]
 
-    n_listed = n_route = 0
+    n_listed = n_route = np.int64(0)
     for k in range(last + 1):
         at_level = (chain[k, 0], chain[k, 1])
-        effort = _search(fields, marks, number, at_level, goal_at, k > 0)
+        if k == 0:
+            aim = (at_level[1], np.int64(-1), float(goal_at[0]), float(goal_at[1]))
+            marks.cost[at_level[0]] = 0.0
+            effort, _ = _search(fields, marks, (number, number), at_level[0], aim, False)
+        else:
+            effort, told[1] = _search_below(
+                fields, marks, (number, told[1]), at_level, goal_at, n_route
+            )
         if effort < 0:
             told[0] = effort
             return route, path
@@ -347,7 +430,7 @@ def descend(fields, marks, ground, number, ends, rings, horizon, named):
         told[4] += fields.areas[marks.listed[i] - starts[last]]
     if horizon > 0:
         path, told[1], told[3], told[5] = _walk(
-            fields, marks, ground, number, ends, n_route, horizon
+            fields, marks, ground, told[1], ends, n_route, horizon
         )
         if path.shape[0] == 0:
             told[0] = told[1]
