@@ -159,7 +159,7 @@ def draw_potential(file: Path) -> None:
     """Draw the potential in the proof of a shortest path of cells, and that path."""
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    proof = hn.HybridPlanner(topology, preset="octile").plan(START, GOAL).proof()
+    proof = hn.prove(hn.HybridPlanner(topology, preset="octile").plan(START, GOAL))
     walls = np.pad(~grid.enterable(), 1, constant_values=True)
     factors = np.full(walls.shape, check_proof.ONE)
     path = check_proof.walk(*proof["path"])
@@ -187,7 +187,7 @@ def draw_cut(file: Path) -> None:
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     shut = hn.Blocked(polygons=[BARRIER])
-    proof = hn.HybridPlanner(topology).plan(START, GOAL, blocked=shut).proof()
+    proof = hn.prove(hn.HybridPlanner(topology).plan(START, GOAL, blocked=shut))
     chain = grid.frame.points_of(check_proof.walk(*proof["chain"]) - 1)
     ax = plot_map(grid, title="A closed chain of walls round the goal")
     ax.plot(*chain.T, color="crimson", linewidth=1.2)

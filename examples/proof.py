@@ -10,7 +10,7 @@ from hybridnav.viz import plot_plan, save_figure
 grid = hn.example_map("office", robot_radius_m=0.25)
 topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
 result = hn.HybridPlanner(topology).plan((1.0, 13.2), (40.6, 19.4))
-proof = result.proof()
+proof = hn.prove(result)
 Path("out/proof.json").write_text(json.dumps(proof), encoding="utf-8")
 print(f"{len(json.dumps(proof)) / 1000:.0f} kB for a path of {result.cost:.2f} m")
 

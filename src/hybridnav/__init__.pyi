@@ -12,6 +12,7 @@ from .guide import (
     plan_alternatives as plan_alternatives,
     plan_tour as plan_tour,
 )
+from .guide.words import words as words
 from .closures import (
     Blocked as Blocked,
     Journal as Journal,
@@ -56,12 +57,14 @@ from .planning import (
     Profile as Profile,
     load_preset as load_preset,
     preset_names as preset_names,
+    under as under,
 )
 from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc
 from .topology import TopologicalMap as TopologicalMap
 from .rooms import Door as Door, Rooms as Rooms, find_rooms as find_rooms
 from .rooms.files import load_rooms as load_rooms, save_rooms as save_rooms
 
+from .reasons import explain as explain, prove as prove
 from .route import Route as Route
 
 __version__: str

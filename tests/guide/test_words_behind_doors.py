@@ -42,7 +42,7 @@ def far_from_door(degrees: float, reach_m: float = 3.6) -> tuple[float, float]:
 def words_at_door(into: float, out: float) -> str:
     """The sentence of the door, of a path that comes and leaves by these angles."""
     comes = far_from_door(180.0 - into, reach_m=6.0)
-    return halls().plan((comes[0], comes[1]), far_from_door(out)).words()[1]
+    return hn.words(halls().plan((comes[0], comes[1]), far_from_door(out)))[1]
 
 
 @pytest.mark.parametrize("hand", [1, -1])
@@ -90,7 +90,7 @@ def test_a_turn_into_a_door_is_not_told_again_behind_it(x: float) -> None:
     """The direction behind it is that of somebody who looks out of it."""
     topology = topology_of(RECEDING)
     result = hn.HybridPlanner(topology).plan((14.25, 0.75), (x, 7.25))
-    line = result.words()[1]
+    line = hn.words(result)[1]
     assert "door on the right (door 1) into the hall" in line
     assert not line.endswith("right")
     check([judged(topology, result)], least_turns=0)
@@ -101,7 +101,7 @@ def test_a_route_that_starts_in_a_doorway_has_its_turn(preset: str) -> None:
     """The nearest point of the hall to a goal in the kitchen lies in the door."""
     planner = hn.HybridPlanner(halls().topology, preset=preset)
     result = planner.plan("hall", (14.5, 4.5))
-    assert result.words()[1].endswith("into the kitchen, then left")
+    assert hn.words(result)[1].endswith("into the kitchen, then left")
     assert all(np.isfinite([one.at_m, one.after_m]).all() for one in result.instructions)
     ends = planner.plan((14.5, 4.5), "hall")
     assert not any(

@@ -128,7 +128,7 @@ class Proving:
 
     def proof(self, result: hn.PlanResult) -> dict[str, Any]:
         """Return the proof."""
-        return result.proof()
+        return hn.prove(result)
 
 
 class ProvingTooMuch(Proving):
@@ -136,7 +136,7 @@ class ProvingTooMuch(Proving):
 
     def proof(self, result: hn.PlanResult) -> dict[str, Any]:
         """Return a false proof."""
-        proof = result.proof()
+        proof = hn.prove(result)
         return {**proof, "bound": proof.get("bound", 0) * 1.01}
 
 
@@ -147,7 +147,7 @@ class ProvingAnother(Proving):
         """Return the proof of the way back."""
         assert result.start is not None
         assert result.goal is not None
-        return self.planner.plan(result.goal, result.start).proof()
+        return hn.prove(self.planner.plan(result.goal, result.start))
 
 
 @pytest.mark.parametrize(

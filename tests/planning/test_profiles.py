@@ -43,19 +43,19 @@ def clinic(uses: dict[str, hn.RoomUse], *, radius_m: float = 0.0, **how: Any) ->
 
 def test_a_chain_of_private_rooms_is_open_for_the_room_behind_it_alone() -> None:
     planner = clinic({"ward a": PRIVATE, "bath": PRIVATE})
-    visitor = planner.under("visitor")
-    assert visitor is planner.under("visitor")
+    visitor = hn.under(planner, "visitor")
+    assert visitor is hn.under(planner, "visitor")
     for pair in (("hall", "bath"), ("bath", "ward b"), ("bath", "ward a"), ("hall", "hall")):
         result = visitor.plan(*pair)
         assert (result.status, result.gap) == (hn.PlanStatus.SOLVED, 0.0)
         assert result.cost == planner.plan(*pair).cost
         assert result.settings["profile"]["name"] == "visitor"
-    behind = clinic({"ward a": PRIVATE}).under("visitor").plan("hall", "bath")
+    behind = hn.under(clinic({"ward a": PRIVATE}), "visitor").plan("hall", "bath")
     assert behind.status is hn.PlanStatus.NO_PATH
     assert behind.settings["profile"]["forbids"] == (
         "profile visitor forbids every route: the way is by private rooms (ward a)"
     )
-    assert clinic({"ward a": PRIVATE}).under("staff").plan("hall", "bath").solved
+    assert hn.under(clinic({"ward a": PRIVATE}), "staff").plan("hall", "bath").solved
 
 
 def drawn(ink: tuple[str, ...]) -> hn.HybridPlanner:
@@ -82,11 +82,11 @@ def test_a_way_through_the_second_part_of_an_own_room_opens_no_other_private_roo
     )
     start, goal = (0.75, 2.25), (4.25, 1.25)
     for pair in ((start, goal), (goal, start)):
-        visitor = drawn(ink).under("visitor")
+        visitor = hn.under(drawn(ink), "visitor")
         path = visitor.plan(*pair).path
         assert path is not None
         assert "B" not in {ink[::-1][row][col] for row, col in path.cells.tolist()}
-        shut = drawn((*ink[:4], "#hhhh##kk#", ink[5])).under("visitor")
+        shut = hn.under(drawn((*ink[:4], "#hhhh##kk#", ink[5])), "visitor")
         assert shut.plan(*pair).solved, "B must be crossed, for there is no other way"
 
 
@@ -96,7 +96,7 @@ def test_ways_of_a_visitor_are_those_of_all_ways_over_parts(seed: int) -> None:
     rng = np.random.default_rng(seed)
     blocks = rng.choice(list("ABCDhk#"), (3, 4))
     ink = tuple("".join(row) for row in blocks.tolist())
-    planner = drawn(ink).under("visitor")
+    planner = hn.under(drawn(ink), "visitor")
     graph: nx.Graph[tuple[int, int]] = nx.grid_2d_graph(3, 4)
     graph.remove_nodes_from([(r, c) for r, c in list(graph) if blocks[r, c] == "#"])
     part_at: dict[tuple[int, int], tuple[int, int]] = {}
@@ -125,7 +125,7 @@ def test_ways_of_a_visitor_are_those_of_all_ways_over_parts(seed: int) -> None:
 
 def test_a_door_must_be_as_wide_as_the_profile() -> None:
     planner = clinic({})
-    wide = planner.under(Profile(name="bed", width_m=0.8))
+    wide = hn.under(planner, Profile(name="bed", width_m=0.8))
     assert wide.grid.robot_radius_m == pytest.approx(0.4, abs=1e-5)
     assert wide.plan("hall", "ward a").solved
     refused = wide.plan("hall", "ward b")
@@ -137,14 +137,14 @@ def test_a_door_must_be_as_wide_as_the_profile() -> None:
     for one in planner.topology.rooms.doors[:2]:
         for width_m in (0.3, 0.5, 0.55, 0.8, 1.0, 1.05, 1.4):
             profile = Profile(name="w", width_m=width_m)
-            solved = planner.under(profile).plan(str(one.rooms[0]), str(one.rooms[1])).solved
+            solved = hn.under(planner, profile).plan(str(one.rooms[0]), str(one.rooms[1])).solved
             assert solved is (width_m <= one.width_m + 1e-9), (one.rooms, width_m)
 
 
 def test_the_room_of_the_goal_has_room_to_turn() -> None:
     planner = clinic({"bath": PRIVATE})
     for turn_m, fits in ((1.5, True), (2.4, True), (3.2, False)):
-        chair = planner.under(Profile(name="chair", turn_m=turn_m))
+        chair = hn.under(planner, Profile(name="chair", turn_m=turn_m))
         assert chair.plan("hall", "bath").solved is fits
         assert chair.plan("hall", (5.25, 3.75)).solved is fits
         assert chair.plan("bath", "hall").solved is (turn_m < 1.9)
@@ -155,7 +155,7 @@ def test_the_room_of_the_goal_has_room_to_turn() -> None:
 def test_costs_and_corridors_are_factors_of_metres() -> None:
     uses = {"hall": hn.RoomUse(corridor=True), "ward a": hn.RoomUse(cost=3.0)}
     planner = clinic(uses)
-    visitor = planner.under("visitor")
+    visitor = hn.under(planner, "visitor")
     result = visitor.plan((2.25, 4.25), (1.75, 1.25))
     assert result.metric == "weighted"
     assert result.gap == pytest.approx(0.0, abs=1e-12)
@@ -166,14 +166,14 @@ def test_costs_and_corridors_are_factors_of_metres() -> None:
     assert set(factors["hall"]) == {1.0}
     assert set(factors["ward a"]) == {4.5}
     assert set(factors["bath"]) == {1.5}
-    assert planner.under(Profile(name="plain", costs=False)).costs is None
-    robot = clinic(uses, preset="robot").under("visitor")
+    assert hn.under(planner, Profile(name="plain", costs=False)).costs is None
+    robot = hn.under(clinic(uses, preset="robot"), "visitor")
     assert robot.preset.name == "robot"
     assert robot.plan("hall", "ward a").gap < 0.5
 
 
 def test_tours_alternatives_words_and_batches_heed_the_profile() -> None:
-    planner = clinic({"ward a": PRIVATE}).under("visitor")
+    planner = hn.under(clinic({"ward a": PRIVATE}), "visitor")
     tour = hn.plan_tour(planner, ["hall", "ward a", "hall"])
     assert tour.solved
     assert any("ward a" in line for line in tour.words())
@@ -190,11 +190,11 @@ def test_tours_alternatives_words_and_batches_heed_the_profile() -> None:
 
 def test_a_planner_under_a_profile_is_made_anew_after_an_update() -> None:
     planner = clinic({"ward a": PRIVATE}, preset="grid-astar")
-    before = planner.under("visitor")
+    before = hn.under(planner, "visitor")
     slow = hn.CostLayer(np.full(planner.grid.shape, 2.0))
     planner.update(costs=slow) if planner.costs else None
     planner.update(topology=clinic({}, preset="grid-astar").topology)
-    after = planner.under("visitor")
+    after = hn.under(planner, "visitor")
     assert after is not before
     assert after.plan("hall", "bath").solved
 
@@ -255,7 +255,7 @@ def test_no_route_of_a_visitor_leads_through_private_rooms_of_the_office() -> No
     ]
     points = {name: topology.rooms.point_of(name) for name in shown}
     planner = hn.HybridPlanner(topology)
-    visitor = planner.under(Profile(name="visitor"))
+    visitor = hn.under(planner, Profile(name="visitor"))
 
     def passed(one: str, other: str, path: Any) -> set[str]:
         found = set(labels.label_of[tuple(path.cells.T)].tolist()) - {-1}

@@ -55,7 +55,7 @@ def test_true_proofs_are_accepted_and_altered_ones_are_not(preset):
             at = grid.frame.cells_of(pair)
             shut = shut[~(shut[:, None] == at).all(axis=2).any(axis=1)]
             result = planner.plan(*pair, blocked={"cells": shut} if n % 2 else None)
-            proof = json.loads(json.dumps(result.proof(), allow_nan=False))
+            proof = json.loads(json.dumps(hn.prove(result), allow_nan=False))
             said = check_proof.check(grid.measured, frame_of(grid), proof)
             assert said.startswith("path" if result.solved else "no path")
             if result.solved and preset != "robot":
@@ -90,7 +90,7 @@ def test_ends_on_the_corners_of_cells_beside_walls_are_proved(preset):
         for pair in rng.choice(len(cells), (8, 2)):
             ends = np.round(cells[pair][:, ::-1] * 0.05, 2)
             below += int((grid.frame.positions_of(ends) < cells[pair]).any())
-            proof = planner.plan(*ends).proof()
+            proof = hn.prove(planner.plan(*ends))
             assert check_proof.check(grid.measured, frame_of(grid), proof)
             assert proof.get("bound", 0) <= proof.get("cost", 0)
     assert below
@@ -100,17 +100,17 @@ def test_ends_on_the_corners_of_cells_beside_walls_are_proved(preset):
 def test_a_bound_above_the_cost_is_no_proof(preset):
     grid = hn.OccupancyGrid(np.zeros((9, 9), np.float32), hn.Frame(0.5), robot_radius_m=0)
     result = planner_of(grid, preset).plan((0.75, 0.75), (3.25, 2.25))
-    assert result.proof()["bound"] <= result.cost
+    assert hn.prove(result)["bound"] <= result.cost
     vars(result)["lower_bound"] = 2 * result.cost
     if preset == "robot":  # its proof finds a bound of its own
-        assert result.proof()["bound"] <= result.cost
+        assert hn.prove(result)["bound"] <= result.cost
     else:
         with pytest.raises(PlanError, match="a proof has the bound"):
-            result.proof()
+            hn.prove(result)
         # Two numbers of which one is above the other by a hair read so.
         vars(result)["lower_bound"] = result.cost * (1 + 1e-8)
         with pytest.raises(PlanError) as error:
-            result.proof()
+            hn.prove(result)
         bound, cost = map(float, re.findall(r"([0-9.]+) m[,:]", str(error.value)))
         assert bound > cost
 
@@ -162,7 +162,7 @@ def test_no_heights_prove_a_length_that_is_too_high(seed):
             result = planner.plan(*pair)
             if not result.solved or result.cost == 0:
                 continue
-            proof = result.proof()
+            proof = hn.prove(result)
             assert is_accepted(grid, proof)
             for _ in range(12):
                 count += 1
@@ -190,7 +190,7 @@ def test_no_line_slips_through_a_wall(line):
     kinds = np.array([[cell == "." for cell in row] for row in SLITS], np.uint8)
     grid = grid_of(kinds)
     ends = grid.frame.points_of([[1, 1], [2, 2]])
-    proof = hn.HybridPlanner(map_of(grid)).plan(*ends).proof()
+    proof = hn.prove(hn.HybridPlanner(map_of(grid)).plan(*ends))
     assert is_accepted(grid, proof)
     assert proof["line"][0] == pytest.approx([1.5, 1.5])
     length = float(np.hypot(*np.diff(np.array(line), axis=0).T).sum()) * grid.resolution_m
@@ -384,7 +384,7 @@ def run_script(*arguments):
 def test_the_script_says_of_every_file_what_it_makes_of_it(tmp_path):
     grid = hn.OccupancyGrid(np.zeros((4, 5), np.float32), hn.Frame(0.5), robot_radius_m=0)
     hn.write_ros_map(grid, file := tmp_path / "original.yaml")
-    proof = hn.HybridPlanner(map_of(grid)).plan((0.1, 0.1), (2.1, 1.1)).proof()
+    proof = hn.prove(hn.HybridPlanner(map_of(grid)).plan((0.1, 0.1), (2.1, 1.1)))
     good, other = tmp_path / "proof.json", tmp_path / "other.json"
     good.write_text(json.dumps(proof))
     code, said = run_script(file, good)
@@ -419,7 +419,7 @@ def test_proofs_of_ends_on_the_edge_of_a_turned_map_are_accepted(preset):
         result = hn.HybridPlanner(map_of(grid), preset=preset).plan(*ends)
         if result.solved:  # else rounding laid an end outside of the map
             count += 1
-            assert is_accepted(grid, json.loads(json.dumps(result.proof())))
+            assert is_accepted(grid, json.loads(json.dumps(hn.prove(result))))
     assert count > 15
 
 
@@ -427,17 +427,17 @@ def test_no_proof_is_made_of_what_has_none():
     grid = grid_of(np.ones((5, 5), int), corner_cutting=True)
     pair = grid.frame.points_of([[0, 0], [4, 4]])
     with pytest.raises(PlanError, match="corners may be cut"):
-        hn.HybridPlanner(map_of(grid), preset="octile").plan(*pair).proof()
+        hn.prove(hn.HybridPlanner(map_of(grid), preset="octile").plan(*pair))
     grid = grid_of(np.ones((5, 5), int))
     planner = hn.HybridPlanner(map_of(grid))
     with pytest.raises(PlanError, match="no proof is known of 'start outside the map'"):
-        planner.plan((0, 0), pair[1]).proof()
+        hn.prove(planner.plan((0, 0), pair[1]))
     copied = pickle.loads(pickle.dumps(planner.plan(*pair)))  # noqa: S301 - our own
     with pytest.raises(PlanError, match="copies of a result have no proof"):
-        copied.proof()
+        hn.prove(copied)
     layer = hn.CostLayer(np.full((5, 5), 2.0))
     with pytest.raises(PlanError, match="costs of the kind 'array'"):
-        hn.HybridPlanner(map_of(grid), preset="grid-astar", costs=layer).plan(*pair).proof()
+        hn.prove(hn.HybridPlanner(map_of(grid), preset="grid-astar", costs=layer).plan(*pair))
 
 
 @pytest.mark.parametrize(
@@ -473,7 +473,7 @@ def test_hostile_values_are_rejected(key, value, why):
     planner = hn.HybridPlanner(
         map_of(grid), preset="grid-astar", costs=hn.CostLayer.clearance(grid)
     )
-    proof = planner.plan((0.5, 0.5), (2.0, 2.5)).proof()
+    proof = hn.prove(planner.plan((0.5, 0.5), (2.0, 2.5)))
     said = check_proof.check(grid.measured, frame_of(grid), {**proof, "allow_unexplored": 1})
     assert "unexplored" not in said  # as only `true` lets paths through them
     value = proof["costs"] | value if key == "costs" else value
@@ -491,7 +491,7 @@ def test_any_other_json_is_rejected_in_one_line(text):
 def test_the_proof_of_robot_is_as_good_as_its_bound():
     grid = hn.example_map("office", robot_radius_m=0.25)
     result = hn.HybridPlanner(map_of(grid), preset="robot").plan((1.0, 13.2), (40.6, 19.4))
-    proof = result.proof()
+    proof = hn.prove(result)
     assert is_accepted(grid, proof)
     assert proof["bound"] >= result.lower_bound > 48
 
@@ -510,7 +510,7 @@ def test_no_bound_of_a_line_by_costs_is_above_the_cheapest_path_by_brute_force()
                 continue
             start, goal = map(tuple, grid.frame.positions_of(pair).tolist())
             cheapest = oracle.cost(start, goal) * grid.resolution_m
-            gaps.append(cheapest / result.proof()["bound"] - 1)
+            gaps.append(cheapest / hn.prove(result)["bound"] - 1)
     assert len(gaps) > 10
     assert min(gaps) > -1e-6
     assert np.median(gaps) < 0.4  # factors of 1 to 3 side by side, and ends that are no corners

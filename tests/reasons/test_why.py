@@ -191,14 +191,14 @@ def test_closures_of_every_kind_are_named_and_counted():
         "keepout": [band],
         "rooms": ["high"],
     }
-    why = planner.explain(start, goal, blocked={"doors": [one, other], "keepout": [band]})
+    why = hn.explain(planner, start, goal, blocked={"doors": [one, other], "keepout": [band]})
     assert set(why.to_open) == {
         Closure("doors", one),
         Closure("doors", other),
         Closure("keepout", 0),
     }
     assert "no fewer suffice" in why.reason
-    ended = planner.explain(start, goal, blocked=blocked)
+    ended = hn.explain(planner, start, goal, blocked=blocked)
     assert [end.closures for end in ended.blocked_ends] == [(Closure("rooms", "high"),)]
     assert "room high" in ended.reason
     single = planner.plan(start, goal, blocked={"doors": [one]})
@@ -221,7 +221,7 @@ def test_a_closed_door_lets_no_smaller_robot_through():
     free = why_of(planner.plan(start, goal))
     assert free.closed.radius_m == grid.resolution_m
     assert free.to_open == ()
-    shut = planner.explain(start, goal, blocked={"doors": [door.number]})
+    shut = hn.explain(planner, start, goal, blocked={"doors": [door.number]})
     assert shut.closed.radius_m == 0
     assert shut.opened == free.opened
     assert "even with nothing closed" in shut.reason
@@ -287,15 +287,18 @@ def test_hostile_questions_end_in_one_line():
     radii: list[Any] = [-1.0, math.nan, math.inf, "wide"]
     for radius in radii:
         with pytest.raises(InvalidValueError, match=r"\A[^\n]+\Z"):
-            planner.explain((0.1, 0.1), (0.2, 0.1), radius_m=radius)
+            hn.explain(planner, (0.1, 0.1), (0.2, 0.1), radius_m=radius)
     with pytest.raises(InvalidValueError, match="language must be one of"):
-        planner.explain((0.1, 0.1), (0.2, 0.1)).words("xx")
+        hn.explain(planner, (0.1, 0.1), (0.2, 0.1)).words("xx")
 
 
 def test_a_found_room_is_not_called_a_room_twice():
     grid = hn.example_map("figure1")
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
-    why = hn.HybridPlanner(topology).explain(
-        (0.5, 0.5), (2.0, 2.5), blocked={"rooms": [topology.rooms.at((0.5, 0.5))]}
+    why = hn.explain(
+        hn.HybridPlanner(topology),
+        (0.5, 0.5),
+        (2.0, 2.5),
+        blocked={"rooms": [topology.rooms.at((0.5, 0.5))]},
     )
     assert why.reason.startswith("The start is closed by room-")

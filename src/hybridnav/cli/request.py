@@ -98,7 +98,7 @@ class Request:
         with stage("preparing the planner", seconds, "prepare"):
             planner = model.planner(settings, topology=topology, costs=costs)
             if self.profile is not None:
-                planner = planner.under(self.profile)
+                planner = hn.under(planner, self.profile)
                 topology, grid = planner.topology, planner.grid
         outcome = self._planned(planner, closed, seconds)
         found = self._alternatives(planner, closed, seconds)
@@ -115,7 +115,7 @@ class Request:
             extension("formats", "bag").save_bag(self.bag, [outcome], grid=grid)
         if self.proof is not None:
             result = outcome if isinstance(outcome, hn.PlanResult) else outcome.results[0]
-            text = json.dumps(result.proof(), separators=(",", ":"), allow_nan=False)
+            text = json.dumps(hn.prove(result), separators=(",", ":"), allow_nan=False)
             replace_file(self.proof, text.encode())
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
@@ -213,7 +213,7 @@ class Request:
         with stage("explaining", seconds, "why"):
             found = [
                 explain_solved(
-                    planner.explain, (one.start, one.goal), named, blocked=_closed_for(one, closed)
+                    planner, (one.start, one.goal), named, blocked=_closed_for(one, closed)
                 )
                 for one, named in zip(results, self._named(planner, outcome), strict=False)
                 if one.start is not None and one.goal is not None and one.solved == outcome.solved

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.guide.words import sentences
-from hybridnav.guide.words.itinerary import heading_of, waypoint_text
+from hybridnav.guide.words.itinerary import guide_of, heading_of, waypoint_text
 from hybridnav.planning import PlanStatus
 
 if TYPE_CHECKING:
@@ -262,13 +262,14 @@ def tour_of(
     least one; only the last may be unsolved; `waypoints`: points or names, one more than plans if
     all are solved.
     """
-    if not results[-1].solved or planner.guide is None:
+    guide = guide_of(planner) if results[-1].solved else None
+    if guide is None:
         return Tour(tuple(results), ())
     paths = [result.path for result in results if result.path is not None]
     legs = [
-        planner.guide.legs(path, waypoint=waypoint_text(waypoint))
+        guide.legs(path, waypoint=waypoint_text(waypoint))
         for path, waypoint in zip(paths, waypoints[1:], strict=True)
     ]
     heading_rad = heading_of(results[0].start)
-    instructions = planner.guide.instructions(paths, legs, heading_rad=heading_rad)
+    instructions = guide.instructions(paths, legs, heading_rad=heading_rad)
     return Tour(tuple(results), tuple(itertools.chain(*legs)), instructions)

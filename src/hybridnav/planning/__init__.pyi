@@ -1,6 +1,6 @@
 from .batch import PlanBatch as PlanBatch
 from .path import Path as Path
-from .planner import HybridPlanner as HybridPlanner
+from .planner import HybridPlanner as HybridPlanner, under as under
 from .preset import (
     LimitSettings as LimitSettings,
     Preset as Preset,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.renamed import renamed
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
@@ -21,7 +22,8 @@ from hybridnav.planning.methods import make_method
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.planning import Planning
 from hybridnav.planning.preset import check_radius
-from hybridnav.planning.questions import Questions, explained
+from hybridnav.planning.questions import Questions
+from hybridnav.planning.result import Unanswered
 from hybridnav.planning.settings import OmplPlannerSettings
 from hybridnav.topology.map import no_places
 
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.closures.blocked import Closable
-    from hybridnav.guide.words.itinerary import Guide
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlanBatch, PlanResult
@@ -147,30 +148,8 @@ class HybridPlanner(Questions):
         """The search that its preset names, on the map now."""
         return self._now.method
 
-    def under(self, profile: Profile | str) -> HybridPlanner:
-        """Return a planner of the same map under a profile, also for tours and alternatives.
-
-        Results are proved for its problem. It is made once, and again after an `update`.
-
-        Parameters
-        ----------
-        profile
-            A `Profile`, or the name of one of `PROFILES`: visitor, staff, wheelchair, cart.
-
-        Raises
-        ------
-        InvalidValueError
-            When there is none of the name, or the map has no rooms.
-
-        Examples
-        --------
-        >>> grid, uses = hn.example_map("figure1"), {"ward": hn.RoomUse(private=True)}
-        >>> rooms = hn.RoomLabels(("hall", "ward"), np.indices(grid.shape)[1] // 20, uses=uses)
-        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
-        >>> visitor = hn.HybridPlanner(topology).under("visitor")
-        >>> print(visitor.plan("hall", "ward").status)
-        solved
-        """
+    def profiled(self, profile: Profile | str) -> HybridPlanner:
+        """Return a planner of the same map under a profile; see `hybridnav.under`."""
         from hybridnav.planning.private_rooms import Privacy  # noqa: PLC0415 - rare
         from hybridnav.planning.profile import ProfiledFloor, profile_of, under_profile  # noqa: PLC0415
 
@@ -183,9 +162,14 @@ class HybridPlanner(Questions):
             if (found[0], found[2]) != (own, given):
                 made = HybridPlanner(found[0], preset=found[1], costs=found[2])
             floor = ProfiledFloor.of(found[0], chosen, found[1].planner)
-            vars(made).update(_privacy=Privacy(chosen, [floor], whole=self), _profiled={})
+            made._privacy, made._profiled = Privacy(chosen, [floor], whole=self), {}
             kept = self._profiled[chosen] = now, made
         return kept[1]
+
+    def under(self, profile: Profile | str) -> HybridPlanner:
+        """Return `hybridnav.under(planner, profile)`: write that."""
+        renamed("HybridPlanner.under(...)", "hybridnav.under(planner, ...)")
+        return self.profiled(profile)
 
     def _closing(
         self, waypoints: Sequence[ArrayLike | str], blocked: Closable | ClosedCells | None
@@ -199,11 +183,6 @@ class HybridPlanner(Questions):
         """The structure built for queries: a mesh or a jump-point graph. None before that, with
         presets that build none, and for the lattice, which changes with the costs."""
         return self._now.method.prepared
-
-    @property
-    def guide(self) -> Guide | None:
-        """The source of descriptions for a person; None on a map without rooms."""
-        return self._now.guide
 
     @property
     def needs_headings(self) -> bool:
@@ -284,7 +263,7 @@ class HybridPlanner(Questions):
                 result = now.near(request, result, within_m)
         if not result.solved and (result.path is None or result.ends_well):
             ends = result.start, result.goal
-            result = replace(result, why_source=partial(explained, now, ends, closed))
+            result = replace(result, why_source=Unanswered(now, ends, closed))
         return result if own is None else own.stated(result, (start, goal), blocked)
 
     def _query(self) -> AbstractContextManager[bool]:
@@ -459,3 +438,32 @@ class HybridPlanner(Questions):
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return closed cells with cells that the costs close for all queries."""
         return self._now.closed_for_all(closed)
+
+
+def under(planner: HybridPlanner, profile: Profile | str) -> HybridPlanner:
+    """Return a planner of the same map under a profile, also for tours and alternatives.
+
+    Results are proved for its problem. It is made once, and again after an `update`.
+
+    Parameters
+    ----------
+    planner
+        A planner on a map with rooms.
+    profile
+        A `Profile`, or the name of one of `PROFILES`: visitor, staff, wheelchair, cart.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is none of the name, or the map has no rooms.
+
+    Examples
+    --------
+    >>> grid, uses = hn.example_map("figure1"), {"ward": hn.RoomUse(private=True)}
+    >>> rooms = hn.RoomLabels(("hall", "ward"), np.indices(grid.shape)[1] // 20, uses=uses)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    >>> visitor = hn.under(hn.HybridPlanner(topology), "visitor")
+    >>> print(visitor.plan("hall", "ward").status)
+    solved
+    """
+    return planner.profiled(profile)

@@ -28,7 +28,7 @@ from hybridnav.planning.endpoints import (
 )
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planning.path import path_of
-from hybridnav.planning.result import PlanDraft
+from hybridnav.planning.result import PlanDraft, Walk
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import FloatArray
     from hybridnav.closures.blocked import Closable
-    from hybridnav.guide.words.itinerary import Guide
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning import PlanBatch, Preset
     from hybridnav.planning.costs import PlannerCosts
@@ -344,9 +343,9 @@ class Planning:
             path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
             least = self._bound(query, found, path.length_m)
             result = self._solved(request, found, path, least, metric=metric)
-        if result.path is None or not result.solved or self.guide is None:
+        if result.path is None or not result.solved or not self.has_rooms:
             return result
-        source = self.guide.of(result.path, request.goal, request.poses[0].tolist())
+        source = Walk(self.built, request.goal, request.poses[0].tolist())
         return replace(result, instruction_source=source)
 
     def _in_sight(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
@@ -513,15 +512,10 @@ class Planning:
             **costs,
         }
 
-    @cached_property
-    def guide(self) -> Guide | None:
-        """The source of descriptions for a person; None on a map without rooms."""
-        if self.topology is None or self.topology.pyramid.rooms is None:
-            return None
-        # Loads modules that plans without rooms do not need.
-        from hybridnav.guide.words.itinerary import Guide  # noqa: PLC0415
-
-        return Guide(self.topology.rooms)
+    @property
+    def has_rooms(self) -> bool:
+        """Whether the map has rooms, so that words tell of its paths."""
+        return self.topology is not None and self.topology.pyramid.rooms is not None
 
     # Many queries at once: those that look-ups answer in one kernel, the others one by one.
 

@@ -245,12 +245,16 @@ class Privacy:
 
         def passed(other: Profile) -> list[str] | None:
             """Return what a path under another profile passes."""
-            planner = self._whole.under(other)
+            planner = self._whole.profiled(other)
             path = planner.draft(*ends, blocked=blocked).result().path
-            if path is None or planner.guide is None:
+            # Loads modules that plans without a profile do not need.
+            from hybridnav.guide.words.itinerary import guide_of  # noqa: PLC0415
+
+            guide = guide_of(planner)
+            if path is None or guide is None:
                 return None
             rooms = planner.topology.rooms.labels
-            return in_the_way(self.profile, rooms, planner.guide, path)
+            return in_the_way(self.profile, rooms, guide.doors(path), path)
 
         facts = {"name": self.profile.name, "asks": self.profile.described}
         if not result.solved and not isinstance(blocked, ClosedCells):

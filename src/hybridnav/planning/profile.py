@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from hybridnav._base.typing import BoolArray
-    from hybridnav.guide.words.itinerary import Guide
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.planning import PlannerSettings, Preset
     from hybridnav.planning.path import Path
+    from hybridnav.rooms import Door
     from hybridnav.search.found import ClosedCells
 
 _MOST_ELSEWHERE, _MOST_M = 10.0, 100.0
@@ -270,23 +270,22 @@ def forbidden(profile: Profile, passed: Callable[[Profile], list[str] | None]) -
 def in_the_way(
     profile: Profile,
     rooms: RoomLabels,
-    guide: Guide,
+    doors: Sequence[Door],
     path: Path,
     *,
     whole: tuple[bool, bool] = (True, True),
 ) -> list[str]:
     """Return what a path passes that a profile does not allow: private rooms, narrow doors.
 
-    `rooms`, `guide`: the rooms of the map, and what tells the doors of a path; `path`: a path under
-    another profile; `whole`: whether the route begins where the path begins, and ends where it
-    ends: it may do so in any room.
+    `rooms`: the rooms of the map; `path`: a path under another profile, with the `doors` it passes;
+    `whole`: whether the route begins where the path begins, and ends where it ends: it may do so in
+    any room.
     """
     labels = rooms.label_of[tuple(path.cells.T)].tolist()
     own = {labels[place] for place, is_end in zip((0, -1), whole, strict=True) if is_end}
     inner = [label for label in labels if label != NO_ROOM and label not in own]
     names = [rooms.names[label] for label in dict.fromkeys(inner)]
     private = [name for name in names if rooms.uses.get(name, RoomUse()).private]
-    doors = [leg.door for leg in guide.legs(path) if leg.door is not None]
     narrow = [
         f"{door.kind} {door.number}, {door.width_m:.2f} m wide"
         for door in doors

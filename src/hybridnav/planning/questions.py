@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.renamed import renamed
 from hybridnav.errors import InvalidValueError
 from hybridnav.planning import PlanStatus
 from hybridnav.planning.endpoints import read_points
+from hybridnav.planning.result import Unanswered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.closures.blocked import Closable
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlanBatch
+    from hybridnav.planning import HybridPlanner, PlanBatch
     from hybridnav.planning.planning import Planning
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.reasons.why import Explanation
@@ -83,6 +85,17 @@ class Questions:
                 closed = self._closing([start, goal], blocked)
             return _distance(now, now.read(start, goal, None, closed, "anywhere"))
 
+    def asked(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        blocked: Closable | ClosedCells | None,
+    ) -> Unanswered:
+        """Return what the reasons of a query are found from; see `hybridnav.explain`."""
+        with self._query():
+            now, closed = self._now, self._closing([start, goal], blocked)
+            return Unanswered(now, now.read(start, goal, None, closed, "point").poses, closed)
+
     def explain(
         self,
         start: ArrayLike | str,
@@ -91,34 +104,11 @@ class Questions:
         blocked: Closable | ClosedCells | None = None,
         radius_m: float | None = None,
     ) -> Explanation:
-        """Explain why there is a path between two points or none, and what would have to change.
+        """Return `hybridnav.explain(planner, start, goal, ...)`: write that."""
+        renamed("HybridPlanner.explain(...)", "hybridnav.explain(planner, ...)")
+        from hybridnav.reasons.why import explain  # noqa: PLC0415 - an old name alone needs it
 
-        It finds the widest path, the fewest closures to open, and whether unexplored cells could
-        help: exactly, for a disc on the cells of the map. Dropped islands count as free.
-
-        Parameters
-        ----------
-        start, goal, blocked
-            As in `plan`; a room stands for its point.
-        radius_m
-            The robot's radius in metres, >= 0; None for the map's.
-
-        Raises
-        ------
-        InvalidValueError
-            As in `plan`, and when the radius is no number >= 0.
-
-        Examples
-        --------
-        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-        >>> planner = hn.HybridPlanner(topology)
-        >>> print(planner.explain((0.5, 0.5), (-2.0, 2.5)).words("de")[0])
-        Das Ziel liegt außerhalb der Karte.
-        """
-        with self._query():
-            now, closed = self._now, self._closing([start, goal], blocked)
-            poses = now.read(start, goal, None, closed, "point").poses
-            return explained(now, poses, closed, radius_m)
+        return explain(cast("HybridPlanner", self), start, goal, blocked=blocked, radius_m=radius_m)
 
     def distances(
         self,
@@ -298,10 +288,3 @@ class _Nearest:
         kept = np.isfinite(self._cost)
         begin = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
         return sparse.csr_array((self._cost[kept], self._to[kept], begin), shape=self._shape)
-
-
-def explained(now: Planning, ends: Any, blocked: Any, radius_m: float | None = None) -> Explanation:
-    """Explain a query; see `Questions.explain`."""
-    from hybridnav.reasons.why import explain  # noqa: PLC0415 - plans do not need shapely
-
-    return explain(now, ends, blocked, radius_m=radius_m)

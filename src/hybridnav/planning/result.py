@@ -6,30 +6,35 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from hybridnav._base.copies import on_demand
+from hybridnav._base.renamed import renamed
 from hybridnav._base.trig import dist
 from hybridnav.errors import PlanError
-from hybridnav.guide.words import sentences
 from hybridnav.route.route import Route
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from numpy.typing import ArrayLike
     from typing_extensions import Self
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.closures.blocked import Closable
     from hybridnav.guide.words import Instruction
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.path import Path
+    from hybridnav.planning.planning import Planning
     from hybridnav.planning.speed import MotionLimits
+    from hybridnav.reasons import Explanation
     from hybridnav.search.found import ClosedCells
+    from hybridnav.topology import TopologicalMap
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
@@ -75,30 +80,22 @@ class RouteSource(Protocol):
         ...
 
 
-class InstructionSource(Protocol):
-    """Data from which instructions are found when somebody reads them."""
+class Walk(NamedTuple):
+    """What the instructions of a path are found from, beside the path."""
 
-    def instructions(self) -> tuple[Instruction, ...]:
-        """Find the instructions."""
-        ...
+    topology: TopologicalMap
+    goal: ArrayLike | str
+    """As it was given: a point in metres, or a name."""
+    start: Sequence[float]
+    """`(x, y)`, or `(x, y, yaw)` of a robot with a heading."""
 
 
-class Reasons(Protocol):
-    """An `Explanation`, in `hybridnav.reasons.why`."""
+class Unanswered(NamedTuple):
+    """What the reasons of a query without a path are found from."""
 
-    @property
-    def reason(self) -> str:
-        """The reason in one line."""
-
-    @property
-    def cut(self) -> FloatArray | None:
-        """The cells that part both ends."""
-
-    def words(self, language: str = "en") -> list[str]:
-        """Return the reason in sentences."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
+    now: Planning
+    ends: tuple[Any, Any]
+    closed: Closable | ClosedCells | None
 
 
 Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
@@ -164,10 +161,10 @@ class PlanResult:
     line: FloatArray | None = field(default=None, repr=False)
     """float64 (m, 2), the straight lines of a path by method `cheapest` before its bends were
     rounded, `(x, y)` in metres, map frame; None of other paths."""
-    instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
+    instruction_source: Walk | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
-    why_source: Callable[[], Reasons] | Reasons | None = field(default=None, repr=False)
-    """The explanation, or how to find it."""
+    why_source: Unanswered | Explanation | None = field(default=None, repr=False)
+    """The explanation, or the data to find it from."""
     leaves_m: float | None = None
     """Metres from the start out of closed cells, which `leave_zone` opened; None of others."""
     proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
@@ -220,24 +217,34 @@ class PlanResult:
     def instructions(self) -> tuple[Instruction, ...]:
         """Instructions for a person; none without a path, and on a map without rooms."""
         source = self.instruction_source
-        return source if isinstance(source, tuple) else source.instructions()
+        if not isinstance(source, Walk) or self.path is None:
+            return source if not isinstance(source, Walk) else ()
+        from hybridnav.guide.words.itinerary import instructions_of_walk  # noqa: PLC0415 - with rooms
+
+        return instructions_of_walk(self.path, source)
 
     @cached_property
-    def explanation(self) -> Reasons | None:
+    def explanation(self) -> Explanation | None:
         """Why there is no path, found when it is read first, in about a second on a million cells;
         None with a path, and in batches."""
         source = self.why_source
-        return source() if callable(source) else source
+        if not isinstance(source, Unanswered):
+            return source
+        from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
+
+        return reasons_of(*source)
 
     @property
     def reason(self) -> str:
-        """Why the goal is not reached, in one line: see `HybridPlanner.explain`; empty if it is."""
+        """Why the goal is not reached, in one line: see `hybridnav.explain`; empty if it is."""
         return "" if self.explanation is None else self.explanation.reason
 
     def words(self, language: str = "en") -> list[str]:
-        """Return a description of the path for a person, as `Tour.words`; no lines without a path,
-        and on a map without rooms."""
-        return sentences(self.instructions, language)
+        """Return `hybridnav.words(result, language)`: write that."""
+        renamed("PlanResult.words(...)", "hybridnav.words(result, ...)")
+        from hybridnav.guide.words import words  # noqa: PLC0415 - an old name alone needs it
+
+        return words(self, language)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with what is found on demand, so that copies hold no map."""
@@ -308,34 +315,11 @@ class PlanResult:
         return self
 
     def proof(self) -> dict[str, Any]:
-        """Return a proof of the answer, plain values for strict JSON. It proves that the path is
-        free and has its cost, and that none costs less than its bound; or that there is no path.
+        """Return `hybridnav.prove(result)`: write that."""
+        renamed("PlanResult.proof()", "hybridnav.prove(result)")
+        from hybridnav.reasons.proofs import prove  # noqa: PLC0415 - an old name alone needs it
 
-        `check_proof.py`, which needs nothing of this package, accepts or rejects it: see
-        :doc:`/explanation/what-a-proof-is`.
-
-        Raises
-        ------
-        PlanError
-            When no proof of such an answer is known: if corners may be cut, for paths of OMPL and
-            copies of a result, and with costs other than clearance.
-
-        Examples
-        --------
-        >>> from hybridnav import check_proof
-        >>> grid = hn.example_map("figure1")
-        >>> planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
-        >>> proof = planner.plan((0.5, 0.5), (2.0, 2.5)).proof()
-        >>> origin = *grid.frame.origin_m, grid.frame.yaw_rad
-        >>> check_proof.check(grid.measured, [grid.resolution_m, *origin], proof)[:43]
-        'path from [0.5, 0.5] to [2.0, 2.5], radius '
-        """
-        if self.proof_source is None:
-            raise PlanError("copies of a result have no proof: ask the result that was planned")
-        # Loads modules that plans without a proof do not need.
-        from hybridnav.reasons.proofs import proof_of  # noqa: PLC0415
-
-        return proof_of(self, *self.proof_source)
+        return prove(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for strict JSON, under the names of the attributes.

@@ -35,14 +35,32 @@ _RATIO = math.sqrt(4 - math.sqrt(8))
 """Most by which moves between corners of cells are dearer than a line."""
 
 
-def proof_of(
-    result: PlanResult, grid: OccupancyGrid, costs: PlannerCosts, closed: ClosedCells | None
-) -> dict[str, Any]:
-    """Return the proof of a result; see `PlanResult.proof`.
+def prove(result: PlanResult) -> dict[str, Any]:
+    """Return a proof of the answer, plain values for strict JSON.
 
-    `grid`, `costs`, `closed`: the map and the costs that it was planned by, and the closed cells of
-    the query.
+    It proves that the path is free and has its cost, and that none costs less than its bound; or
+    that there is no path. `check_proof.py`, which needs nothing of this package, accepts or rejects
+    it: see :doc:`/explanation/what-a-proof-is`.
+
+    Raises
+    ------
+    PlanError
+        When no proof of such an answer is known: if corners may be cut, for paths of OMPL and
+        copies of a result, and with costs other than clearance.
+
+    Examples
+    --------
+    >>> from hybridnav import check_proof
+    >>> grid = hn.example_map("figure1")
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    >>> proof = hn.prove(planner.plan((0.5, 0.5), (2.0, 2.5)))
+    >>> origin = *grid.frame.origin_m, grid.frame.yaw_rad
+    >>> check_proof.check(grid.measured, [grid.resolution_m, *origin], proof)[:43]
+    'path from [0.5, 0.5] to [2.0, 2.5], radius '
     """
+    if result.proof_source is None:
+        raise PlanError("copies of a result have no proof: ask the result that was planned")
+    grid, costs, closed = result.proof_source
     if grid.corner_cutting:
         raise PlanError(
             "no proof is known where corners may be cut: load the map without corner_cutting"

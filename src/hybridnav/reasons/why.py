@@ -23,10 +23,13 @@ from hybridnav.rooms import Door
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid
+    from hybridnav.planning import HybridPlanner
     from hybridnav.planning.planning import Planning
     from hybridnav.topology import TopologicalMap
 
@@ -38,7 +41,9 @@ class Explanation:
     Examples
     --------
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> why = hn.HybridPlanner(topology).explain((0.5, 0.5), (2.0, 2.5), radius_m=0.6)
+    >>> why = hn.explain(
+    ...     hn.HybridPlanner(topology), (0.5, 0.5), (2.0, 2.5), radius_m=0.6
+    ... )
     >>> why.has_path, why.widest_m
     (False, 0.4)
     """
@@ -344,16 +349,53 @@ def _number_of(door: int | Door) -> int:
 
 
 def explain(
+    planner: HybridPlanner,
+    start: ArrayLike | str,
+    goal: ArrayLike | str,
+    *,
+    blocked: Closable | ClosedCells | None = None,
+    radius_m: float | None = None,
+) -> Explanation:
+    """Explain why there is a path between two points or none, and what would have to change.
+
+    It finds the widest path, the fewest closures to open, and whether unexplored cells could
+    help: exactly, for a disc on the cells of the map. Dropped islands count as free.
+
+    Parameters
+    ----------
+    planner
+        The planner, whose map, preset and costs count.
+    start, goal, blocked
+        As in `HybridPlanner.plan`; a room stands for its point.
+    radius_m
+        The robot's radius in metres, >= 0; None for the map's.
+
+    Raises
+    ------
+    InvalidValueError
+        As in `HybridPlanner.plan`, and when the radius is no number >= 0.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology)
+    >>> print(hn.explain(planner, (0.5, 0.5), (-2.0, 2.5)).words("de")[0])
+    Das Ziel liegt außerhalb der Karte.
+    """
+    return reasons_of(*planner.asked(start, goal, blocked), radius_m=radius_m)
+
+
+def reasons_of(
     now: Planning,
     ends: Any,
     blocked: Closable | ClosedCells | None,
     *,
     radius_m: float | None = None,
 ) -> Explanation:
-    """Explain a query of a planner; see `HybridPlanner.explain`.
+    """Explain a query of a planner; see `explain`.
 
     `now`: how the planner plans; `ends`: start and goal, `(x, y)` or `(x, y, yaw)` each, metres,
-    map frame; `blocked`, `radius_m`: see `HybridPlanner.explain`.
+    map frame; `blocked`: what is closed.
     """
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):
@@ -374,22 +416,22 @@ def explain(
 
 
 def explain_solved(
-    explain: Callable[..., Explanation],
+    planner: HybridPlanner,
     points: Sequence[Any],
     waypoints: Sequence[Any],
     **how: Any,
 ) -> Explanation:
-    """Explain how wide a path that is there can be; `explain`: of a planner, with its `how`.
+    """Explain how wide a path that is there can be; `how`: as of `explain`.
 
     A path to a named room ends beside the jambs of its door, where little fits: the widest to its
     own point may be wider, and the wider one of both is told. `points`: the ends of the path;
     `waypoints`: those that were given, points or names.
     """
-    found = [explain(*points, **how)]
+    found = [explain(planner, *points, **how)]
     if any(isinstance(one, str) for one in waypoints):
         ends = [
             one if isinstance(one, str) else point
             for one, point in zip(waypoints, points, strict=True)
         ]
-        found.append(explain(*ends, **how))
+        found.append(explain(planner, *ends, **how))
     return max(found, key=lambda one: one.widest_m)

@@ -52,7 +52,7 @@ class BlockedEnd(NamedTuple):
     Examples
     --------
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> why = hn.HybridPlanner(topology).explain((0.5, 0.5), (-2.0, 2.5))
+    >>> why = hn.explain(hn.HybridPlanner(topology), (0.5, 0.5), (-2.0, 2.5))
     >>> print(why.blocked_ends[0].status)
     goal outside the map
     """

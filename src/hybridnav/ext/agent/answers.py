@@ -15,7 +15,7 @@ from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
 from hybridnav.guide import Tour, plan_tour
-from hybridnav.reasons.why import explain_solved
+from hybridnav.reasons.why import explain, explain_solved
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -204,7 +204,8 @@ class MapAnswers:
         self, planner: HybridPlanner, tour: Tour, asked: ask.Journey, language: str
     ) -> dict[str, Any]:
         """Answer that there is no path, and why."""
-        why = planner.explain(
+        why = explain(
+            planner,
             tour.start or self._places.place(asked.start),
             tour.goal or self._places.place(asked.goal),
             blocked=self._shut(asked.avoiding),
@@ -224,7 +225,7 @@ class MapAnswers:
             return {"can_reach": False, **self._no_path(planner, tour, asked, "en")}
         named = [self._places.place(one) for one in (asked.start, asked.goal)]
         shut = self._shut(asked.avoiding)
-        why = explain_solved(planner.explain, (tour.start, tour.goal), named, blocked=shut)
+        why = explain_solved(planner, (tour.start, tour.goal), named, blocked=shut)
         width = places.doubled(why.widest_m)
         limits = "nothing limits the width"
         if width is not None:
@@ -242,7 +243,7 @@ class MapAnswers:
         blocked = self._shut(asked.avoiding)
         planner = self._session.planning.planner("shortest")
         radius_m = None if asked.width is None else asked.width / 2
-        why = planner.explain(start, goal, blocked=blocked, radius_m=radius_m)
+        why = explain(planner, start, goal, blocked=blocked, radius_m=radius_m)
         return {
             "text": " ".join(why.words(asked.language)),
             "has_path": why.has_path,

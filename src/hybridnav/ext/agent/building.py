@@ -24,6 +24,7 @@ from hybridnav.ext.agent.questions import (
 from hybridnav.ext.fleet.building import legs_of, tightest
 from hybridnav.ext.fleet.links import ClosedLink
 from hybridnav.guide.words import check_language
+from hybridnav.guide.words.itinerary import guide_of
 from hybridnav.maps.names import folded, place_of_name, read_point
 from hybridnav.planning import Profile
 
@@ -202,7 +203,7 @@ class BuildingAnswers:
         """Return the way on each floor, and the ride that it ends with."""
         found = []
         for floor, result, ride in zip(leg.floors, leg.results, [*leg.rides, None], strict=True):
-            guide, path = self._building.floor(floor).planner.guide, result.path
+            guide, path = guide_of(self._building.floor(floor).planner), result.path
             assert path is not None  # noqa: S101 - it is solved
             passed = [] if guide is None else guide.legs(path)
             part = {

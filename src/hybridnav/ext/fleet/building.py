@@ -566,6 +566,6 @@ def tightest(
             shut = blocked.get(name, Blocked())
             shut |= Blocked() if journal is None else journal.closures(name)
             planner = building.floor(name).planner
-            found = explain_solved(planner.explain, ends, named, blocked=shut, radius_m=radius_m)
+            found = explain_solved(planner, ends, named, blocked=shut, radius_m=radius_m)
             lines += [why.on_floor(name, line, language) for line in found.words(language)]
     return list(dict.fromkeys(lines))  # a tour passes a place again

@@ -13,6 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.links import ClosedLink, Link, LinkEnd
 from hybridnav.ext.fleet.search import Endpoint
+from hybridnav.guide.words.itinerary import guide_of
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import did_you_mean, place_of_name
@@ -358,11 +359,11 @@ def reason_under(
         on = {floor.name: floor for floor in floors}
         last, words = len(plan.results) - 1, []
         for number, (name, result) in enumerate(zip(plan.floors, plan.results, strict=True)):
-            guide, rooms = on[name].planner.guide, on[name].rooms
+            guide, rooms = guide_of(on[name].planner), on[name].rooms
             if guide is None or rooms is None or result.path is None:
                 continue
             whole = number == 0, number == last
-            words += in_the_way(profile, rooms, guide, result.path, whole=whole)
+            words += in_the_way(profile, rooms, guide.doors(result.path), result.path, whole=whole)
         half_m = (profile.width_m or 0.0) / 2
         taken = [
             ride.link for ride in plan.rides if not ride.link.admits(half_m, stairs=profile.stairs)

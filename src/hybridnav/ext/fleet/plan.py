@@ -15,13 +15,11 @@ from hybridnav.ext.fleet.floors import ROUNDED, Floor
 from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
 from hybridnav.ext.fleet.search import COUNTS, Endpoint, LinkSearch, stats_of
 from hybridnav.guide.words import FloorChange, Instruction, Space, sentences
-from hybridnav.guide.words.itinerary import Guide, heading_of, waypoint_text
+from hybridnav.guide.words.itinerary import Guide, guide_of, heading_of, waypoint_text
 from hybridnav.planning import Metric, Path, PlanResult, PlanStats, PlanStatus
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-    from hybridnav.planning.result import InstructionSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,7 @@ class BuildingPlan:
     """Metres per second that the robot drives."""
     stats: PlanStats = field(default_factory=PlanStats)
     """Effort of the query, with that for plans which are not on the route."""
-    instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
+    instruction_source: GuidedRoute | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
     profile: str | None = None
     """Name of the profile that it was planned under; None for none."""
@@ -266,7 +264,7 @@ class Answers:
         floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]
         start, goal = (self._named(end) for end in endpoints)
         guided = GuidedRoute(
-            tuple(floor.planner.guide for floor in floors),
+            tuple(guide_of(floor.planner) for floor in floors),
             results,
             rides,
             waypoint_text(endpoints[1].waypoint),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.closures.blocked import as_blocked
 from hybridnav.planning import PlanStatus
-from hybridnav.reasons.why import each_closure
+from hybridnav.reasons.why import each_closure, explain
 from hybridnav.reasons.why_words import closure_words
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def reasons(
     if is_end and not (found and isinstance(endpoints[_is_goal(plan)].waypoint, str)):
         number = int(_is_goal(plan))
         floor = floors[endpoints[number].floor]
-        why = floor.planner.explain(at[number], at[number], blocked=blocked.get(floor.name))
+        why = explain(floor.planner, at[number], at[number], blocked=blocked.get(floor.name))
         ends = tuple(one for one in why.blocked_ends if one.is_start == (number == 0))
         return _each(lambda to: _on(floor, replace(why, blocked_ends=ends).words(to), to))
     if found:

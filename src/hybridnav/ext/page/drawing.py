@@ -16,7 +16,7 @@ from hybridnav.guide import plan_alternatives
 from hybridnav.guide.tour import tour_of
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.names import natural_key
-from hybridnav.planning import PlanResult, load_preset, preset_names
+from hybridnav.planning import PlanResult, load_preset, preset_names, under
 from hybridnav.rooms.choices import leading_doors
 from hybridnav.viz.places import Places
 
@@ -279,7 +279,7 @@ class PagePlanning:
     def _under(self, query: ask.PathQuery) -> HybridPlanner:
         """Return the planner of the preset of a query, under its profile."""
         planner = self.planner(query.preset)
-        return planner if query.profile is None else planner.under(query.profile)
+        return planner if query.profile is None else under(planner, query.profile)
 
     def kept(self) -> HybridPlanner:
         """Return what a model of the map holds."""

@@ -8,6 +8,11 @@ from .instruction import (
     Wall as Wall,
 )
 from .language import Language as Language
-from .write import check_language as check_language, languages as languages, sentences as sentences
+from .write import (
+    check_language as check_language,
+    languages as languages,
+    sentences as sentences,
+    words as words,
+)
 
 __all__: list[str]

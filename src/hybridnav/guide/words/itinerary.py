@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import LongArray
     from hybridnav.guide.words import Instruction
     from hybridnav.guide.words.instruction import Shape
-    from hybridnav.planning import Path
-    from hybridnav.rooms import Rooms
+    from hybridnav.planning import HybridPlanner, Path
+    from hybridnav.planning.result import Walk
+    from hybridnav.rooms import Door, Rooms
+    from hybridnav.topology import TopologicalMap
 
 _SLIVER_M = 0.5
 _LEAST_ROOM_M2 = 6.0
@@ -96,6 +99,10 @@ class Guide:
         )
         return _without_grazes([*legs, last])
 
+    def doors(self, path: Path) -> list[Door]:
+        """Return the doors and openings that a path passes."""
+        return [leg.door for leg in self.legs(path) if leg.door is not None]
+
     def instructions(
         self,
         paths: Sequence[Path],
@@ -110,14 +117,6 @@ class Guide:
         """
         told = [[self._told(leg) for leg in each] for each in legs]
         return tuple(instructions_of(paths, told, self._landmarks, heading_rad))
-
-    def of(self, path: Path, waypoint: ArrayLike | str, start: Sequence[float]) -> GuidedPath:
-        """Return what the instructions of one path are found from.
-
-        `waypoint`: the goal, as it was given; `start`: `(x, y)`, or `(x, y, yaw)` of a robot with a
-        heading.
-        """
-        return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
 
     def _told(self, leg: Leg) -> Leg:
         """Return a leg as words tell it: a room that nobody has named has the shape of its kind."""
@@ -143,19 +142,27 @@ class Guide:
         return "hall" if area_m2 >= _LEAST_HALL_M2 else "room"
 
 
-@dataclass(frozen=True, eq=False)
-class GuidedPath:
-    """A path whose instructions are found when somebody reads them."""
+_GUIDES: WeakKeyDictionary[TopologicalMap, Guide] = WeakKeyDictionary()
 
-    guide: Guide
-    path: Path
-    waypoint: str
-    heading_rad: float | None
 
-    def instructions(self) -> tuple[Instruction, ...]:
-        """Find the instructions."""
-        legs = self.guide.legs(self.path, waypoint=self.waypoint)
-        return self.guide.instructions([self.path], [legs], heading_rad=self.heading_rad)
+def guide_of(planner: HybridPlanner) -> Guide | None:
+    """Return what describes the paths of a planner; None on a map without rooms."""
+    return None if planner.pyramid_rooms is None else _guide_on(planner.topology)
+
+
+def _guide_on(topology: TopologicalMap) -> Guide:
+    """Return what describes paths on a map with rooms, made once."""
+    guide = _GUIDES.get(topology)
+    if guide is None:
+        guide = _GUIDES[topology] = Guide(topology.rooms)
+    return guide
+
+
+def instructions_of_walk(path: Path, walk: Walk) -> tuple[Instruction, ...]:
+    """Return the instructions of the path of one plan."""
+    guide = _guide_on(walk.topology)
+    legs = guide.legs(path, waypoint=waypoint_text(walk.goal))
+    return guide.instructions([path], [legs], heading_rad=heading_of(walk.start))
 
 
 def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         Wall,
     )
     from hybridnav.guide.words.language import HandWords, Language, NameWords, SpaceWords
+    from hybridnav.planning import PlanResult
 
 _LANGUAGES = {"de": GERMAN, "en": ENGLISH}
 _NOUNS = {
@@ -51,6 +52,32 @@ def languages() -> dict[str, str]:
     {'de': 'Deutsch', 'en': 'English'}
     """
     return {code: language.name for code, language in _LANGUAGES.items()}
+
+
+def words(result: PlanResult, language: str = "en") -> list[str]:
+    """Describe the path of a plan to a person; no lines without a path, and without rooms.
+
+    Parameters
+    ----------
+    result
+        A plan on a map with rooms.
+    language
+        Code of a language, one of `languages`.
+
+    Raises
+    ------
+    InvalidValueError
+        When there are no words in the language.
+
+    Examples
+    --------
+    >>> grid = hn.example_map("figure1")
+    >>> rooms = hn.RoomLabels(("west", "east"), np.indices(grid.shape)[1] // 20)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    >>> hn.words(hn.HybridPlanner(topology).plan("west", "west"))[0]
+    'start in room west'
+    """
+    return sentences(result.instructions, language)
 
 
 def check_language(language: str) -> Language:
