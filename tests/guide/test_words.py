@@ -17,8 +17,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.guide.words import sentences
-from hybridnav.guide.words.itinerary import instructions_of_walk
-from hybridnav.planning.result import Walk
+from hybridnav.guide.words.itinerary import instructions_of
 from tests.drawn_rooms import HOUSE, SIDE, house, topology_of
 from tests.oracle.bends import Windows, simplified_corners
 from tests.strategies import examples
@@ -221,7 +220,7 @@ def test_the_turns_of_drawn_corridors_are_told(name, preset, yaw_rad):
     assert hn.words(result)[0] == f"start in the maze heading {compass}"
     assert all("in the maze" in line for line in hn.words(result))
     path = hn.Path(result.path.cells[::-1].copy(), result.path.points[::-1].copy(), result.cost)
-    back = instructions_of_walk(path, Walk(topology, "home", goal))
+    back = instructions_of(path, topology, "home", goal)
     expected = [(result.cost - at_m, -degrees) for at_m, degrees in turns_of(result.instructions)]
     assert np.allclose(turns_of(back)[::-1], expected)
 

@@ -490,14 +490,14 @@ def test_every_public_name_loads_and_others_are_refused() -> None:
     for name in hn.__all__:
         thing = getattr(hn, name)
         assert thing.__name__ == (
-            f"hybridnav.{name}" if name in {"errors", "ext", "harness", "viz"} else name
+            f"hybridnav.{name}" if name in {"errors", "ext", "graphs", "harness", "viz"} else name
         )
     with pytest.warns(
         FutureWarning, match=r"^hybridnav\.MapError is now hybridnav\.errors\.MapErr"
     ):
         assert hn.MapError is hn.errors.MapError  # type: ignore[attr-defined]
     with pytest.warns(
-        FutureWarning, match=r"^hybridnav\.load_graph is now hybridnav\.ext\.graphs\."
+        FutureWarning, match=r"^hybridnav\.load_graph is now hybridnav\.ext\.fleet\."
     ):
         assert hn.load_graph is hn.ext.fleet.load_graph  # type: ignore[attr-defined]
     with pytest.raises(AttributeError, match="module hybridnav has no attribute Planner"):

@@ -452,6 +452,11 @@ def under(planner: HybridPlanner, profile: Profile | str) -> HybridPlanner:
     profile
         A `Profile`, or the name of one of `PROFILES`: visitor, staff, wheelchair, cart.
 
+    Returns
+    -------
+    HybridPlanner
+        A planner of its own; `update` is for the one without the profile.
+
     Raises
     ------
     InvalidValueError

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav.planning import HybridPlanner, PlanBatch
     from hybridnav.planning.planning import Planning
     from hybridnav.planning.private_rooms import Privacy
-    from hybridnav.reasons.why import Explanation
+    from hybridnav.reasons import Explanation
     from hybridnav.search.found import ClosedCells
 
     Block = tuple[slice, slice, FloatArray]
@@ -106,7 +106,7 @@ class Questions:
     ) -> Explanation:
         """Return `hybridnav.explain(planner, start, goal, ...)`: write that."""
         renamed("HybridPlanner.explain(...)", "hybridnav.explain(planner, ...)")
-        from hybridnav.reasons.why import explain  # noqa: PLC0415 - an old name alone needs it
+        from hybridnav.reasons import explain  # noqa: PLC0415 - an old name alone needs it
 
         return explain(cast("HybridPlanner", self), start, goal, blocked=blocked, radius_m=radius_m)
 

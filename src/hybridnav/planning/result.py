@@ -84,6 +84,7 @@ class Walk(NamedTuple):
     """What the instructions of a path are found from, beside the path."""
 
     topology: TopologicalMap
+    """The map with its rooms."""
     goal: ArrayLike | str
     """As it was given: a point in metres, or a name."""
     start: Sequence[float]
@@ -94,8 +95,11 @@ class Unanswered(NamedTuple):
     """What the reasons of a query without a path are found from."""
 
     now: Planning
+    """How it was planned."""
     ends: tuple[Any, Any]
+    """Start and goal, `(x, y)` or `(x, y, yaw)`, metres, map frame."""
     closed: Closable | ClosedCells | None
+    """What was closed."""
 
 
 Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
@@ -219,9 +223,9 @@ class PlanResult:
         source = self.instruction_source
         if not isinstance(source, Walk) or self.path is None:
             return source if not isinstance(source, Walk) else ()
-        from hybridnav.guide.words.itinerary import instructions_of_walk  # noqa: PLC0415 - with rooms
+        from hybridnav.guide.words.itinerary import instructions_of  # noqa: PLC0415 - with rooms
 
-        return instructions_of_walk(self.path, source)
+        return instructions_of(self.path, *source)
 
     @cached_property
     def explanation(self) -> Explanation | None:
@@ -230,7 +234,7 @@ class PlanResult:
         source = self.why_source
         if not isinstance(source, Unanswered):
             return source
-        from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
+        from hybridnav.reasons import reasons_of  # noqa: PLC0415 - plans need no shapely
 
         return reasons_of(*source)
 
@@ -317,7 +321,7 @@ class PlanResult:
     def proof(self) -> dict[str, Any]:
         """Return `hybridnav.prove(result)`: write that."""
         renamed("PlanResult.proof()", "hybridnav.prove(result)")
-        from hybridnav.reasons.proofs import prove  # noqa: PLC0415 - an old name alone needs it
+        from hybridnav.reasons import prove  # noqa: PLC0415 - an old name alone needs it
 
         return prove(self)
 

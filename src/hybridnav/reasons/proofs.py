@@ -42,6 +42,16 @@ def prove(result: PlanResult) -> dict[str, Any]:
     that there is no path. `check_proof.py`, which needs nothing of this package, accepts or rejects
     it: see :doc:`/explanation/what-a-proof-is`.
 
+    Parameters
+    ----------
+    result
+        A result as it was planned; copies hold no map.
+
+    Returns
+    -------
+    dict
+        The proof.
+
     Raises
     ------
     PlanError

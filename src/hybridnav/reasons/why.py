@@ -370,6 +370,11 @@ def explain(
     radius_m
         The robot's radius in metres, >= 0; None for the map's.
 
+    Returns
+    -------
+    Explanation
+        The reasons, also in words.
+
     Raises
     ------
     InvalidValueError
@@ -394,8 +399,19 @@ def reasons_of(
 ) -> Explanation:
     """Explain a query of a planner; see `explain`.
 
-    `now`: how the planner plans; `ends`: start and goal, `(x, y)` or `(x, y, yaw)` each, metres,
-    map frame; `blocked`: what is closed.
+    Parameters
+    ----------
+    now
+        How the planner plans.
+    ends
+        Start and goal, `(x, y)` or `(x, y, yaw)` each, metres, map frame.
+    blocked, radius_m
+        As in `explain`.
+
+    Returns
+    -------
+    Explanation
+        The reasons, also in words.
     """
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):

@@ -20,7 +20,7 @@ class Closure(NamedTuple):
 
     Examples
     --------
-    >>> hn.planner.Closure("doors", 12)
+    >>> hn.reasons.Closure("doors", 12)
     Closure(kind='doors', which=12)
     """
 
@@ -36,7 +36,7 @@ class TightPlace(NamedTuple):
 
     Examples
     --------
-    >>> hn.planner.TightPlace((0.5, 2.0)).point
+    >>> hn.reasons.TightPlace((0.5, 2.0)).point
     (0.5, 2.0)
     """
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.trig import hypots
 from hybridnav.guide.words.bends import Leg
-from hybridnav.guide.words.instructions import instructions_of
+from hybridnav.guide.words.instructions import instructions_of as instructions_of_legs
 from hybridnav.guide.words.landmarks import Landmarks
 from hybridnav.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 from hybridnav.route import RouteFinder
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from hybridnav.guide.words import Instruction
     from hybridnav.guide.words.instruction import Shape
     from hybridnav.planning import HybridPlanner, Path
-    from hybridnav.planning.result import Walk
     from hybridnav.rooms import Door, Rooms
     from hybridnav.topology import TopologicalMap
 
@@ -116,7 +115,7 @@ class Guide:
         radians counter-clockwise from the x axis; None if there is none.
         """
         told = [[self._told(leg) for leg in each] for each in legs]
-        return tuple(instructions_of(paths, told, self._landmarks, heading_rad))
+        return tuple(instructions_of_legs(paths, told, self._landmarks, heading_rad))
 
     def _told(self, leg: Leg) -> Leg:
         """Return a leg as words tell it: a room that nobody has named has the shape of its kind."""
@@ -158,11 +157,13 @@ def _guide_on(topology: TopologicalMap) -> Guide:
     return guide
 
 
-def instructions_of_walk(path: Path, walk: Walk) -> tuple[Instruction, ...]:
-    """Return the instructions of the path of one plan."""
-    guide = _guide_on(walk.topology)
-    legs = guide.legs(path, waypoint=waypoint_text(walk.goal))
-    return guide.instructions([path], [legs], heading_rad=heading_of(walk.start))
+def instructions_of(
+    path: Path, topology: TopologicalMap, goal: ArrayLike | str, start: Sequence[float]
+) -> tuple[Instruction, ...]:
+    """Return the instructions of the path of one plan; see `planning.result.Walk`."""
+    guide = _guide_on(topology)
+    legs = guide.legs(path, waypoint=waypoint_text(goal))
+    return guide.instructions([path], [legs], heading_rad=heading_of(start))
 
 
 def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:

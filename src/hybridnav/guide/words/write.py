@@ -64,6 +64,11 @@ def words(result: PlanResult, language: str = "en") -> list[str]:
     language
         Code of a language, one of `languages`.
 
+    Returns
+    -------
+    list of str
+        The sentences in order.
+
     Raises
     ------
     InvalidValueError
@@ -74,8 +79,8 @@ def words(result: PlanResult, language: str = "en") -> list[str]:
     >>> grid = hn.example_map("figure1")
     >>> rooms = hn.RoomLabels(("west", "east"), np.indices(grid.shape)[1] // 20)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
-    >>> hn.words(hn.HybridPlanner(topology).plan("west", "west"))[0]
-    'start in room west'
+    >>> hn.words(hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5)))[::2]
+    ['start in the west', 'you are at (2, 2.5) in the east']
     """
     return sentences(result.instructions, language)
 
