@@ -14,7 +14,8 @@ from collections import Counter
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from statistics import median
+
+import networkx as nx
 
 ROOT = Path(__file__).parents[2]
 SRC = ROOT / "src" / "hybridnav"
@@ -156,6 +157,75 @@ def bare_kernels() -> list[str]:
     return found
 
 
+def parts() -> list[Path]:
+    """Return the packages of the house, those of the wing one by one."""
+    return sorted(
+        path.parent
+        for path in (*SRC.glob("*/__init__.py"), *SRC.glob(f"{WING}/*/__init__.py"))
+        if path.parent.name != WING
+    )
+
+
+def lines_of(package: Path) -> int:
+    """Return the lines of a package."""
+    return sum(path.read_text().count("\n") for path in package.rglob("*.py"))
+
+
+def floors_of(package: Path) -> int:
+    """Return the longest chain of modules inside a package, each of which imports the next one.
+
+    Names that a package hands on lead to the file that its stub names.
+    """
+    graph = nx.DiGraph()
+    for path in package.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridnav."):
+                for alias in node.names:
+                    other = _home(node.module or "", alias.name)
+                    if other != path and other.is_relative_to(package):
+                        graph.add_edge(path, other)
+    whole = nx.condensation(graph)
+    return int(nx.dag_longest_path_length(whole)) + 1
+
+
+def _home(module: str, name: str) -> Path:
+    """Return the file that a name is imported from."""
+    place = SRC.parent / module.replace(".", "/")
+    if (place / f"{name}.py").exists():
+        return place / f"{name}.py"
+    stub = place / "__init__.pyi"
+    if stub.exists():
+        for node in ast.walk(ast.parse(stub.read_text())):
+            if isinstance(node, ast.ImportFrom) and any(one.name == name for one in node.names):
+                return _home(".".join([module, *filter(None, [node.module])]), name)
+    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+
+
+def unnamed() -> list[str]:
+    """Return the public names that the head of their file neither names nor speaks of: none of the
+    words in a name begins a word there."""
+    missing = []
+    for stub in SRC.rglob("*.pyi"):
+        for node in ast.walk(ast.parse(stub.read_text())):
+            if not isinstance(node, ast.ImportFrom) or node.level != 1 or not node.module:
+                continue
+            path = stub.parent / f"{node.module.replace('.', '/')}.py"
+            if path.exists():
+                head = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n\n")[0]
+                missing += [
+                    f"{path.relative_to(SRC)}: {alias.name}"
+                    for alias in node.names
+                    if not _is_named(alias.name, head)
+                ]
+    return missing
+
+
+def _is_named(name: str, head: str) -> bool:
+    words = re.findall(r"[A-Z]?[a-z0-9]{2,}|[A-Z]{3,}", name)
+    begins = (word.lower().rstrip("s")[:5] for word in words if len(word) > 2)
+    return name in head or any(begin in head.lower() for begin in begins)
+
+
 def figures(target: Path) -> dict[str, float]:
     """Return the figures of the house by name."""
     files = sources()
@@ -173,7 +243,6 @@ def figures(target: Path) -> dict[str, float]:
         "lines": sum(sizes),
         "files": len(files),
         "code outside ext": code - by_package[WING],
-        "lines of a file, median": median(sizes),
         "lines of a file, most": max(sizes),
         "packages": len(names),
         "arrows between packages": len(between),

@@ -1,4 +1,4 @@
-"""Closures for one query, and the cells that they close."""
+"""Closures for one query, and the cells that they close. Public: `Blocked`."""
 
 from __future__ import annotations
 

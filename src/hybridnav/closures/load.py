@@ -1,4 +1,6 @@
-"""Files of closed areas: GeoJSON in metres of the map frame, masks of Nav2, or images."""
+"""Files of closed areas: GeoJSON in metres of the map frame, masks of Nav2, or images. Public:
+`load_blocked`.
+"""
 
 from __future__ import annotations
 

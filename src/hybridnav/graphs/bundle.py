@@ -1,4 +1,6 @@
-"""All that Nav2 needs of a map in one folder: graph, masks, poses and parameters."""
+"""All that Nav2 needs of a map in one folder: graph, masks, poses and parameters. Public:
+`export_bundle`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Nodes and edges as readers find them, and what is wrong with a graph, by kinds."""
+"""Nodes and edges as readers find them, and what is wrong with a graph, by kinds. Public:
+`SEVERITIES`, `Example` and `Finding`.
+"""
 
 from __future__ import annotations
 

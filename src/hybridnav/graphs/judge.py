@@ -1,4 +1,6 @@
-"""Free space as the builder of route graphs sees it: cells, sight, exact shortest paths."""
+"""Free space as the builder of route graphs sees it: cells, sight, exact shortest paths. Public:
+`Excess`.
+"""
 
 from __future__ import annotations
 

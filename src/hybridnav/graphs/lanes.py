@@ -1,4 +1,4 @@
-"""What is made of a graph that was built: descriptions, and one-way lanes."""
+"""What is made of a graph that was built: descriptions, and one-way lanes. Public: `keep_right`."""
 
 from __future__ import annotations
 

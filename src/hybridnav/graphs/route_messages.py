@@ -1,4 +1,6 @@
-"""Routes over a graph that robots follow: messages, changes, and whether they still hold."""
+"""Routes over a graph that robots follow: messages, changes, and whether they still hold. Public:
+`first_broken_edge`.
+"""
 
 from __future__ import annotations
 

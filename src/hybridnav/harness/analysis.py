@@ -1,4 +1,6 @@
-"""From records to figures: the outcomes of all methods on all maps."""
+"""From records to figures: the outcomes of all methods on all maps. Public: `Study`, `load_study`
+and `to_frame`.
+"""
 
 from __future__ import annotations
 

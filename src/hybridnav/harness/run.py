@@ -1,4 +1,4 @@
-"""A run of the harness: maps and methods in, records in a folder out."""
+"""A run of the harness: maps and methods in, records in a folder out. Public: `evaluate`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What answers are held against: the reference of losses, and the answers of other methods."""
+"""What answers are held against: the reference of losses, and the answers of other methods. Public:
+`AnyAngleOptimum`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Occupancy grids: probabilities, thresholds, and the classes of cells."""
+"""Occupancy grids: probabilities, thresholds, and the classes of cells. Public: `drop_islands`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Widest paths: the largest robot that can go from one cell to another, and where it is tight."""
+"""Widest paths: the largest robot that can go from one cell to another, and where it is tight.
+Public: `Bottleneck`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models: a map with everything that planners have prepared on it, in one file."""
+"""Models: a map with everything that planners have prepared on it, in one file. Public: `load`."""
 
 from __future__ import annotations
 

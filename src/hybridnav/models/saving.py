@@ -1,4 +1,4 @@
-"""Planners, maps and grids, written to files as models."""
+"""Planners, maps and grids, written to files as models. Public: `save`."""
 
 from __future__ import annotations
 

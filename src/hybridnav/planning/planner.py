@@ -1,4 +1,4 @@
-"""The hybrid planner: paths between points by a preset, with their routes."""
+"""The hybrid planner: paths between points by a preset, with their routes. Public: `under`."""
 
 from __future__ import annotations
 

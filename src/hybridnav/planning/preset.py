@@ -1,4 +1,6 @@
-"""Presets: how to build a pyramid and how to plan on it, in YAML files that are checked."""
+"""Presets: how to build a pyramid and how to plan on it, in YAML files that are checked. Public:
+`LimitSettings` and `planner_settings`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Results of a planner: statuses, routes, bounds."""
+"""Results of a planner: statuses, routes, bounds. Public: `COST_METRICS`, `Refinement` and
+`Metric`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The sections of a preset: of the pyramid, and of the planner by each method."""
+"""The sections of a preset: of the pyramid, and of the planner by each method. Public:
+`ClearanceSettings` and `CostSettings`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The record of a decimation, from which every level is rebuilt."""
+"""The record of a decimation, from which every level is rebuilt. Public: `Linkage`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Proofs of results, which `check_proof.py` checks without anything of this package."""
+"""Proofs of results, which `check_proof.py` checks without anything of this package. Public:
+`prove`.
+"""
 
 from __future__ import annotations
 

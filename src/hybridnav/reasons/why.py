@@ -1,4 +1,6 @@
-"""Reasons: why there is no path, what would have to change, and where a path is tightest."""
+"""Reasons: why there is no path, what would have to change, and where a path is tightest. Public:
+`Explanation` and `explain`.
+"""
 
 from __future__ import annotations
 

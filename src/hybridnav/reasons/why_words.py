@@ -1,4 +1,6 @@
-"""Sentences for `Explanation`, in English and in German."""
+"""Sentences for `Explanation`, in English and in German. Public: `Closure`, `TightPlace` and
+`BlockedEnd`.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Paths on the cells that a query and its corridor leave open: the optimal path of cells, the
-string pulled tight along it, and which positions see each other.
+string pulled tight along it, and which positions see each other. Public: `LineOfSight`, `Sight`,
+`Refiner` and `GridRefiner`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """The topological map: places, the boundaries between them, and the local map of each place in a
-frame of its own (the source paper's section 2).
+frame of its own (the source paper's section 2). Public: `Obstacle` and `Component`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Charts of methods: what their paths lose, and how long their queries take."""
+"""Charts of methods: what their paths lose, and how long their queries take. Public: `plot_losses`
+and `plot_speed`.
+"""
 
 from __future__ import annotations
 

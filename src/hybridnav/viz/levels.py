@@ -1,4 +1,4 @@
-"""Pictures of how a pyramid grows.
+"""Pictures of how a pyramid grows. Public: `plot_levels` and `plot_kernels`.
 
 Its levels side by side, and the arcs that are contracted and removed in one step.
 """

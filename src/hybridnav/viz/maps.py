@@ -1,4 +1,6 @@
-"""Pictures of maps, of the levels of their pyramids, and of the costs of their cells."""
+"""Pictures of maps, of the levels of their pyramids, and of the costs of their cells. Public:
+`plot_places`.
+"""
 
 from __future__ import annotations
 

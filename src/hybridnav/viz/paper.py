@@ -1,4 +1,6 @@
-"""The source paper's Fig. 1 for any map: simple graph and dual graph side by side."""
+"""The source paper's Fig. 1 for any map: simple graph and dual graph side by side. Public:
+`plot_figure1`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of a plan."""
+"""The picture of a plan. Public: `plot_paths`."""
 
 from __future__ import annotations
 

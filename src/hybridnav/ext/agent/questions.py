@@ -1,4 +1,6 @@
-"""What a program may ask, and the shape of what it gets: checked whole before anything is done."""
+"""What a program may ask, and the shape of what it gets: checked whole before anything is done.
+Public: `Tool` and `TOOLS`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Nodes at the ends of links: found, or added and joined to the graph of the floor."""
+"""Nodes at the ends of links: found, or added and joined to the graph of the floor. Public:
+`DoorLine` and `to_networkx`.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Plans over floors, made from the routes that a search has chosen."""
-
+"""Plans over floors, from the routes that a search has chosen. Public: `BuildingAlternatives`."""
 from __future__ import annotations
 
 import itertools

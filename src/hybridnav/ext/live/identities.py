@@ -1,4 +1,6 @@
-"""What of an older version is where in a newer one: its cells, and its places."""
+"""What of an older version is where in a newer one: its cells, and its places. Public: `Flips`,
+`CarriedCosts` and `carry_costs`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A pyramid that follows its map."""
+"""A pyramid that follows its map. Public: `Update`."""
 
 from __future__ import annotations
 

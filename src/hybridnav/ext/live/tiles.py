@@ -1,4 +1,6 @@
-"""Cells in square tiles that versions share: a change copies the tiles that it touches."""
+"""Cells in square tiles that versions share: a change copies the tiles that it touches. Public:
+`NO_PLACE`.
+"""
 
 from __future__ import annotations
 

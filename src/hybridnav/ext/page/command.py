@@ -1,4 +1,4 @@
-"""`hybridnav view`: a local page for people who would rather click than type."""
+"""`hybridnav view`: a local page for people who would rather click than type. Public: `serve`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page itself: one HTML file, one style sheet, plain ES modules."""
+"""The page itself: one HTML file, one style sheet, plain ES modules. Public: `Opening`."""
 
 from __future__ import annotations
 

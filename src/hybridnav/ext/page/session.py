@@ -1,4 +1,6 @@
-"""What one page shows and changes: a map, its planners, its rooms and their file."""
+"""What one page shows and changes: a map, its planners, its rooms and their file. Public:
+`Session`.
+"""
 
 from __future__ import annotations
 

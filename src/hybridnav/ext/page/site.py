@@ -1,4 +1,4 @@
-"""What one page shows: a session for each floor, and routes over all of them."""
+"""What one page shows: a session for each floor, and routes over all of them. Public: `Site`."""
 
 from __future__ import annotations
 

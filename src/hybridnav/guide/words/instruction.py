@@ -1,4 +1,6 @@
-"""Instructions for a person who walks along a path: the geometry of sentences, without words."""
+"""Instructions for a person who walks along a path: the geometry of sentences, without words.
+Public: `Space`, `Turn`, `Landmark`, `Wall`, `Doorway` and `FloorChange`.
+"""
 
 from __future__ import annotations
 

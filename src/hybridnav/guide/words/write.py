@@ -1,4 +1,4 @@
-"""Sentences of instructions in a language."""
+"""Sentences of instructions in a language. Public: `words`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Planning on regions: a coarse search on their graph, then the best path inside them."""
+"""Planning on regions: a coarse search on their graph, then the best path inside them. Public:
+`AnyAngleResult`, `CostClaim`, `MethodResult` and `Solver`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Costs as the judges read them: of cheapest paths of cells, and of arcs of circles."""
+"""Costs as the judges read them: of cheapest paths of cells, and of arcs of circles. Public:
+`Chords` and `chords_of`.
+"""
 
 from __future__ import annotations
 

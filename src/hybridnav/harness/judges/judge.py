@@ -1,4 +1,6 @@
-"""Judges of paths that share no code with planners: legal cells, segments, lengths."""
+"""Judges of paths that share no code with planners: legal cells, segments, lengths. Public:
+`Verdict` and `ScipyOptimum`.
+"""
 
 from __future__ import annotations
 

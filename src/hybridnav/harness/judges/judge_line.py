@@ -1,4 +1,6 @@
-"""Any-angle paths judged by exact geometry, and exact shortest ones by a visibility graph."""
+"""Any-angle paths judged by exact geometry, and exact shortest ones by a visibility graph. Public:
+`line_cells`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Losses summarised, bucketed by distance and compared, with bootstrap intervals."""
+"""Losses summarised, bucketed by distance and compared, with bootstrap intervals. Public:
+`PairedDifference`, `paired_difference` and `thrun_count`.
+"""
 
 from __future__ import annotations
 

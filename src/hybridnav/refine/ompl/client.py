@@ -1,4 +1,6 @@
-"""Messages between the planner's process and the worker."""
+"""Messages between the planner's process and the worker. Public: `Setup`, `OmplQuery`, `Search`,
+`Reply`, `require_ompl` and `start_ahead`.
+"""
 
 from __future__ import annotations
 

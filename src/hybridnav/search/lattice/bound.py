@@ -1,4 +1,4 @@
-"""A lower bound on the cost of all paths at any angle."""
+"""A lower bound on the cost of all paths at any angle. Public: `slopes_of`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""A convex mesh of changed cells: only the polygons beside them are cut anew."""
+"""A convex mesh of changed cells: only the polygons beside them are cut anew. Public:
+`DetourSearch`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reader of VDMA's Layout Interchange Format, version 1."""
+"""Reader of VDMA's Layout Interchange Format, version 1. Public: `export_lif`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""OpenStreetMap's XML: nodes and ways with their tags, and where on the Earth they lie."""
+"""OpenStreetMap's XML: nodes and ways with their tags, and where on the Earth they lie. Public:
+`Anchor`.
+"""
 
 from __future__ import annotations
 

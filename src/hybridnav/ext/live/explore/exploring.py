@@ -1,4 +1,6 @@
-"""Exploration of a floor plan by a simulated robot, until nothing in its reach is unknown."""
+"""Exploration of a floor plan by a simulated robot, until nothing in its reach is unknown. Public:
+`By`, `MOST_GOALS` and `Step`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Where a robot goes next: unexplored places, and places from which it should look again."""
+"""Where a robot goes next: unexplored places, and places from which it should look again. Public:
+`Goals`.
+"""
 
 from __future__ import annotations
 

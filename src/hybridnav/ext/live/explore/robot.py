@@ -1,4 +1,6 @@
-"""A robot that is simulated in a floor plan: what it measures, knows, and where it drives."""
+"""A robot that is simulated in a floor plan: what it measures, knows, and where it drives. Public:
+`laser_all_round`.
+"""
 
 from __future__ import annotations
 

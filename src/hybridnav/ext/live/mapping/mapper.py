@@ -1,4 +1,4 @@
-"""Occupancy grids that grow scan by scan."""
+"""Occupancy grids that grow scan by scan. Public: `Mapper`."""
 
 from __future__ import annotations
 
