@@ -176,7 +176,7 @@ def floors_of(package: Path) -> int:
 
     Names that a package hands on lead to the file that its stub names.
     """
-    graph = nx.DiGraph()
+    graph: nx.DiGraph[Path] = nx.DiGraph()
     for path in package.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridnav."):
