@@ -13,6 +13,7 @@ from scipy import ndimage
 import hybridnav as hn
 from tests.drawn_rooms import topology_of
 from tests.oracle.doorways import LEAST_DEGREES, Verdict, judged
+from tests.strategies import IS_FULL
 
 OFFICE = FilePath(__file__).parents[2] / "maps" / "office" / "office.yaml"
 
@@ -165,8 +166,9 @@ def until(
 def test_every_turn_behind_the_doors_of_the_office_is_told() -> None:
     assert LEAST_DEGREES == 40.0
     topology = found_rooms(OFFICE)
-    check(until(topology, 10, 160), least_turns=10)
-    check(until(topology, 5, 160, preset="octile"), least_turns=5)
+    by_lines, by_cells = (10, 5) if IS_FULL else (5, 3)
+    check(until(topology, by_lines, 160), least_turns=by_lines)
+    check(until(topology, by_cells, 160, preset="octile"), least_turns=by_cells)
 
 
 @pytest.mark.full

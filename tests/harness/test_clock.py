@@ -147,5 +147,5 @@ def test_only_deadlines_are_told_by_another_clock():
         for path in (ROOT / "src/hybridnav").rglob("*.py")
         if "perf_counter" in path.read_text(encoding="utf-8")
     }
-    mesh = {"search/mesh/cut.py", "search/mesh/search.py"}
+    mesh = {"search/mesh/search.py"}
     assert read == {"_base/clock.py", "_base/jit.py", *mesh}

@@ -71,6 +71,7 @@ def test_a_cluster_makes_the_records_of_local_workers(cluster, settings, tmp_pat
     assert evaluate(there, tmp_path / "local") == 0
 
 
+@pytest.mark.full  # starts workers until one is lost
 def test_the_tasks_of_a_worker_that_is_lost_run_again(cluster, settings, tmp_path):
     only = replace(
         settings,
@@ -103,6 +104,7 @@ def test_the_tasks_of_a_worker_that_is_lost_run_again(cluster, settings, tmp_pat
     assert len({record["id"] for record in records}) == len(records) == made > 2 * 150
 
 
+@pytest.mark.full  # starts workers until one is lost
 def test_a_task_that_kills_every_worker_is_recorded_as_lost(
     cluster, settings, tmp_path, monkeypatch
 ):
