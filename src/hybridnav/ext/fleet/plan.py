@@ -1,4 +1,5 @@
 """Plans over floors, from the routes that a search has chosen. Public: `BuildingAlternatives`."""
+
 from __future__ import annotations
 
 import itertools
