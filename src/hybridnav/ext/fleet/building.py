@@ -415,7 +415,7 @@ class Building:
                 table.closing(table.floor.planner.closed(own.rooms_closed(number)))
                 for number, table in enumerate(made._current())
             ]
-            vars(made).update(_privacy=own, _tables=shut)
+            made._privacy, made._tables = own, shut
             last = list(self._profiled.items())[-_MOST_PROFILED:]
             self._profiled = {**dict(last), profile: (tables, made)}
             return made
