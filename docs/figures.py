@@ -17,6 +17,7 @@ import hybridnav as hn
 from hybridnav import check_proof
 from hybridnav.ext.fleet import plot_building
 from hybridnav.graphs import build_lane_graph, plot_route_graph
+from hybridnav.search.descent import Descent, DescentSettings
 from hybridnav.viz import (
     plot_costs,
     plot_level,
@@ -24,6 +25,7 @@ from hybridnav.viz import (
     plot_map,
     plot_mesh,
     plot_rooms,
+    save_descent,
     save_figure,
 )
 
@@ -34,6 +36,8 @@ BUILDING = ROOT / "maps" / "building" / "building.yaml"
 LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells."""
+STEPS = DescentSettings(field_cells=32, step=2.0)
+"""More levels than `paper` visits, to see them narrow."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 BARRIER = [(29.1, 5.0), (29.3, 5.0), (29.3, 20.0), (29.1, 20.0)]
@@ -57,6 +61,16 @@ def draw_route(file: Path) -> None:
         str(file),
     ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
+
+
+def draw_descent(file: Path) -> None:
+    """Draw how a route comes down the levels between the same points, and its path."""
+    pyramid = hn.DualGraphPyramid.build(hn.load_map(OFFICE, robot_radius_m=0.25))
+    grid = pyramid.grid
+    descent = Descent(pyramid, grid.enterable(), STEPS)
+    watched = descent.watch(grid.frame.cell_of(*START), grid.frame.cell_of(*GOAL))
+    assert watched is not None  # noqa: S101 - there is a way
+    save_descent(grid, watched, file)
 
 
 def draw_levels(file: Path) -> None:
@@ -211,11 +225,14 @@ def draw_gallery() -> None:
 
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
+    if file.suffix == ".gif":  # which has no more, and more than one frame
+        return
     with Image.open(file) as image:
         image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
 PICTURES = {
+    "office-descent.gif": draw_descent,
     "office-route.png": draw_route,
     "office-levels.png": draw_levels,
     "office-regions.png": draw_regions,

@@ -37,6 +37,7 @@ def page(name: str) -> str:
 
 def small(file: Path) -> np.ndarray[Any, Any]:
     with Image.open(file) as image:
+        image.seek(getattr(image, "n_frames", 1) - 1)  # a moving picture ends with its path
         height = round(image.height * WIDTH / image.width)
         return np.asarray(image.convert("L").resize((WIDTH, height)), float)
 
