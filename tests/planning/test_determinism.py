@@ -18,10 +18,13 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.maps.clearance import within_radius
+from tests.strategies import IS_FULL
 
-COUNTS = {"shortest": 200, "octile": 200, "robot": 100, "cheapest": 200} | dict.fromkeys(
+COUNTS = {"shortest": 200, "octile": 200, "robot": 40, "cheapest": 80} | dict.fromkeys(
     ("grid-astar", "paper", "cheapest-by-noise"), 20
 )
+if IS_FULL:
+    COUNTS |= {"robot": 100, "cheapest": 200}
 """Number of queries by each preset, fewer of the slow ones. `cheapest` is the method of `robot`
 without costs, `cheapest-by-noise` with a given layer."""
 

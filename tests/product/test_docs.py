@@ -35,7 +35,7 @@ def _documented() -> list[str]:
 
 def _public_names() -> list[str]:
     """Names of the package itself, and of its packages those that it does not export."""
-    modules = {"errors", "ext", "harness", "viz"}
+    modules = {"errors", "ext", "graphs", "harness", "viz"}
     names = [name for name in hn.__all__ if name not in modules]
     wing = [f"ext.{name}" for name in importlib.import_module("hybridnav.ext").__all__]
     packages = [module.name for module in pkgutil.iter_modules(hn.__path__) if module.ispkg]
