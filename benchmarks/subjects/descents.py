@@ -2,9 +2,11 @@
 
 Maps of noise, rooms and blobs, with unexplored cells, corners that may be cut, closures, costs, and
 changes of the map under a planner; fields, steps, rings and horizons at random, with and without
-blocks above small places. A path is found if and only if there is one, is legal, has the cost that
-it states, and none lies below the optimum; the bound of a plan by lengths is the optimum. Exits
-with 1 at the first answer that is not so, and prints what gives it again.
+blocks above small places. On half of the maps the places are versions of an on-line pyramid, which
+the planner follows: then it answers as a planner made anew. A path is found if and only if there is
+one, is legal, has the cost that it states, and none lies below the optimum; the bound of a plan by
+lengths is the optimum. Exits with 1 at the first answer that is not so, and prints what gives it
+again.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from scipy.sparse import csgraph
 
 import hybridnav as hn
 from benchmarks.common import SEED, option
+from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search import descent
 
 if TYPE_CHECKING:
@@ -115,15 +118,42 @@ def faults(case: Case, result: Any, shut: Any, ends: Any) -> str:
     return f"states {result.cost}, bound {bound_m}; the path costs {cost_m}, the optimum {least_m}"
 
 
-def topology_of(values: Any, rng: np.random.Generator, *, cutting: bool) -> hn.TopologicalMap:
-    """Return a map with places of a random size."""
-    grid = hn.OccupancyGrid(values, hn.Frame(0.1), robot_radius_m=0, corner_cutting=cutting)
+def grid_of(values: Any, *, cutting: bool) -> hn.OccupancyGrid:
+    """Return a map of a robot without width."""
+    return hn.OccupancyGrid(values, hn.Frame(0.1), robot_radius_m=0, corner_cutting=cutting)
+
+
+def pyramid_of(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.DualGraphPyramid:
+    """Return a pyramid with places of a random size."""
     merge_m = float(rng.choice([0.15, 0.3, 0.8, 3.0]))
-    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=merge_m))
+    return hn.DualGraphPyramid.build(grid, merge_distance_m=merge_m)
 
 
-def asked(case: Case, planner: hn.HybridPlanner, rng: np.random.Generator) -> tuple[int, str]:
-    """Ask for some pairs, and return how many were, and the first fault."""
+def differs(one: hn.PlanResult, other: hn.PlanResult) -> str:
+    """Return how two answers differ, nothing where they are equal, points and effort too."""
+    told = [
+        (
+            each.status,
+            each.cost,
+            each.lower_bound,
+            None if each.path is None else each.path.points.tolist(),
+            (each.stats.expanded, each.stats.expanded_places, each.stats.corridor_cells),
+        )
+        for each in (one, other)
+    ]
+    return "" if told[0] == told[1] else f"{told[0]}, and made anew {told[1]}"
+
+
+def asked(
+    case: Case,
+    planner: hn.HybridPlanner,
+    rng: np.random.Generator,
+    anew: hn.HybridPlanner | None,
+) -> tuple[int, str]:
+    """Ask for some pairs, and return how many were, and the first fault.
+
+    `anew`: a planner that must answer alike; None for none.
+    """
     n = 0
     for _ in range(PAIRS):
         shut = rng.random(case.open.shape) < rng.choice([0.0, 0.0, 0.05, 0.2])
@@ -134,7 +164,11 @@ def asked(case: Case, planner: hn.HybridPlanner, rng: np.random.Generator) -> tu
         closed = {"cells": np.argwhere(shut & case.open)} if shut.any() else None
         result = planner.plan(*case.grid.frame.points_of(ends), blocked=closed)
         n += 1
-        if fault := faults(case, result, shut, ends):
+        fault = faults(case, result, shut, ends)
+        if not fault and anew is not None:
+            again = anew.plan(*case.grid.frame.points_of(ends), blocked=closed)
+            fault = differs(result, again)
+        if fault:
             return n, fault
     return n, ""
 
@@ -143,7 +177,9 @@ def checked(seed: int) -> tuple[int, str]:
     """Check one map; return its plans and its fault."""
     rng = np.random.default_rng(seed)
     values, cutting = random_classes(rng), bool(rng.random() < 0.2)
-    topology = topology_of(values, rng, cutting=cutting)
+    pyramid = pyramid_of(grid_of(values, cutting=cutting), rng)
+    version = OnlinePyramid.of(pyramid) if rng.random() < 0.5 else None
+    topology = hn.TopologicalMap(version or pyramid)
     unexplored, by_costs = bool(rng.random() < 0.3), bool(rng.random() < 0.2)
     descent.MANY_PLACES = int(rng.choice([0, 1000]))
     descent.MOST_AT_TOP, descent.MOST_BLOCKS = rng.choice([2, 10, 1000], 2).tolist()
@@ -160,17 +196,23 @@ def checked(seed: int) -> tuple[int, str]:
     always = rng.random(shape) < 0.1 if by_costs else np.zeros(shape, np.bool_)
     costs = hn.CostLayer(factors, closed=always) if by_costs else None
     planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
-    total = 0
-    for turn in range(2):
+    total, anew = 0, None
+    for turn in range(2 if version is None else 5):
         if turn:
             low, high = np.sort(rng.integers(0, np.array(shape) + 1, (2, 2)), axis=0)
             values = values.copy()
             values[low[0] : high[0], low[1] : high[1]] = rng.choice([0.0, 1.0])
-            topology = topology_of(values, rng, cutting=cutting)
-            planner.update(topology=topology)
-        grid = topology.grid
+            grid = grid_of(values, cutting=cutting)
+            if version is None:
+                planner.update(topology=hn.TopologicalMap(pyramid_of(grid, rng)))
+            else:
+                version = version.update(grid).version
+                planner.update(grid=version)
+                now = hn.TopologicalMap(version.pyramid)
+                anew = hn.HybridPlanner(now, preset=preset, costs=costs)
+        grid = planner.grid
         case = Case(grid, grid.enterable(allow_unexplored=unexplored) & ~always, factors)
-        n, fault = asked(case, planner, rng)
+        n, fault = asked(case, planner, rng, anew)
         total += n
         if fault:
             return total, f"{fault}; costs {by_costs}, cutting {cutting}, {keys}"

@@ -2,18 +2,22 @@
 
 A square of 60 x 60 cells is blocked and freed again in turn. `update` is `planner.update` with the
 grid and the area of the change, `answer` the next query across it; `fresh` is the structure of the
-preset built of the changed map. All ratios are taken in one process.
+preset built of the changed map. The second table has `paper`, which takes the version of the
+on-line pyramid: CPU time of its update over that of the pyramid's own update by the same change, at
+random places; all packed arrays are compared with those of a planner made anew. All ratios are
+taken in one process.
 """
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import option, print_head, print_row, with_classes
+from benchmarks.common import option, print_head, print_load, print_row, with_classes
+from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search.mesh import build_mesh
 from hybridnav.search.octile import build_jump_graph, contract_graph
 
@@ -86,6 +90,37 @@ def run(preset: str, grid: hn.OccupancyGrid, topology: hn.TopologicalMap) -> Row
     return Row(update[4:], answer[4:], fresh_ms(preset, blocked))
 
 
+def run_paper(grid: hn.OccupancyGrid) -> tuple[list[float], ...]:
+    """Return CPU milliseconds of updates of the pyramid and of the planner, and of answers."""
+    version = OnlinePyramid.of(hn.DualGraphPyramid.build(grid))
+    planner = hn.HybridPlanner(hn.TopologicalMap(version), preset="paper")
+    free = np.argwhere(grid.classes == 1)
+    rng = np.random.default_rng(0)
+    planner.plan(*grid.frame.points_of(rng.choice(free, 2)))
+    own, update, answer = list[float](), list[float](), list[float]()
+    for low in rng.integers(0, grid.shape[0] - CHANGE, (TURNS, 2)).tolist():
+        blocked = grid.classes.copy()
+        blocked[low[0] : low[0] + CHANGE, low[1] : low[1] + CHANGE] = 0
+        high = low[0] + CHANGE, low[1] + CHANGE
+        area = grid.frame.points_of_grid([low, high]).ravel().tolist()
+        ends = grid.frame.points_of(rng.choice(np.argwhere(blocked == 1), 2))
+        for now in (with_classes(grid, blocked), grid):
+            times = [time.process_time()]
+            version = version.update(now, changed=area).version
+            times.append(time.process_time())
+            planner.update(grid=version, changed=area)
+            times.append(time.process_time())
+            planner.plan(*ends)
+            times.append(time.process_time())
+            for found, took in zip((own, update, answer), np.diff(times) * 1e3, strict=True):
+                found.append(float(took))
+    anew = hn.HybridPlanner(hn.TopologicalMap(version.pyramid), preset="paper")
+    fields: list[Any] = [each.method.prepare() for each in (planner, anew)]
+    if not all(map(np.array_equal, *(each.fields for each in fields))):
+        raise SystemExit("paper: what was repaired differs from what is made anew")
+    return own[4:], update[4:], answer[4:]
+
+
 OPTIONS = [
     option("--sides", type=int, nargs="+", default=SIDES),
 ]
@@ -108,3 +143,12 @@ def main(given: Namespace) -> None:
             of_both = f"{update:.1f}", f"{answer:.1f}", f"{np.percentile(both, 95):.1f}"
             fresh = f"{found.fresh:.0f}", f"{found.fresh / middle:.0f}"
             print_row(preset, f"{side * side:,}", *of_both, *fresh)
+    print_load()
+    print_head("paper", "the pyramid's update, ms", "the planner's, ms", "ratio", "answer, ms")
+    for side in given.sides:
+        classes = rooms_of(side)
+        probability = np.where(classes == 0, np.float32(1), np.float32(0))
+        grid = hn.OccupancyGrid(probability, hn.Frame(RESOLUTION_M), robot_radius_m=0)
+        own, update, answer = map(np.median, run_paper(grid))
+        figures = f"{own:.2f}", f"{update:.2f}", f"{update / own:.1f}", f"{answer:.2f}"
+        print_row(f"{side * side:,}", *figures)

@@ -16,11 +16,14 @@ from hybridnav.maps import CellClass
 from hybridnav.search.descent import (
     Descent,
     DescentSettings,
-    layers_of,
-    layers_within,
-    levels_of,
+    Planes,
+    has_small_places,
+    layers_over,
+    levels_by,
     pack,
+    sizes_of,
 )
+from hybridnav.search.lowest import lowest_of
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.strategies import examples, free_cells, scenes
 
@@ -70,8 +73,10 @@ def test_a_path_is_legal_and_there_whenever_one_is(scene: Any, how: Any, seed: i
 def test_the_levels_are_packed_as_the_pyramid_has_them(scene: Any, how: Any) -> None:
     pyramid = scene.pyramid("radius")
     enterable = scene.classes == CellClass.FREE
-    levels = levels_of(pyramid, how)
-    fields = pack(pyramid[levels[-1]], layers_of(pyramid, levels), enterable=enterable)
+    sizes = sizes_of(pyramid)
+    levels = levels_by(sizes, how)
+    lowest = lowest_of(pyramid, sizes, levels, None, by_distance=True)
+    fields = pack(lowest, Planes(lowest.layers, 0, 0), enterable, by_units=False)
     assert levels[0] == pyramid.place_level
     assert (np.diff(levels) < 0).all()
     for k, index in enumerate(levels):
@@ -173,11 +178,16 @@ def test_fields_above_are_what_arcs_connect_inside_a_block(
     with pytest.MonkeyPatch.context() as patch:
         for name, limit in zip(("MANY_PLACES", "MOST_AT_TOP", "MOST_BLOCKS"), limits, strict=True):
             patch.setattr(f"hybridnav.search.descent.{name}", limit)
-        level, layers, named = layers_within(pyramid, enterable, how)
-    fields = pack(level, layers, enterable=enterable)
+        sizes = sizes_of(pyramid)
+        is_small = has_small_places(sizes, how)
+        levels = [pyramid.place_level] if is_small else levels_by(sizes, how)
+        lowest = lowest_of(pyramid, sizes, levels, None, by_distance=not is_small)
+        planes = layers_over(lowest, enterable, how, is_by_places=True)
+    (layers, named, _), level = planes, pyramid[levels[-1]]
+    fields = pack(lowest, planes, enterable, by_units=False)
     is_open = level.classes == CellClass.FREE
     if kind == "few":
-        assert len(layers) == len(levels_of(pyramid, how))
+        assert len(layers) == len(levels)
     if named >= 0:
         assert len(layers[named].vertex) == pyramid[pyramid.place_level].n_vertices
     for k, (above, below) in enumerate(itertools.pairwise(layers)):
@@ -187,7 +197,7 @@ def test_fields_above_are_what_arcs_connect_inside_a_block(
         held = is_open[below.vertex]
         assert (parents[held] == above.of[below.vertex][held]).all()
         # Each field is connected: the sons of a route's fields hold a route.
-        ends = below.of[level.arcs[below.arcs]]
+        ends = below.of[level.arcs]
         ends = ends[(ends >= 0).all(axis=1)]
         ends = ends[held[ends].all(axis=1)]
         inside = ends[parents[ends[:, 0]] == parents[ends[:, 1]]]

@@ -205,7 +205,7 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     if not first.solved:
         return unplanned(first.status)
     search = None
-    if planner.topology.pyramid.rooms is not None:
+    if planner.topology.has_rooms:
         closed = planner.closed_for_all(planner.closed(blocked, waypoints))
         search = DoorTours(planner, first, waypoints, closed)
     return _by_doors(search, first, limits, by_costs=planner.costs is not None)

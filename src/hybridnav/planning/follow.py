@@ -16,6 +16,7 @@ from hybridnav.planning.methods import make_method
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.search.found import MapChange
 from hybridnav.topology import TopologicalMap
+from hybridnav.topology.map import is_version
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.planning import Planning
+    from hybridnav.topology.map import Version
 
 
 class PlannerUpdate(NamedTuple):
@@ -41,21 +43,25 @@ class PlannerUpdate(NamedTuple):
 
 
 def update_of(
-    costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
+    costs: CostLayer | None,
+    grid: OccupancyGrid | Version | None,
+    topology: TopologicalMap | None,
+    box: Box,
 ) -> PlannerUpdate:
-    """Return the update that was given.
+    """Return the update that was given; a version stands for its places.
 
     Raises `InvalidValueError` when nothing is given, or something of another type.
     """
     if topology is not None:
         checked_type("topology", topology, TopologicalMap)
-    if grid is not None:
-        checked_type("grid", grid, OccupancyGrid)
-    if costs is None and topology is None and grid is None:
+    if is_version(grid):
+        topology, grid = topology or TopologicalMap(grid), grid.grid
+    map_now = None if grid is None else checked_type("grid", grid, OccupancyGrid)
+    if costs is None and topology is None and map_now is None:
         raise InvalidValueError(
             "update was given no costs, grid or topology, expected one of them: pass what changed"
         )
-    return PlannerUpdate(costs, grid, topology, box)
+    return PlannerUpdate(costs, map_now, topology, box)
 
 
 def begun(now: Planning, update: PlannerUpdate) -> Callable[[], Planning]:
@@ -94,7 +100,7 @@ def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     if places is None and settings.needs_places:
         raise InvalidValueError(
             f"preset {now.preset.name} plans on the places of its map, and only a grid is given: "
-            "call update with topology too, or take another preset than paper"
+            "call update with a version of an OnlinePyramid as grid, or with topology too"
         )
     if places is not None:
         if grid is not None and not np.array_equal(grid.classes, places.grid.classes):

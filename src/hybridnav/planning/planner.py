@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from hybridnav.planning.result import PlanDraft
     from hybridnav.search.found import ClosedCells, Method, Prepared
     from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.map import Version
 
 
 @copies_alike
@@ -136,7 +137,7 @@ class HybridPlanner(Questions):
     def pyramid_rooms(self) -> RoomLabels | None:
         """The rooms of the map; None without rooms, or while its places are not built."""
         own = self._now.topology
-        return None if own is None else own.pyramid.rooms
+        return own.pyramid.rooms if own is not None and own.has_rooms else None
 
     @property
     def costs(self) -> CostLayer | None:
@@ -345,7 +346,7 @@ class HybridPlanner(Questions):
         self,
         *,
         costs: CostLayer | None = None,
-        grid: OccupancyGrid | None = None,
+        grid: OccupancyGrid | Version | None = None,
         topology: TopologicalMap | None = None,
         changed: BaseGeometry | ArrayLike | None = None,
     ) -> None:
@@ -356,8 +357,10 @@ class HybridPlanner(Questions):
 
         `shortest`, `octile`, `grid-astar` and `robot` follow a changed grid alone. Their results
         have no route, and names, places and doors are refused, until an update brings the places of
-        the map now. All other presets need these at once. Costs that were given stay with their
-        cells on a changed map; costs that the preset computes from the map are computed anew.
+        the map now. All other presets need these at once. `paper` takes them from the version of an
+        `OnlinePyramid`. What it packed of the version before is repaired where the map changed.
+        Then its plans are those of a planner made anew. Costs that were given stay with
+        their cells on a changed map; costs that the preset computes from it are computed anew.
 
         Parameters
         ----------
@@ -365,7 +368,8 @@ class HybridPlanner(Questions):
             The new costs, in place of those given before; those of the preset stay joined with
             them. Closed cells are closed from now on, and open again if they were closed before.
         grid
-            The map now, with the shape and the frame of the one before; its classes count.
+            The map now, with the shape and the frame of the one before; its classes count. Or a
+            version of an `OnlinePyramid`, which has the places too; they are made when read.
         topology
             The places of the map now; its grid is taken if no `grid` is given.
         changed

@@ -496,7 +496,7 @@ class Planning:
 
     @cached_property
     def _settings(self) -> dict[str, Any]:
-        pyramid, layer = self.built.pyramid, self.costs.layer
+        pyramid, layer = self.built.source, self.costs.layer
         costs = {} if layer is None else {"costs": layer.source}
         limits = self.preset.limits
         return {
@@ -515,7 +515,7 @@ class Planning:
     @property
     def has_rooms(self) -> bool:
         """Whether the map has rooms, so that words tell of its paths."""
-        return self.topology is not None and self.topology.pyramid.rooms is not None
+        return self.topology is not None and self.topology.has_rooms
 
     # Many queries at once: those that look-ups answer in one kernel, the others one by one.
 

@@ -5,7 +5,7 @@ share.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -101,6 +101,18 @@ _NO_HULLS = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
 """Hulls where distances do not count."""
 
 
+class Window(NamedTuple):
+    """Where the map of a decimation lies on a larger one: edges of equal attribute are ordered as
+    there."""
+
+    row: int
+    """Its first row, a multiple of 16: blocks are those of the larger map."""
+    col: int
+    """Its first column, another multiple."""
+    cols: int
+    """Columns of the larger map."""
+
+
 class Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
@@ -108,13 +120,25 @@ class Decimation:
     """By flat cell, those that survive whatever they merge with; None for no such cells."""
 
     def __init__(
-        self, start: Start, seed: int, linkage: int = _kernels.SURVIVOR, limit: int = NO_LIMIT
+        self,
+        start: Start,
+        seed: int,
+        linkage: int = _kernels.SURVIVOR,
+        limit: int = NO_LIMIT,
+        window: Window | None = None,
     ) -> None:
         self.stats = BuildStats()
         self._began = clock()
         self._linkage = linkage
         self._limit = limit
-        self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
+        row, col, cols = (0, 0, start.cols) if window is None else window
+        numbers = (
+            seed * 0x9E3779B1 + 0x7F4A7C15 & 0xFFFFFFFF,
+            2 * (row * cols + col),
+            2 * start.cols,
+            2 * (cols - start.cols),
+        )
+        self._order = _kernels.Order(*map(np.uint64, numbers))
         self._hulls = _NO_HULLS
         self._steering: Steering | None = None
         self.record, self._darts, self._vertices, self._level, self._cols = start
@@ -234,7 +258,7 @@ class Decimation:
             scratch.matched,
             scratch.best,
             self._vertices,
-            self._seed,
+            self._order,
             stars,
         )
         if self._steering is not None:
@@ -269,7 +293,7 @@ class Decimation:
                 self._level,
                 self._linkage,
                 self._limit,
-                self._seed,
+                self._order,
                 self._scratch.keys,
                 self._scratch.state,
                 self._scratch.best,
@@ -282,7 +306,7 @@ class Decimation:
         arcs, ranks = steering.candidates(self.field_of, darts, self._vertices)
         keys, base_edge = scratch.keys[: len(arcs)], darts.base_edge
         _kernels.open_candidates(
-            darts.origin, base_edge, arcs, ranks, self._seed, keys, scratch.state, scratch.best
+            darts.origin, base_edge, arcs, ranks, self._order, keys, scratch.state, scratch.best
         )
         return len(arcs)
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._base.clock import clock
-from hybridnav.pyramid.contraction import NO_LIMIT, Decimation
+from hybridnav.pyramid.contraction import NO_LIMIT, Decimation, Window
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
@@ -255,18 +255,20 @@ class Fields(NamedTuple):
     """int32 (n, 4), as `Level.boxes`."""
 
 
-def contract_places(places: IntArray, survivors: BoolArray, criterion: Criterion) -> Record:
+def contract_places(
+    places: IntArray, survivors: BoolArray, criterion: Criterion, *, window: Window | None = None
+) -> Record:
     """Contract each of some places to its surviving cell, and return all levels, flat.
 
     `places`: int32 (rows, cols), the place of each cell that starts as a vertex of the base, from
     1; 0 elsewhere; `survivors`: bool (rows, cols), the cell of each place that survives. The
     linkage is "radius", and no cell is too far from that of its place. `criterion`: when two fields
-    merge.
+    merge; `window`: where on a larger map they lie, to be contracted as there; None for the whole.
     """
     in_blocks = np.where(survivors, np.int32(0), places)
     places.flags.writeable = in_blocks.flags.writeable = False
     start = start_at_base(places, criterion.limit, in_blocks=in_blocks)
-    return _contract_within(start, criterion, survivors.ravel())
+    return _contract_within(start, criterion, survivors.ravel(), window)
 
 
 def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
@@ -281,14 +283,16 @@ def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
     return Fields(field_of.reshape(classes.shape), survivors, areas, boxes)
 
 
-def _contract_within(start: Start, criterion: Criterion, survivors: BoolArray | None) -> Record:
+def _contract_within(
+    start: Start, criterion: Criterion, survivors: BoolArray | None, window: Window | None = None
+) -> Record:
     """Contract stars from a start until no edge may be contracted, and return its record.
 
     `survivors`: bool by flat cell, cells that survive whatever they merge with; at most one of each
     kind.
     """
     linkage, limit, seed = criterion
-    run = Decimation(start, seed, _LINKAGES[linkage], limit)
+    run = Decimation(start, seed, _LINKAGES[linkage], limit, window)
     run.survivors = survivors
     run.exhaust()
     return start.record

@@ -317,11 +317,16 @@ class Level:
         return {"name": grid.name, "level": self.index, "resolution_m": grid.resolution_m}
 
     @cached_property
+    def hulls(self) -> tuple[LongArray, IntArray]:
+        """The convex hulls of the fields: int64 (n_vertices + 1,), where each begins among the
+        next, and int32 (n, 2), cells (row, col)."""
+        return _hull_kernels.field_hulls(self._labels[0], self._grid.shape[1], self.boxes)
+
+    @cached_property
     def max_distance_m(self) -> FloatArray:
         """float64 (n_arcs,), largest distance between the centre of a cell of one field and the
         centre of a cell of the other; for a self-loop the diameter of its field. In metres."""
-        start, points = _hull_kernels.field_hulls(self._labels[0], self._grid.shape[1], self.boxes)
-        squared = _hull_kernels.hull_distances(start, points, self.arcs)
+        squared = _hull_kernels.hull_distances(*self.hulls, self.arcs)
         return frozen(np.sqrt(squared) * self._grid.resolution_m)
 
     @cached_property

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.pyramid.kernels.fields import level_sizes
+from hybridnav.pyramid.kernels.fields import field_extents, label_fields, level_sizes
+from hybridnav.pyramid.kernels.hulls import field_hulls, hull_distances
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._base.typing import ByteArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.darts import Resists
 
@@ -55,6 +56,39 @@ class Record:
         """Count what each level has, without making the levels; `cols` are those of the grid."""
         ends = self.vertex_end, self.vertex_parent, self.edge_end
         return [LevelSize(*size) for size in level_sizes(*ends, cols, n_levels).tolist()]
+
+
+class Patch(NamedTuple):
+    """What differs between the records of two maps: whole places, in a window."""
+
+    low: tuple[int, int]
+    """Row and column of the first cell of the window."""
+    was: BoolArray
+    """bool (rows, cols), the cells of places that are no more, or other ones than before."""
+    record: Record
+    """Record of the window's cells, for the places that are new, or other ones; parents are flat
+    cells of the window. `vertex_end` of all other cells is 0."""
+
+    def fields(self, level: int) -> tuple[IntArray, LongArray]:
+        """Return the vertex of a level that holds each cell of the window, int32 (rows, cols), -1
+        for none, and the surviving cells, flat in the window."""
+        record = self.record
+        label, survivors = label_fields(record.vertex_end, record.vertex_parent, level)
+        return label.reshape(self.was.shape), survivors
+
+    def place_hulls(self) -> tuple[LongArray, IntArray]:
+        """Return the convex hulls of the places, as `Level.hulls` of the map."""
+        label, survivors = self.fields(SURVIVES - 1)
+        cols = self.was.shape[1]
+        boxes = field_extents(label.ravel(), cols, len(survivors))[1]
+        start, points = field_hulls(label.ravel(), cols, boxes)
+        return start, points + np.array(self.low, np.int32)
+
+
+def farthest_apart(hulls: tuple[LongArray, IntArray], pairs: LongArray) -> LongArray:
+    """Return the largest squared distance between cells of the fields of each pair, (n, 2)."""
+    squared: LongArray = hull_distances(*hulls, pairs.astype(np.int32))
+    return squared
 
 
 @dataclass(frozen=True)

@@ -210,7 +210,8 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
 MAX_POWER = 3
 """The largest block has 2^3 cells a side: larger ones gain no time."""
 
-_PERIOD = 2 << MAX_POWER  # a block's survivor depends on whether its block number is odd
+PERIOD = 2 << MAX_POWER
+"""Rows after which blocks lie as before: their survivors depend on whether their number is odd."""
 
 
 class Templates(NamedTuple):
@@ -292,12 +293,12 @@ def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
 def make_templates() -> Templates:
     """Fill the tables."""
     powers, width = MAX_POWER + 1, 1 << MAX_POWER
-    vertex_end = np.full((powers, _PERIOD, _PERIOD), SURVIVES, np.uint8)
-    parent_rows = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
-    parent_cols = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
+    vertex_end = np.full((powers, PERIOD, PERIOD), SURVIVES, np.uint8)
+    parent_rows = np.zeros((powers, PERIOD, PERIOD), np.int64)
+    parent_cols = np.zeros((powers, PERIOD, PERIOD), np.int64)
     inside_east = np.zeros((powers, width, width), np.uint8)
     inside_north = np.zeros((powers, width, width), np.uint8)
-    for power, row, col in np.ndindex(powers, _PERIOD, _PERIOD):
+    for power, row, col in np.ndindex(powers, PERIOD, PERIOD):
         by_row, by_col = _death(row), _death(col)
         if by_col <= min(power, by_row):
             vertex_end[power, row, col] = 2 * by_col - 1

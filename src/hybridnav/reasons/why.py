@@ -286,7 +286,7 @@ class Case:
         """Return a cell as a point, with the door whose boundary its free disc meets."""
         x, y = self.grid.frame.points_of(cell).tolist()
         topology = self.topology
-        if topology is None or topology.pyramid.rooms is None:
+        if topology is None or not topology.has_rooms:
             return TightPlace((x, y))
         reach_m = self._clear(cell)
         best: tuple[float, Door | None] = (reach_m / self.grid.resolution_m, None)

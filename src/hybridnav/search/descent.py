@@ -10,7 +10,8 @@ at a time.
 from __future__ import annotations
 
 import math
-from functools import partial
+from copy import copy
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -19,20 +20,21 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import legal_moves
 from hybridnav._base.threads import Pool
 from hybridnav.maps.costs.factors import UNIT_BITS
-from hybridnav.pyramid.record import SURVIVES, Record
 from hybridnav.route.route import Corridor
 from hybridnav.search.grid_search import move_tables
 from hybridnav.search.kernels import descent as _kernels
+from hybridnav.search.kernels import fields as _field_kernels
 from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
 from hybridnav.search.kernels.grid_search import BUCKETS
+from hybridnav.search.lowest import Layer, lowest_of, patched, patched_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.pyramid.level import Level
-    from hybridnav.pyramid.record import Record
+    from hybridnav.pyramid.record import Patch
+    from hybridnav.search.lowest import Lowest
 
 T = TypeVar("T")
 Cell = tuple[int, int]
@@ -80,14 +82,19 @@ class Descended(NamedTuple):
     """Length of the path, cells; 0 without one."""
 
 
-def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]:
-    """Return the levels that a descent visits, from the top down.
+def sizes_of(pyramid: DualGraphPyramid) -> list[int]:
+    """Return how many vertices the levels have that a descent may visit, the base first.
 
     The top is that of the places, or that of the regions, if the pyramid has any.
     """
     top = pyramid.place_level if pyramid.region_cells is None else pyramid.region_level
-    sizes = np.array([size.vertices for size in pyramid.stats.sizes[: top + 1]])
-    means = sizes[0] / np.maximum(sizes, 1)
+    return [size.vertices for size in pyramid.stats.sizes[: top + 1]]
+
+
+def levels_by(sizes: list[int], settings: DescentSettings) -> list[int]:
+    """Return the levels that a descent visits, from the top down; `sizes`: see `sizes_of`."""
+    top, counts = len(sizes) - 1, np.array(sizes)
+    means = counts[0] / np.maximum(counts, 1)
     off = np.maximum(means / settings.field_cells, settings.field_cells / np.maximum(means, 1))
     levels = [int(np.argmin(off))]
     for level in range(levels[0] + 1, top):
@@ -96,6 +103,12 @@ def levels_of(pyramid: DualGraphPyramid, settings: DescentSettings) -> list[int]
     if len(levels) > 1 and means[top] < settings.step * means[levels[-1]] * NEARLY:
         levels.pop()
     return [*([top] if top != levels[-1] else []), *reversed(levels)]
+
+
+def has_small_places(sizes: list[int], settings: DescentSettings) -> bool:
+    """Return whether places, the last of some levels, are many and smaller than the last fields."""
+    n_cells, n_places = sizes[0], sizes[-1]
+    return n_places > MANY_PLACES and n_cells < settings.field_cells * n_places
 
 
 class KeptFields(NamedTuple):
@@ -121,49 +134,19 @@ class WatchedDescent(NamedTuple):
     """int64 (k, 2), the cells of the path, (row, col)."""
 
 
-class Layer(NamedTuple):
-    """The fields of one level of a descent, made of the vertices of a level of the pyramid."""
-
-    of: LongArray
-    """int64 (vertices,), the field of each; -1 for none."""
-    vertex: LongArray
-    """int64 (n,), the vertex of each field whose surviving cell stands for it."""
-    arcs: LongArray
-    """int64 (m,), the arcs of the pyramid's level that join fields of this one."""
-    costs: FloatArray | None = None
-    """float64 (m,), costs of these arcs, cells; None for octile distances between centres of
-    gravity."""
-
-
-def layers_of(pyramid: DualGraphPyramid, levels: list[int]) -> list[Layer]:
-    """Return the fields of some levels, the highest first, of the vertices of the last one.
-
-    At the top an arc costs its `max_distance_m`, which the source paper has.
-    """
-    lowest, record, cols = pyramid[levels[-1]], pyramid.record, pyramid.grid.shape[1]
-    survivors = lowest.cells[:, 0] * cols + lowest.cells[:, 1]
-    vertex_end, edge_end = record.vertex_end[survivors], record.edge_end[lowest.base_edges]
-    costs: FloatArray | None = pyramid[levels[0]].max_distance_m / pyramid.grid.resolution_m
-    layers = []
-    for level in levels:
-        arcs = np.flatnonzero(edge_end >= min(2 * level + 2, SURVIVES))
-        alive = np.flatnonzero(vertex_end > level)
-        layers.append(Layer(_ancestors(record, survivors, level), alive, arcs, costs))
-        costs = None
-    return layers
-
-
-def joined(level: Level, below: Layer, is_open: BoolArray, side: int) -> Layer:
+def joined(lowest: Lowest, below: Layer, enterable: BoolArray, side: int) -> Layer:
     """Return the fields of a level above: those that arcs connect inside a square block of cells.
 
-    `level`: the level of whose vertices fields are made; `below`: the fields that are joined;
-    `is_open`: bool (vertices,), those that paths may pass; `side`: of a block, in cells.
+    `lowest`: the vertices of which fields are made; `below`: the fields that are joined;
+    `enterable`: bool (rows, cols), the cells that paths may pass; `side`: of a block, in cells.
     """
-    arcs = below.of[level.arcs[below.arcs]]
-    cells, may_pass = level.cells[below.vertex], is_open[below.vertex]
-    arcs = arcs[((arcs >= 0) & may_pass[arcs]).all(axis=1)]
-    of, nearest = _kernels.join_in_blocks(cells, may_pass, arcs, side)
-    return Layer(np.append(of, -1)[below.of], below.vertex[nearest], below.arcs)
+    flat, arcs = lowest.cells[below.vertex], below.of[lowest.arcs]
+    may_pass = enterable.ravel()[flat]
+    is_open = (arcs >= 0) & may_pass[arcs]
+    arcs = arcs[is_open[:, 0] & is_open[:, 1]]
+    cells = np.stack(np.divmod(flat, enterable.shape[1]), axis=1)
+    of, nearest = _field_kernels.join_in_blocks(cells, may_pass, arcs, side)
+    return Layer(np.append(of, -1)[below.of], below.vertex[nearest])
 
 
 def _by_fields_above(layer: Layer, above: Layer) -> Layer:
@@ -175,104 +158,86 @@ def _by_fields_above(layer: Layer, above: Layer) -> Layer:
     return layer._replace(of=rank[layer.of], vertex=layer.vertex[order])
 
 
-def layers_within(
-    pyramid: DualGraphPyramid, enterable: BoolArray, settings: DescentSettings
-) -> tuple[Level, list[Layer], int]:
-    """Return the fields of a descent: the level of whose vertices they are made, the layers from
-    the top down, and which of them is that of the places; -1 for none.
+class Planes(NamedTuple):
+    """The layers of a descent, from the top down."""
+
+    layers: list[Layer]
+    named: int
+    """Which of them is that of the places; -1 for none."""
+    given: int
+    """Which has costs of its own; -1 for none."""
+
+
+def layers_over(
+    lowest: Lowest, enterable: BoolArray, settings: DescentSettings, *, is_by_places: bool
+) -> Planes:
+    """Return the fields of a descent.
 
     Where places are many and smaller than the last fields, these are blocks of joined places. Where
     a level has too many fields to be the top, there are blocks of theirs above it.
+
+    `is_by_places`: whether the highest level of the pyramid is that of the places.
     """
-    n_cells, n_places = (pyramid.stats.sizes[k].vertices for k in (0, pyramid.place_level))
-    levels = levels_of(pyramid, settings)
-    is_by_places, most = levels[0] == pyramid.place_level, MOST_AT_TOP
-    level = pyramid[levels[-1]]
-    is_open = enterable[tuple(level.cells.T)]
-    if is_by_places and n_places > MANY_PLACES and n_cells < settings.field_cells * n_places:
-        level, most, is_by_places = pyramid[pyramid.place_level], MOST_BLOCKS, False
-        is_open = enterable[tuple(level.cells.T)]
-        every, side = np.arange(level.n_vertices), max(round(math.sqrt(settings.field_cells)), 1)
-        layers = [joined(level, Layer(every, every, np.arange(level.n_arcs)), is_open, side)]
+    is_small, most = lowest.top is None, MOST_AT_TOP
+    layers, n_cells = list(lowest.layers), int(lowest.sums[:, 0].sum())
+    if is_small:
+        side, most = max(round(math.sqrt(settings.field_cells)), 1), MOST_BLOCKS
+        layers = [joined(lowest, layers[0], enterable, side)]
     else:
-        layers = layers_of(pyramid, levels)
         side = math.isqrt(n_cells // max(len(layers[0].vertex), 1)) + 1
     n_below = len(layers)
     while len(layers[0].vertex) > most:
         side *= BLOCK_SIDE
-        layers.insert(0, joined(level, layers[0], is_open, side))
+        layers.insert(0, joined(lowest, layers[0], enterable, side))
         if len(layers[0].vertex) > NEARLY * len(layers[1].vertex):
             layers.pop(0)  # parts that no arc connects
             break
-    named = len(layers) - n_below if is_by_places else -1
+    given = -1 if is_small else len(layers) - n_below
+    named = given if is_by_places else -1
     for k in range(max(named, 0) + 1, len(layers)):
         layers[k] = _by_fields_above(layers[k], layers[k - 1])
-    return level, layers, named
+    return Planes(layers, named, given)
 
 
-def pack(
-    level: Level,
-    layers: list[Layer],
-    *,
-    enterable: BoolArray,
-    units: IntArray | None = None,
-) -> LevelFields:
+def pack(lowest: Lowest, planes: Planes, enterable: BoolArray, *, by_units: bool) -> LevelFields:
     """Return the fields of a descent for kernels.
 
     Where no other cost is given, an arc costs the octile distance between the centres of gravity of
-    its two fields (ours), with `units` times the mean of their factors.
+    its two fields (ours), with `by_units` times the mean of their factors.
 
-    `level`: the level of whose vertices fields are made; `layers`: those of the descent, the
-    highest first; `enterable`: bool (rows, cols), the cells that paths may use; `units`: int32
-    (rows, cols), factor of each cell; None for lengths.
+    `enterable`: bool (rows, cols), the cells that paths may use.
     """
-    cols = enterable.shape[1]
-    survivors = level.cells[:, 0] * cols + level.cells[:, 1]
-    flat = None if units is None else np.ascontiguousarray(units).ravel()
-    sums = _kernels.field_sums(level.field_of.ravel(), cols, flat, level.n_vertices)
-    starts, parts, n_arcs = [0], [], 0
+    starts, parts, n_arcs, cols = [0], [], 0, enterable.shape[1]
     above: LongArray | None = None  # the field of the level above of each vertex
     total = np.empty((0, 4))
-    for of, vertex, edges, given in layers:
+    for k, (of, vertex) in enumerate(planes.layers):
         n_fields, held = len(vertex), of >= 0
-        total = np.stack([np.bincount(of[held], part[held], n_fields) for part in sums.T], axis=1)
+        total = np.stack(
+            [np.bincount(of[held], part[held], n_fields) for part in lowest.sums.T], axis=1
+        )
         means = total[:, 1:] / total[:, :1]
-        ends, is_open = of[level.arcs[edges].T], np.append(enterable.flat[survivors[vertex]], False)
-        may_pass = is_open[ends[0]] & is_open[ends[1]] & (ends[0] != ends[1])
-        middle = means[:, :2] if given is None else level.cells[vertex].astype(np.float64)
-        ends = ends[:, may_pass]
-        keys = ends * n_fields + ends[::-1]
-        pairs = np.sort(keys, axis=None)  # several times faster than np.unique
-        pairs = pairs[np.diff(pairs, prepend=-1) > 0]
-        tails, neighbour = np.divmod(pairs, max(n_fields, 1))
-        first = np.searchsorted(tails, np.arange(n_fields))
-        if given is None:
-            rows_cols = np.abs(middle[tails] - middle[neighbour])
-            cost = rows_cols.max(axis=1) + (_ROOT_2 - 1) * rows_cols.min(axis=1)
-            if units is not None:
-                cost *= (means[tails, 2] + means[neighbour, 2]) / (2 << UNIT_BITS)
+        cells = lowest.cells[vertex]
+        first, heads = _field_kernels.neighbours_of(lowest.arcs, of, enterable.ravel()[cells])
+        tails = np.repeat(np.arange(n_fields), np.diff(first))
+        if k == planes.given and lowest.top is not None:
+            middle = np.stack(np.divmod(cells, cols), axis=1).astype(np.float64)
+            costs = lowest.top.of(cells[tails], cells[heads], enterable.size)
         else:
-            cost = np.empty(len(pairs))  # arcs between the same two fields cost the same
-            cost[np.searchsorted(pairs, keys)] = given[may_pass]
+            middle = means[:, :2]
+            costs = _field_kernels.octile_costs(first, heads, middle)
+            if by_units:
+                costs *= (means[tails, 2] + means[heads, 2]) / (2 << UNIT_BITS)
         parent = np.full(n_fields, -1) if above is None else above[vertex] + starts[-2]
-        parts.append((first + n_arcs, neighbour + starts[-1], cost, parent, middle))
-        n_arcs += len(neighbour)
+        parts.append((first[:-1] + n_arcs, heads + np.int32(starts[-1]), costs, parent, middle))
+        n_arcs += len(heads)
         starts.append(starts[-1] + n_fields)
         above = of
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     dtypes: list[Any] = [np.int64, np.int32, np.float32, np.int32, np.float32]
     arrays: list[Any] = [c.astype(dtype) for c, dtype in zip(columns, dtypes, strict=True)]
     arrays[0] = np.append(arrays[0], n_arcs)
-    areas = total[:, 0].astype(np.int64)
-    return LevelFields._make([np.array(starts), *arrays, survivors[layers[-1].vertex], areas])
-
-
-def _ancestors(record: Record, cells: LongArray, level: int) -> LongArray:
-    """Return the vertex of a level that holds each surviving cell, flat, of a level below."""
-    holder = cells.copy()
-    while (gone := record.vertex_end[holder] <= level).any():
-        holder[gone] = record.vertex_parent[holder[gone]]
-    return np.searchsorted(cells[record.vertex_end[cells] > level], holder)
+    last = lowest.cells[planes.layers[-1].vertex]
+    return LevelFields._make([np.array(starts), *arrays, last, total[:, 0].astype(np.int64)])
 
 
 class _Work:
@@ -305,8 +270,9 @@ class _Work:
 class Descent:
     """The descents of one map; threads may share it.
 
-    Between queries it holds some 60 bytes for each field of its levels, and four bytes a cell for
-    the field of each. A search for a path takes eight bytes a cell for its records.
+    Between queries it holds some 120 bytes for each field of its levels, and six bytes a cell: the
+    moves from each, and the vertex that holds it. A search for a path takes eight bytes a cell for
+    its records.
 
     Parameters
     ----------
@@ -340,19 +306,60 @@ class Descent:
         units: IntArray | None = None,
         corner_cutting: bool = False,
     ) -> None:
-        level, layers, self._named = layers_within(pyramid, enterable, settings)
-        self.fields = pack(level, layers, enterable=enterable, units=units)
-        self.field_of = np.append(layers[-1].of, -1).astype(np.int32)[level.field_of]
-        """int32 (rows, cols), the last field of each cell; -1 for none."""
-        rings = np.full(len(layers), settings.ring)
+        sizes = sizes_of(pyramid)
+        self._is_by_places = pyramid.region_cells is None
+        self._settings, self._corner_cutting = settings, corner_cutting
+        is_small = self._is_by_places and has_small_places(sizes, settings)
+        levels = [pyramid.place_level] if is_small else levels_by(sizes, settings)
+        lowest = lowest_of(pyramid, sizes, levels, units, by_distance=not is_small)
+        self._lay(lowest, enterable, by_units=units is not None)
+
+    def _lay(self, lowest: Lowest, enterable: BoolArray, *, by_units: bool) -> None:
+        """Pack the fields that are made of some vertices."""
+        settings = self._settings
+        planes = layers_over(lowest, enterable, settings, is_by_places=self._is_by_places)
+        self._lowest, self._named = lowest, planes.named
+        self.fields = pack(lowest, planes, enterable, by_units=by_units)
+        rings = np.full(len(planes.layers), settings.ring)
         rings[: max(self._named + 1, 1)] += 2 if settings.ring else 0
         self._rings, self._horizon = rings, float(settings.horizon_cells)
-        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
-        successors, _ = move_tables(corner_cutting=corner_cutting)
+        moves = legal_moves(np.ascontiguousarray(enterable), self._corner_cutting)
+        successors, _ = move_tables(corner_cutting=self._corner_cutting)
         self._ground = MapCells(
-            moves.ravel(), enterable.shape[1], self.field_of.ravel(), successors
+            moves.ravel(),
+            enterable.shape[1],
+            lowest.holder.ravel(),
+            lowest.cells,
+            planes.layers[-1].of,
+            successors,
         )
         self._works = Pool(partial(_Work, self.fields, enterable.size))
+
+    @cached_property
+    def field_of(self) -> IntArray:
+        """int32 (rows, cols), the last field of each cell; -1 for none."""
+        return np.append(self._ground.field_of, -1).astype(np.int32)[self._lowest.field_of]
+
+    def changed(self, patch: Patch, enterable: BoolArray, units: IntArray | None) -> Descent | None:
+        """Return the descents of a map after a change, this one stays as it is.
+
+        They are those that are made of the whole pyramid of the map now, in the time of the change,
+        of copies of four bytes a cell, and of packing the fields. None where other levels have to
+        be visited now.
+
+        `patch`: what became of the pyramid's record; `enterable`, `units`: as in the constructor.
+        """
+        lowest, settings = self._lowest, self._settings
+        _, sizes = patched_ends(lowest, patch)
+        is_small = has_small_places(sizes, settings)
+        levels = [len(sizes) - 1] if is_small else levels_by(sizes, settings)
+        if is_small is not (lowest.top is None) or levels[1:] != lowest.levels[1:]:
+            return None
+        made = copy(self)
+        vars(made).pop("field_of", None)
+        now = patched(lowest, patch, levels, units)
+        Descent._lay(made, now, enterable, by_units=units is not None)
+        return made
 
     @property
     def memory_bytes(self) -> int:

@@ -7,13 +7,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeGuard
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.pyramid import Level
+    from hybridnav.pyramid.record import Linkage, Patch
     from hybridnav.rooms.level import Rooms
     from hybridnav.topology.inclusion import Enclosed, Inclusion
 
@@ -81,6 +83,39 @@ def transform_of(level: Level, arc: int) -> Pose:
     return x, y, 0.0
 
 
+class Version(Protocol):
+    """One version of a pyramid that follows its map, as `hybridnav.ext.live.OnlinePyramid`."""
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map of this version."""
+
+    @property
+    def merge_distance_m(self) -> float:
+        """See `DualGraphPyramid`."""
+
+    @property
+    def linkage(self) -> Linkage:
+        """See `DualGraphPyramid`."""
+
+    @property
+    def seed(self) -> int:
+        """See `DualGraphPyramid`."""
+
+    @property
+    def pyramid(self) -> DualGraphPyramid:
+        """The version as a pyramid with all levels; it takes far longer than an update."""
+
+    def patched(self, before: Any, cells: LongArray) -> Patch | None:
+        """Return what differs between the records of `pyramid` and that of another version, by
+        which some cells changed, int64 (n, 2); None where they cannot be compared."""
+
+
+def is_version(thing: object) -> TypeGuard[Version]:
+    """Return whether something is a version; nothing of it is read, as `isinstance` would do."""
+    return hasattr(type(thing), "patched")
+
+
 @dataclass(frozen=True)
 class Obstacle:
     """An 8-connected set of occupied cells, by its index in `pyramid.islands`; 0 is the rim."""
@@ -105,7 +140,8 @@ class TopologicalMap:
     Parameters
     ----------
     pyramid
-        The pyramid that holds the places: at its apex, or below its rooms.
+        The pyramid that holds the places: at its apex, or below its rooms. Or a version of a
+        pyramid that follows its map, such as an `OnlinePyramid`.
 
     Examples
     --------
@@ -117,13 +153,29 @@ class TopologicalMap:
     0
     """
 
-    def __init__(self, pyramid: DualGraphPyramid) -> None:
-        self.pyramid = pyramid
-        self.level: Level = pyramid[pyramid.place_level]
-        self.place_ids: LongArray = np.arange(self.level.n_vertices, dtype=np.int64)
-        self.arc_ids: LongArray = np.arange(self.level.n_arcs, dtype=np.int64)
-        self.place_ids.flags.writeable = False
-        self.arc_ids.flags.writeable = False
+    def __init__(self, pyramid: DualGraphPyramid | Version) -> None:
+        self.source = pyramid
+
+    @cached_property
+    def pyramid(self) -> DualGraphPyramid:
+        """The pyramid that holds the places; that of a version is made when it is read."""
+        own = self.source
+        return own if isinstance(own, DualGraphPyramid) else own.pyramid
+
+    @cached_property
+    def level(self) -> Level:
+        """The level of the places."""
+        return self.pyramid[self.pyramid.place_level]
+
+    @cached_property
+    def place_ids(self) -> LongArray:
+        """int64 (n_places,), lasting ids of the places."""
+        return frozen(np.arange(self.level.n_vertices, dtype=np.int64))
+
+    @cached_property
+    def arc_ids(self) -> LongArray:
+        """int64 (n_arcs,), lasting ids of the arcs."""
+        return frozen(np.arange(self.level.n_arcs, dtype=np.int64))
 
     def __repr__(self) -> str:
         return f"TopologicalMap(n_places={self.n_places}, n_arcs={self.n_arcs})"
@@ -131,7 +183,12 @@ class TopologicalMap:
     @property
     def grid(self) -> OccupancyGrid:
         """The grid of the map."""
-        return self.pyramid.grid
+        return self.source.grid
+
+    @property
+    def has_rooms(self) -> bool:
+        """Whether the pyramid was built with rooms."""
+        return getattr(self.source, "rooms", None) is not None
 
     @cached_property
     def rooms(self) -> Rooms:

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.identities import settle, shift_of
-from hybridnav.ext.live.state import CellDraft, State, pyramid_of, state_of
+from hybridnav.ext.live.state import CellDraft, State, check_stated, patch_of, pyramid_of, state_of
 from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area, class_reach, class_rules
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav.pyramid.record import Patch
 
 
 @copies_alike
@@ -216,6 +217,37 @@ class OnlinePyramid:
         """
         box = self._box()
         return pyramid_of(self.state, box, self.grid, self.merge_distance_m, self._criterion)
+
+    def patched(self, before: OnlinePyramid, cells: LongArray) -> Patch | None:
+        """Return what differs between the records of `pyramid` and that of another version, in the
+        time of a change and not of the map. It is for planners that follow.
+
+        Parameters
+        ----------
+        before
+            The other version.
+        cells
+            int64 (n, 2), the cells (row, col) of the grid whose class is another one.
+
+        Returns
+        -------
+        Patch or None
+            None for a version of another map, or of other settings.
+
+        Raises
+        ------
+        InvalidValueError
+            When one of the cells changed and no update stated it.
+        """
+        same = (self.grid.shape, self.low, self._criterion)
+        if (before.grid.shape, before.low, before._criterion) != same:
+            return None
+        if len(cells):
+            (row, col), high = cells.min(axis=0).tolist(), (cells.max(axis=0) + 1).tolist()
+            box = Box(row, col, *high)
+            classes = self.state.tiles.planes(box.moved(*self.low))[1]
+            check_stated(classes, self.grid.classes[row : high[0], col : high[1]], (row, col))
+        return patch_of(before.state, self.state, self._box(), self._criterion)
 
     @cached_property
     def place_numbers(self) -> LongArray:

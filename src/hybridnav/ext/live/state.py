@@ -14,9 +14,10 @@ from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.near import box_groups
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.contraction import Window
 from hybridnav.pyramid.decimation import Criterion, contract_alone, contract_places, squared_limit
-from hybridnav.pyramid.record import SURVIVES, BuildStats
-from hybridnav.pyramid.start import parts_of
+from hybridnav.pyramid.record import SURVIVES, BuildStats, Patch, Record
+from hybridnav.pyramid.start import PERIOD, parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -220,13 +221,7 @@ def pyramid_of(
     To keep the levels of places that stay, and contract the others beside them, was not faster.
     """
     place, classes = state.tiles.planes(box)
-    differs = classes != grid.classes
-    if differs.any():
-        row, col = np.argwhere(differs)[0].tolist()
-        raise InvalidValueError(
-            f"{int(differs.sum())} cells changed outside what the updates stated, the first at "
-            f"row {row}, column {col}: pass changed=None to compare all cells"
-        )
+    check_stated(classes, grid.classes, (0, 0))
     numbers = state.places.numbers()
     index_of = np.zeros(state.next_place + 1, np.int32)  # the last one is that of no place
     index_of[numbers] = np.arange(1, len(numbers) + 1)
@@ -239,6 +234,51 @@ def pyramid_of(
     stats = BuildStats(record.sizes(grid.shape[1], n_levels), tops=[n_levels - 1])
     linkage, _, seed = criterion
     return DualGraphPyramid(grid, merge_distance_m, linkage, seed, stats, None, record)
+
+
+def check_stated(classes: ByteArray, of_grid: ByteArray, low: tuple[int, int]) -> None:
+    """Refuse cells whose class is not that of the grid; `low`: the first one of both arrays."""
+    differs = classes != of_grid
+    if differs.any():
+        row, col = (np.argwhere(differs)[0] + low).tolist()
+        raise InvalidValueError(
+            f"{int(differs.sum())} cells changed outside what the updates stated, the first at "
+            f"row {row}, column {col}: pass changed=None to compare all cells"
+        )
+
+
+def patch_of(before: State, now: State, box: Box, criterion: Criterion) -> Patch:
+    """Return what differs between the records of two versions of a map.
+
+    `box`: the cells of both grids among those of the tiles.
+    """
+    lost, found = set[int](), set[int]()
+    for tile in now.tiles.differing_from(before.tiles):
+        old, new = (of.tiles.planes(tile)[0] for of in (before, now))
+        differs = old != new
+        lost.update(np.unique(old[differs]).tolist())
+        found.update(np.unique(new[differs]).tolist())
+    numbers = np.intersect1d(before.places.numbers(), now.places.numbers())
+    moved = (before.places.read(numbers)["cell"] != now.places.read(numbers)["cell"]).any(axis=1)
+    lost.update(numbers[moved].tolist())
+    both = sorted((lost | found) - {NO_PLACE})  # a place whose cells differ is another one
+    rows = [of.places.read(of.places.known(both)) for of in (before, now)]
+    boxes = np.concatenate([each["box"] for each in rows])
+    if not len(boxes):
+        none = np.zeros(1, np.uint8)
+        return Patch((0, 0), np.zeros((1, 1), np.bool_), Record(none, np.zeros(1, np.int32), none))
+    low = np.maximum(boxes[:, :2].min(axis=0) - np.array(box[:2]), 0) // PERIOD * PERIOD
+    window = Box(*(low + box[:2]).tolist(), *boxes[:, 2:].max(axis=0).tolist())
+    place, _ = now.tiles.planes(window)
+    was = np.isin(before.tiles.planes(window)[0], both)
+    index_of = np.zeros(now.next_place + 1, np.int32)
+    index_of[now.places.known(both)] = np.arange(1, len(rows[1]) + 1)
+    survivors = np.zeros(window.shape, np.bool_)
+    survivors[tuple((rows[1]["cell"] - np.array(window[:2])).T)] = True
+    row, col = low.tolist()
+    at = Window(row, col, box.shape[1])
+    record = contract_places(index_of[place], survivors, criterion, window=at)
+    return Patch((row, col), was, record)
 
 
 # The draft of a next version, in which single cells move between places.

@@ -83,6 +83,10 @@ class Box(NamedTuple):
         """Return the least box that holds this one and another one."""
         return Box(*map(min, self[:2], other[:2]), *map(max, self[2:], other[2:]))
 
+    def scaled(self, side: int) -> Box:
+        """Return the cells of a box of tiles of so many cells a side."""
+        return Box(*(side * at for at in self))
+
     def inside(self, outer: Box) -> tuple[slice, slice]:
         """Return the slices by which an array of the outer box holds this one."""
         return (
@@ -220,6 +224,16 @@ class Tiles:
             runs, count = _tile_kernels.moved_cells(old, new, runs, count)
         sums: LongArray = _tile_kernels.sums_of(runs, count)
         return sums
+
+    def differing_from(self, before: Tiles) -> list[Box]:
+        """Return the boxes of the tiles that another version does not share."""
+        keys = []
+        for row in self._rows.keys() | before._rows.keys():
+            mine, others = self._rows.get(row, {}), before._rows.get(row, {})
+            if mine is not others:
+                cols = mine.keys() | others.keys()
+                keys += [(row, col) for col in cols if mine.get(col) is not others.get(col)]
+        return [Box(row, col, row + 1, col + 1).scaled(SIDE) for row, col in sorted(keys)]
 
     def arrays(self) -> dict[tuple[int, int], Tile]:
         """Return each tile, by row and column of tiles."""

@@ -21,13 +21,14 @@ from hybridnav.planning.methods.grid import KnownMap, WholeMap, on_cells, round_
 from hybridnav.route.route import Route, RouteOfPlaces
 from hybridnav.search.descent import Descent, DescentSettings
 from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.topology.map import is_version
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.planning.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.route.route import Corridor
-    from hybridnav.search.found import Metric, Query
+    from hybridnav.search.found import MapChange, Metric, Query
 
 
 @copies_alike
@@ -66,16 +67,36 @@ class MaxDistance(Method):
         return routes.MaxDistanceSearch(self._topology, allow_unexplored=allowed)
 
     def _descent(self) -> Descent:
-        settings, costs = self._settings, self._refiner.costs
+        settings = self._settings
         return Descent(
             self._topology.pyramid,
             self._topology.grid.enterable(allow_unexplored=settings.allow_unexplored),
             DescentSettings(
                 settings.field_cells, settings.step, settings.ring, settings.horizon_cells
             ),
-            units=None if costs is None else costs.units,
+            units=self._units,
             corner_cutting=self._topology.grid.corner_cutting,
         )
+
+    def changed(self, change: MapChange) -> MaxDistance | None:
+        """Return the method of the next version of the map, with its levels repaired; None to make
+        it anew. See `Method`."""
+        grid, topology, costs, cells = change
+        before, now = self._topology.source, None if topology is None else topology.source
+        if not is_version(now) or not is_version(before):
+            return None
+        patch = now.patched(before, cells)
+        if patch is None or not isinstance(self._search, Descent):
+            return None
+        made = MaxDistance(KnownMap(grid, topology, costs), self._settings)
+        enterable = grid.enterable(allow_unexplored=self._settings.allow_unexplored)
+        made._search = self._search.changed(patch, enterable, made._units)
+        return made
+
+    @property
+    def _units(self) -> IntArray | None:
+        """The factor of each cell, None for lengths."""
+        return None if self._refiner.costs is None else self._refiner.costs.units
 
     def find(self, query: Query) -> Found:
         """Find a path along the route; see `Method`."""

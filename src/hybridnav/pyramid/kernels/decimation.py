@@ -50,10 +50,26 @@ class Hulls(NamedTuple):
     points: np.ndarray
 
 
+class Order(NamedTuple):
+    """What orders edges of equal attribute: a seed, and their numbers on the map of a window."""
+
+    seed: np.uint64
+    """Below 2^32."""
+    first: np.uint64
+    """The number on the map of the window's first edge."""
+    row: np.uint64
+    """Edges of a row of the window."""
+    more: np.uint64
+    """How many more a row of the map has."""
+
+
 @njit(cache=True, nogil=True)
-def make_key(attribute, base_edge, seed, position):
+def make_key(attribute, base_edge, order, position):
     """Return the key of an edge: attribute, then a seeded hash (MurmurHash3's finaliser)."""
-    h = np.uint64(base_edge) ^ seed  # below 2^32, so no product overflows
+    edge = np.uint64(base_edge)
+    if order.more > 0:
+        edge += edge // order.row * order.more
+    h = edge + order.first ^ order.seed  # below 2^32, so no product overflows
     h ^= h >> np.uint64(16)
     h = h * np.uint64(0x85EBCA6B) & _LOW_HALF
     h ^= h >> np.uint64(13)
@@ -111,7 +127,7 @@ def possible_survivors(u, v, cells, boxes, hull_start, hull_points, linkage, lim
 
 @njit(cache=True, nogil=True)
 def contractible(
-    origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, survivors_of_edge, best
+    origin, base_edge, vertices, hulls, level, linkage, limit, order, keys, survivors_of_edge, best
 ):
     """Fill `keys` with the contractible edges; return their number, or UNDECIDED without hulls.
 
@@ -129,8 +145,8 @@ def contractible(
         Number of the level.
     linkage, limit
         See `possible_survivors`.
-    seed
-        uint64, orders equal attributes.
+    order
+        `Order`, of equal attributes.
     keys
         uint64 (n_edges,), filled in.
     survivors_of_edge
@@ -162,7 +178,7 @@ def contractible(
                 return UNDECIDED
             if survivors == 0:
                 continue
-        key = make_key(max(height, width), base_edge[e], seed, e)
+        key = make_key(max(height, width), base_edge[e], order, e)
         keys[count] = key
         survivors_of_edge[e] = survivors
         best[u] = min(best[u], key)
@@ -172,7 +188,7 @@ def contractible(
 
 
 @njit(cache=True, nogil=True)
-def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edge, best):
+def open_candidates(origin, base_edge, arcs, ranks, order, keys, survivors_of_edge, best):
     """Fill `keys` with the keys of some arcs by their ranks; let either endpoint of each survive.
 
     Parameters
@@ -182,8 +198,8 @@ def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edg
     arcs, ranks
         int64 (n,), edges that may be contracted, and their attributes, at most `ATTRIBUTE_MAX`: the
         least first.
-    seed
-        uint64, orders equal ranks.
+    order
+        `Order`, of equal ranks.
     keys
         uint64 (n,), filled in.
     survivors_of_edge
@@ -195,7 +211,7 @@ def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edg
         best[v] = _NO_KEY
     for i in range(arcs.size):
         edge = arcs[i]
-        key = make_key(ranks[i], base_edge[edge], seed, edge)
+        key = make_key(ranks[i], base_edge[edge], order, edge)
         keys[i] = key
         survivors_of_edge[edge] = EITHER_MAY_SURVIVE
         for dart in (2 * edge, 2 * edge + 1):
@@ -307,7 +323,7 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
 
 @njit(cache=True, nogil=True)
 def select_stars(
-    darts_origin, base_edge, keys, survivors_of_edge, matched, best, vertices, seed, stars
+    darts_origin, base_edge, keys, survivors_of_edge, matched, best, vertices, order, stars
 ):
     """Fill in the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
 
@@ -317,7 +333,7 @@ def select_stars(
 
     Parameters
     ----------
-    darts_origin, base_edge, keys, survivors_of_edge, vertices, seed
+    darts_origin, base_edge, keys, survivors_of_edge, vertices, order
         See `contractible`.
     matched, best
         See `join_leaves`.
@@ -352,7 +368,7 @@ def select_stars(
         elif survivors == EITHER_MAY_SURVIVE:
             reach_u = max(far_corner(cells, u, boxes, v), far_corner(cells, u, boxes, u))
             reach_v = max(far_corner(cells, v, boxes, u), far_corner(cells, v, boxes, v))
-            coin = make_key(0, base_edge[edge], seed, 0) >> np.uint64(30) & np.uint64(1)
+            coin = make_key(0, base_edge[edge], order, 0) >> np.uint64(30) & np.uint64(1)
             if reach_u < reach_v or (reach_u == reach_v and coin):
                 survivors = FIRST_MAY_SURVIVE
             else:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import find, pop, push
+from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.kernels.moves import BUCKET_FULL, trace
 from hybridnav.search.kernels.grid_search import astar
 
@@ -80,8 +80,13 @@ class MapCells(NamedTuple):
     """uint8 (n_cells,), legal moves."""
     cols: int
     """Columns of the map."""
+    holder: np.ndarray
+    """int32 (n_cells,), the surviving cell, flat, of the vertex that holds each cell, -1 for none:
+    what a change of the map leaves as it is elsewhere."""
+    vertices: np.ndarray
+    """int64 (n,), these surviving cells, ascending."""
     field_of: np.ndarray
-    """int32 (n_cells,), the field of the last level that holds each cell, -1 for none."""
+    """int64 (n,), the field of the last level that is made of each vertex, -1 for none."""
     successors: np.ndarray
     """uint32 (9 * 256,), see `grid_search.move_tables`."""
 
@@ -369,6 +374,19 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
     return cells, window, expanded, diagonals
 
 
+@njit(cache=True, nogil=True)
+def _index(cells, cell):
+    """Return where a cell stands among ascending ones."""
+    low, high = 0, cells.size
+    while low < high:
+        middle = low + high >> 1
+        if cells[middle] < cell:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def descend(fields, marks, ground, number, ends, rings, horizon, named):
@@ -402,7 +420,8 @@ def descend(fields, marks, ground, number, ends, rings, horizon, named):
 
     chain = np.empty((last + 1, 2), np.int64)
     for side in range(2):
-        chain[last, side] = starts[last] + ground.field_of[ends[side]]
+        vertex = _index(ground.vertices, ground.holder[ends[side]])
+        chain[last, side] = starts[last] + ground.field_of[vertex]
         for k in range(last, 0, -1):
             chain[k - 1, side] = fields.parent[chain[k, side]]
 
@@ -435,57 +454,3 @@ def descend(fields, marks, ground, number, ends, rings, horizon, named):
         if path.shape[0] == 0:
             told[0] = told[1]
     return route, path
-
-
-@njit(cache=True, nogil=True)
-def field_sums(field_of, cols, units, n_fields):
-    """Return the cells of each field, and the sums of their rows, columns and units, float64
-    (n_fields, 4).
-
-    `units`: int32 (n_cells,), factors of cells; None for none, whose sums are 0.
-    """
-    sums = np.zeros((n_fields, 4))
-    for row in range(field_of.size // cols):
-        for col in range(cols):
-            v = field_of[row * cols + col]
-            if v >= 0:
-                sums[v, 0] += 1
-                sums[v, 1] += row
-                sums[v, 2] += col
-                if units is not None:
-                    sums[v, 3] += units[row * cols + col]
-    return sums
-
-
-@njit(cache=True, nogil=True)
-def join_in_blocks(cells, is_open, arcs, side):
-    """Return the fields that arcs connect inside square blocks of cells: int64 (n_places,), the
-    field of each place, -1 for one that is not open, and int64 (n_fields,), the place of each field
-    that lies nearest to the middle of its block.
-
-    `cells`: int64 (n_places, 2), surviving cells, (row, col); `is_open`: bool (n_places,); `arcs`:
-    int32 (n, 2), between open places; `side`: of a block, in cells.
-    """
-    n = len(cells)
-    root = np.arange(n)
-    for i in range(len(arcs)):
-        u, v = np.int64(arcs[i, 0]), np.int64(arcs[i, 1])
-        in_row = cells[u, 0] // side == cells[v, 0] // side
-        if in_row and cells[u, 1] // side == cells[v, 1] // side:
-            u, v = find(root, u), find(root, v)
-            root[max(u, v)] = min(u, v)
-    of, nearest, least = np.full(n, -1), np.empty(n, np.int64), np.empty(n, np.int64)
-    n_fields = 0
-    for v in range(n):
-        if not is_open[v]:
-            continue
-        off = abs(cells[v, 0] % side * 2 - side) + abs(cells[v, 1] % side * 2 - side)
-        first = find(root, v)
-        if first == v:
-            of[v], least[n_fields], nearest[n_fields] = n_fields, off, v
-            n_fields += 1
-            continue
-        k = of[v] = of[first]
-        if off < least[k]:
-            least[k], nearest[k] = off, v
-    return of, nearest[:n_fields].copy()
