@@ -236,7 +236,7 @@ class PlanResult:
         source = self.why_source
         if not isinstance(source, Unanswered):
             return source
-        from hybridnav.reasons import reasons_of  # noqa: PLC0415 - plans need no shapely
+        from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
 
         return reasons_of(*source)
 

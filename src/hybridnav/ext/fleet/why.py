@@ -191,8 +191,8 @@ def _enclosed(
         stop.position_m for link in network.links if (stop := link.end_on(floor.name))
     ]
     ways += [other] if endpoints[0].floor == endpoints[1].floor else []
-    explain = floor.planner.explain
-    found = [explain(here, way, blocked=blocked.get(floor.name)) for way in ways]
+    closed = blocked.get(floor.name)
+    found = [explain(floor.planner, here, way, blocked=closed) for way in ways]
     return found[-1] if found and not any(one.has_path for one in found) else None
 
 
