@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import sys
 import warnings
+from dataclasses import is_dataclass
 from importlib import import_module
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -21,21 +22,33 @@ from hybridnav.cli.common import (
     complain,
     exit_code,
 )
+from hybridnav.cli.map_options import FloorOptions, check_options
 from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.errors import HybridNavError
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 _HOME_OF = {
     "plan": "plan",
-    "build": "build",
+    "closed": "closed",
+    "verify": "show",
     "show": "show",
     "rooms": "rooms",
-    "closed": "closed",
+    "build": "build",
+    "preset": "show",
     "evaluate": "evaluate",
     "compare": "evaluate",
-    "preset": "show",
-    "verify": "show",
 }
-"""The module of each command of this package, in the order of the help; others are registered."""
+"""The module of each command of this package; others are registered."""
+_GROUPS = {
+    "Plan": ("plan", "closed", "verify"),
+    "Look": ("show", "rooms", "view"),
+    "Prepare": ("map", "build", "preset"),
+    "Measure": ("evaluate", "compare", "explore", "replay"),
+    "Robots and fleets": ("export", "check", "serve"),
+}
+"""The groups of the help; those of other packages stand in one of their own."""
 
 _WrongUsage: Any = typer.BadParameter.__base__
 """click's UsageError: Typer brings a click of its own or not, and names only this subclass."""
@@ -58,18 +71,27 @@ class _Commands(TyperGroup):
         return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List the commands by their docstrings: Typer reads their options for a third of a
-        help's time."""
-        for name in self.list_commands(ctx):
-            home = _home(name)
-            text = home.info.help if isinstance(home, typer.Typer) else home.__doc__
-            self.commands[name] = TyperCommand(name, help=inspect.cleandoc(text or ""))
-        super().format_commands(ctx, formatter)
+        """List the commands in groups, by their docstrings: Typer reads their options for a third
+        of a help's time."""
+        names = self.list_commands(ctx)
+        width = max(map(len, names))
+        grouped = {name for group in _GROUPS.values() for name in group}
+        others = [name for name in names if name not in grouped]
+        with formatter.section("Commands"):
+            for title, group in (_GROUPS | {"Others": others}).items():
+                rows = [
+                    (f"{name:<{width}}", _summary_of(name, formatter.width - 8 - width))
+                    for name in group
+                    if name in names
+                ]
+                if rows:
+                    with formatter.section(title):
+                        formatter.write_dl(rows)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse an unknown command before Typer loads what checks the options of a known one."""
-        known = not args or args[0].startswith("-") or args[0] in _HOME_OF
-        if not known and args[0] not in extensions("commands"):
+        is_ours = not args or args[0].startswith("-") or args[0] in _HOME_OF
+        if not is_ours and args[0] not in extensions("commands"):
             for name in self.list_commands(ctx):  # one of them may have been meant
                 self.get_command(ctx, name)
             self.resolve_command(ctx, args)
@@ -83,13 +105,59 @@ def _home(name: str) -> Any:
     return extension("commands", name) if name in extensions("commands") else None
 
 
+class _Command(TyperCommand):
+    """A command whose help has its options in panels, as `MapOptions.PANELS`."""
+
+    panels: Mapping[str, tuple[str, ...]] = {}
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """List the arguments, and the options panel by panel."""
+        records: dict[str, list[tuple[str, str]]] = {
+            "Arguments": [],
+            **{t: [] for t in self.panels},
+        }
+        panel_of = {name: title for title, names in self.panels.items() for name in names}
+        for each in self.get_params(ctx):
+            is_argument = each.param_type_name == "argument"
+            title = "Arguments" if is_argument else panel_of.get(each.name, "Options")
+            if record := each.get_help_record(ctx):
+                records.setdefault(title, []).append(record)
+        for title, rows in records.items():
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+def _summary_of(name: str, most: int) -> str:
+    """Return the first sentence of a command's help, cut after some letters."""
+    home = _home(name)
+    text = home.info.help if isinstance(home, typer.Typer) else home.__doc__
+    return TyperCommand(name, help=inspect.cleandoc(text or "")).get_short_help_str(most)
+
+
 def _command(name: str, home: Any) -> Any:
-    """Build a command, or a group of commands, as Typer does."""
+    """Build a command, or a group of commands, as Typer does.
+
+    The options of a function of one dataclass are its fields.
+    """
     if isinstance(home, typer.Typer):
         return typer.main.get_command(home)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name)(home)
-    return typer.main.get_command(alone)
+    parameters = inspect.signature(home, eval_str=True).parameters.values()
+    options: Any = next((p.annotation for p in parameters if is_dataclass(p.annotation)), None)
+    alone.command(name, cls=_Command, help=inspect.getdoc(home))(options or home)
+    command: Any = typer.main.get_command(alone)
+    if options is not None:
+        command.panels, read = getattr(options, "PANELS", {}), command.callback
+
+        def call(**values: Any) -> Any:
+            args = read(**values)
+            if isinstance(args, FloorOptions):
+                check_options(command.params, args)
+            return home(args)
+
+        command.callback = call
+    return command
 
 
 app = typer.Typer(
@@ -102,8 +170,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(asked: bool) -> None:  # noqa: FBT001 - called by Typer
-    if asked:
+def _print_version(wanted: bool) -> None:  # noqa: FBT001 - called by Typer
+    if wanted:
         answer(f"hybridnav {hn.__version__}\n")
         raise typer.Exit
 

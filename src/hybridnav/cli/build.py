@@ -2,71 +2,70 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
-
-import typer
 
 import hybridnav as hn
 from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, answer, progress_bar, stage, timings
-from hybridnav.cli.options import MapOrBuildingArgument, OutOption, PresetOption, RoomsOption
+from hybridnav.cli.map_options import FloorOptions
+from hybridnav.cli.options import OneMap, OutOption, RoomsOption, option
 from hybridnav.cli.reading import (
-    MapOptions,
     check_model,
     check_room_to_be,
     grow_topology,
-    load_model,
     overridden,
-    with_map,
 )
 from hybridnav.cli.warm import rehearse
 
-FindRoomsOption = Annotated[
-    bool, typer.Option("--find-rooms", help="Find rooms, and keep them in the model.")
-]
+FindRoomsOption = Annotated[bool, option("--find-rooms", "Find rooms, and keep them in the model.")]
 CompressOption = Annotated[
-    bool, typer.Option("--compress", help="Write a small file, which loads more slowly.")
+    bool, option("--compress", "Write a small file, which loads more slowly.")
 ]
 
 
-@with_map(
-    before="compress",
-    without=("preset",),
-    over_floors=lambda: extension("formats", "building").build_over_floors,
-)
-def build(
-    map_file: MapOrBuildingArgument,
-    out: OutOption[Path],
-    preset: PresetOption[list[str] | None] = None,
-    rooms_file: RoomsOption = None,
-    find_rooms: FindRoomsOption = False,
-    compress: CompressOption = False,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Prepare MAP for planning, and write it to a model (.hnm), which other commands take as MAP.
+@dataclass(frozen=True, kw_only=True)
+class BuildOptions(FloorOptions):
+    """The options of `hybridnav build`."""
 
-    --preset says what to prepare; it may be given several times, the first is the model's own.
-    Rooms of --rooms are kept in the model. MAP may be a building; `hybridnav plan` takes its model.
+    out: OutOption[Path]
+    rooms_file: OneMap[RoomsOption] = None
+    find_rooms: OneMap[FindRoomsOption] = False
+    compress: CompressOption = False
+
+
+def build(args: BuildOptions) -> None:
+    """Prepare MAP for planning, and write it to a model (.hnm).
+
+    Other commands take it as MAP. --preset says what to prepare; it may be given several times, the
+    first is the model's own. Rooms of --rooms are kept in the model. MAP may be a building;
+    `hybridnav plan` takes its model.
+
+    Example: hybridnav build maps/office/office.yaml --find-rooms -o office.hnm
     """
-    if rooms_file is not None and find_rooms:
+    if args.is_building:
+        extension("formats", "building").build_over_floors(args)
+        return
+    out = args.out
+    if args.rooms_file is not None and args.find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
     check_model(out)
-    settings = [reading.settings(map_file, preset=name) for name in preset or (None,)]
+    each_preset = [replace(args, presets=[name]) for name in args.presets or ()] or [args]
+    settings = [each.settings() for each in each_preset]
     seconds: dict[str, float] = {}
-    model = load_model(map_file, settings[0], seconds, reading)
-    if preset is None:  # all that a model was built for
+    model = args.load(settings[0], seconds)
+    if not args.presets:  # all that a model was built for
         settings += [
-            overridden(model.fitted(other), reading.overrides, reading.robot_radius_m, reading.seed)
+            overridden(model.fitted(other), args.overrides, args.robot_radius_m, args.seed)
             for other in model.presets[1:]
         ]
     for each in settings:
         check_room_to_be(model.grid, allow_unexplored=each.planner.allow_unexplored)
     topology = grow_topology(
-        model, settings[0], seconds, rooms_file=rooms_file, find_rooms=find_rooms
+        model, settings[0], seconds, rooms_file=args.rooms_file, find_rooms=args.find_rooms
     )
     began = clock()
     planners = [model.planner(each, topology=topology) for each in settings]
@@ -76,7 +75,7 @@ def build(
         planner.close()
     seconds["prepare"] = round(clock() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        hn.save(planners, out, compress=compress)
+        hn.save(planners, out, compress=args.compress)
     with stage("planning on the model once", seconds, "rehearse"):
         rehearse(out, settings)
     answer(_summary(out, topology, settings, seconds))

@@ -4,113 +4,59 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated
-
-import typer
 
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer
-from hybridnav.cli.reading import MapOptions, grow_topology, load_model, with_map
+from hybridnav.cli.map_options import FloorOptions
+from hybridnav.cli.options import OneMap, option
+from hybridnav.cli.reading import grow_topology
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from hybridnav.closures import OutOfOrder
 
 CloseOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--close",
-        metavar="WHAT",
-        help="Close door:N or room:NAME; in a building link:NAME, link:NAME@FLOOR, "
-        "FLOOR:door:N or FLOOR:room:NAME. "
-        "May be repeated.",
+    option(
+        "--close WHAT",
+        "Close door:N or room:NAME; in a building link:NAME, link:NAME@FLOOR, FLOOR:door:N or "
+        "FLOOR:room:NAME. May be repeated.",
     ),
 ]
 OpenOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--open", metavar="WHAT", help="Open a closed thing again, or all. May be repeated."
-    ),
+    list[str] | None, option("--open WHAT", "Open a closed thing again, or all. May be repeated.")
 ]
-WhyOption = Annotated[
-    str | None, typer.Option("--why", metavar="TEXT", help="The reason for --close, one line.")
-]
+WhyOption = Annotated[str | None, option("--why TEXT", "The reason for --close, one line.")]
 
 
-@with_map(over_floors=lambda: extension("formats", "building").close_over_floors)
-def closed(
-    map_file: options.MapOrBuildingArgument,
-    close: CloseOption = None,
-    open_again: OpenOption = None,
-    why: WhyOption = None,
-    rooms_file: options.RoomsOption = None,
-    as_json: options.JsonOption = False,
-    *,
-    reading: MapOptions,
-) -> None:
-    """List things out of order in MAP, or close and open links, doors and rooms.
+@dataclass(frozen=True, kw_only=True)
+class ClosedOptions(FloorOptions):
+    """The options of `hybridnav closed`."""
 
-    It stays closed for plans, pages and programs until it is opened again: NAME.closed.yaml beside
-    MAP holds it.
+    close: CloseOption = None
+    open_again: OpenOption = None
+    why: WhyOption = None
+    rooms_file: OneMap[options.RoomsOption] = None
+    as_json: options.JsonOption = False
+
+
+def closed(args: ClosedOptions) -> None:
+    """List things out of order in MAP; close and open things.
+
+    Doors, rooms and links stay closed for plans, pages and programs until they are opened again:
+    NAME.closed.yaml beside MAP holds them. MAP may be a building.
+
+    Example: hybridnav closed map.yaml --close door:3 --why "it is stuck"
     """
-
-    def check(item: OutOfOrder) -> None:
-        """Refuse what is not on the map."""
-        settings = reading.settings(map_file)
-        model = load_model(map_file, settings, {}, reading)
-        beside = map_file.parent / "rooms.yaml"
-        file = rooms_file or (beside if beside.is_file() else None)
-        item.check_on(grow_topology(model, settings, {}, rooms_file=file, find_rooms=True))
-
-    change_closed(map_file, close or (), open_again or (), why, check=check)
-    list_closed(map_file, as_json=as_json)
-
-
-def change_closed(
-    map_file: Path,
-    close: Sequence[str],
-    open_again: Sequence[str],
-    why: str | None,
-    *,
-    check: Callable[[OutOfOrder], None],
-) -> None:
-    """Close and open things in the journal of a file; all are checked before one is closed.
-
-    `map_file`: a map or a building; `close`, `open_again`, `why`: as the options of
-    `hybridnav closed`; `check`: refuses what is not there.
-    """
-    from hybridnav.closures import Journal, OutOfOrder  # noqa: PLC0415 - loads shapely
-
-    if why is not None and not close:
-        raise UsageError("--why is for --close: add --close WHAT, or leave it out")
-    if not map_file.is_file():
-        raise UsageError(f"there is no file '{printable(map_file)}'")
-    journal = Journal(map_file)
-    known = [item.what for item in journal.items()]
-    for what in open_again:
-        if what != "all" and what not in known:
-            listed = ", ".join(known) or "nothing"
-            raise UsageError(f"--open: {what!r:.80} is not closed; closed is {listed:.400}")
-    for what in close:
-        check(OutOfOrder(what, why=why or ""))
-    for what in known if "all" in open_again else open_again:
-        journal.open(what)
-    for what in close:
-        journal.close(what, why=why or "", by=os.environ.get("USER", ""))
-
-
-def list_closed(map_file: Path, *, as_json: bool) -> None:
-    """Print what the journal of a file closes."""
     from hybridnav.closures import Journal  # noqa: PLC0415 - loads shapely
 
-    journal = Journal(map_file)
+    _change(args)
+    journal = Journal(args.map_file)
     items = journal.items()
-    if as_json:
+    if args.as_json:
         values = {"journal": str(journal.path), "closed": [asdict(item) for item in items]}
         answer(json.dumps(values) + "\n")
         return
@@ -120,3 +66,40 @@ def list_closed(map_file: Path, *, as_json: bool) -> None:
         facts = item.since and f"since {item.since} UTC", item.by and f"by {item.by}", item.why
         lines.append(f"{item.what:<{width}}  {', '.join(filter(None, facts))}".rstrip())
     answer("\n".join(lines) + "\n")
+
+
+def _change(args: ClosedOptions) -> None:
+    """Close and open things in the journal of a file; all are checked before one is closed."""
+    from hybridnav.closures import Journal, OutOfOrder  # noqa: PLC0415 - loads shapely
+
+    close, open_again, why = args.close or (), args.open_again or (), args.why or ""
+    if args.why is not None and not close:
+        raise UsageError("--why is for --close: add --close WHAT, or leave it out")
+    if not args.map_file.is_file():
+        raise UsageError(f"there is no file '{printable(args.map_file)}'")
+    journal = Journal(args.map_file)
+    closed_now = [item.what for item in journal.items()]
+    for what in open_again:
+        if what != "all" and what not in closed_now:
+            listed = ", ".join(closed_now) or "nothing"
+            raise UsageError(f"--open: {what!r:.80} is not closed; closed is {listed:.400}")
+    items = [OutOfOrder(what, why=why) for what in close]
+    if items and args.is_building:
+        extension("formats", "building").check_closing_over_floors(args, items)
+    elif items:
+        _check_on_map(args, items)
+    for what in closed_now if "all" in open_again else open_again:
+        journal.open(what)
+    for what in close:
+        journal.close(what, why=why, by=os.environ.get("USER", ""))
+
+
+def _check_on_map(args: ClosedOptions, items: list[OutOfOrder]) -> None:
+    """Refuse what is not on the map."""
+    settings = args.settings()
+    model = args.load(settings, {})
+    beside = args.map_file.parent / "rooms.yaml"
+    file = args.rooms_file or (beside if beside.is_file() else None)
+    topology = grow_topology(model, settings, {}, rooms_file=file, find_rooms=True)
+    for item in items:
+        item.check_on(topology)

@@ -12,7 +12,9 @@ from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, answer, complain, progress_bar
-from hybridnav.cli.reading import is_building_file, read_settings
+from hybridnav.cli.map_options import is_building_file
+from hybridnav.cli.options import option
+from hybridnav.cli.reading import read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
@@ -22,75 +24,53 @@ if TYPE_CHECKING:
 
 BaselinesOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--baseline",
-        metavar="NAME",
-        help="A baseline, or module:class; may be given several times.",
-    ),
+    option("--baseline NAME", "A baseline, or module:class; may be given several times."),
 ]
 GraphsOption = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--graph",
-        metavar="FILE",
-        help="A graph in any format that `hybridnav check` reads, to follow on one "
-        "map; may be given several times.",
+    option(
+        "--graph FILE",
+        "A graph in any format that `hybridnav check` reads, to follow on one map; may be given "
+        "several times.",
     ),
 ]
 ClearEdgesOption = Annotated[
-    bool,
-    typer.Option(
-        "--clear-edges", help="Leave out edges of the graph that the robot cannot follow."
-    ),
+    bool, option("--clear-edges", "Leave out edges of the graph that the robot cannot follow.")
 ]
 PairsOption = Annotated[
-    int | None,
-    typer.Option("--pairs", metavar="N", min=1, help="Pairs a map: 100 sampled, or all of --scen."),
+    int | None, option("--pairs N", "Pairs a map: 100 sampled, or all of --scen.", min=1)
 ]
 LatticeOption = Annotated[
-    float | None,
-    typer.Option("--all-pairs", metavar="STEP", help="All pairs of cells STEP metres apart."),
+    float | None, option("--all-pairs STEP", "All pairs of cells STEP metres apart.")
 ]
-ScenariosOption = Annotated[
-    Path | None, typer.Option("--scen", metavar="FILE", help="The pairs of a scenario file.")
-]
+ScenariosOption = Annotated[Path | None, option("--scen FILE", "The pairs of a scenario file.")]
 RepeatOption = Annotated[
     int,
-    typer.Option(
-        "--repeat",
-        metavar="N",
+    option(
+        "--repeat N",
+        "Time each query N times in a pass of its own, all methods in shuffled order; 0 for times "
+        "of the answers alone.",
         min=0,
-        help="Time each query N times in a pass of its own, all methods in shuffled order; 0 for "
-        "times of the answers alone.",
     ),
 ]
-WorkersOption = Annotated[
-    int, typer.Option("--workers", metavar="W", help="Processes on this machine.")
-]
+WorkersOption = Annotated[int, option("--workers W", "Processes on this machine.")]
 SchedulerOption = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler instead."),
+    str | None, option("--scheduler ADDRESS", "A dask.distributed scheduler instead.")
 ]
 CornersOption = Annotated[
-    bool, typer.Option("--corner-cutting", help="Let diagonals cut corners: breaks consistency.")
+    bool, option("--corner-cutting", "Let diagonals cut corners: breaks consistency.")
 ]
-TimeoutOption = Annotated[
-    float, typer.Option("--timeout", metavar="S", help="Longest silence of a process, seconds.")
-]
+TimeoutOption = Annotated[float, option("--timeout S", "Longest silence of a process, seconds.")]
 LimitOption = Annotated[
-    float | None,
-    typer.Option(
-        "--limit", metavar="S", help="Seconds for a method on a map; pairs left are not asked."
-    ),
+    float | None, option("--limit S", "Seconds for a method on a map; pairs left are not asked.")
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")]
 MetricOption = Annotated[
     str,
-    typer.Option(
-        "--metric",
-        metavar="WHICH",
-        help="What losses refer to: the any-angle optimum for all paths, the octile optimum, the "
-        "least cost of paths of cells (with --costs), or both, each path's own (any-angle, octile, "
+    option(
+        "--metric WHICH",
+        "What losses refer to: the any-angle optimum for all paths, the octile optimum, the least "
+        "cost of paths of cells (with --costs), or both, each path's own (any-angle, octile, "
         "weighted, both).",
     ),
 ]
@@ -121,16 +101,18 @@ def evaluate(
     limit_s: LimitOption = None,
     metric: MetricOption = "both",
 ) -> None:
-    """Measure consistency, loss and efficiency of methods on maps, pair by pair.
+    """Measure consistency, loss and efficiency of methods on maps.
 
-    Records go to records.jsonl in the folder --out; a run that was stopped goes on where it was.
-    --preset may be given several times, shortest where no method is named; --set holds for all of
-    them. --seed is that of sampled pairs. Methods plan by --costs and are judged by them. Robot
-    radii of presets do not count. On MovingAI maps the radius is 0 unless stated, and the size of
-    places 40 m.
+    They answer the same pairs. Records go to records.jsonl in the folder --out; a run that was
+    stopped goes on where it was. --preset may be given several times, shortest where no method is
+    named; --set holds for all of them. --seed is that of sampled pairs. Methods plan by --costs and
+    are judged by them. Robot radii of presets do not count. On MovingAI maps the radius is 0 unless
+    stated, and the size of places 40 m.
 
     Exits with 1 when a counter-example was found, a method could not be made, or nothing was
     checked. Queries in which a method raised are counted on stderr, and do not change that.
+
+    Example: hybridnav evaluate maps/figure1/figure1.yaml --pairs 20 -o run
     """
     if all_pairs is not None and (scen is not None or pairs is not None):
         raise UsageError(
@@ -178,25 +160,25 @@ def evaluate(
     _run(settings, out)
     study = write_outputs(out, metric=yardstick)
     answer((out / "summary.md").read_text(encoding="utf-8") + f"\nreport: {out / 'report.html'}\n")
-    faults = [f"{found.map_name}, {found.label}: {fault}" for found, _, fault in study.faults]
+    faults = [f"{each.map_name}, {each.label}: {fault}" for each, _, fault in study.faults]
     unmade = [
-        f"{found.map_name}, {found.label}: {found.preparation.get('error', 'lost')}"
-        for found in study.outcomes
-        if found.is_asked and found.preparation["status"] != "ready"
+        f"{each.map_name}, {each.label}: {each.preparation.get('error', 'lost')}"
+        for each in study.outcomes
+        if each.is_asked and each.preparation["status"] != "ready"
     ]
     raised = [
-        f"{found.map_name}, {found.label}: {record.get('error', record['status'])}"
-        for found in study.outcomes
-        if found.preparation["status"] == "ready"
-        for record in found.failed
+        f"{each.map_name}, {each.label}: {record.get('error', record['status'])}"
+        for each in study.outcomes
+        if each.preparation["status"] == "ready"
+        for record in each.failed
     ]
-    for what, found in (
+    for what, cases in (
         ("counter-examples", faults),
         ("methods without answers", unmade),
         ("queries that failed", raised),
     ):
-        if found:
-            complain(f"{what}: {len(found)}, the first: {found[0]}")
+        if cases:
+            complain(f"{what}: {len(cases)}, the first: {cases[0]}")
     if not study.checks and not unmade:
         complain(f"nothing was checked: {_why_nothing(study)}")
     if faults or unmade or not study.checks:
@@ -216,9 +198,9 @@ def _check_maps(files: list[Path]) -> None:
 
 def _why_nothing(study: Study) -> str:
     """Return the reason for a run without answers."""
-    for found in study.outcomes:
-        if not found.is_asked:
-            return f"{found.map_name}, {found.label}: {found.preparation['error']}"
+    for outcome in study.outcomes:
+        if not outcome.is_asked:
+            return f"{outcome.map_name}, {outcome.label}: {outcome.preparation['error']}"
     return "the maps have no such pairs of free cells"
 
 
@@ -244,7 +226,10 @@ def _run(settings: RunSettings, out: Path) -> None:
 
 
 def compare(first: RunArgument, second: RunArgument, metric: MetricOption = "both") -> None:
-    """Set two runs side by side, pair by pair, with the significance of the difference."""
+    """Set two runs side by side, and test whether they differ.
+
+    Example: hybridnav compare run-a run-b
+    """
     from hybridnav.harness.compare import compare_runs  # noqa: PLC0415 - on demand
     from hybridnav.harness.tables import to_markdown  # noqa: PLC0415 - on demand
 

@@ -23,6 +23,19 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 """What a command takes: one value or several, with a default or without."""
+OneMap = Annotated[T, "one map"]
+"""An option that means nothing for a building, which `check_options` refuses then."""
+OfBuilding = Annotated[T, "a building"]
+"""An option that means something for a building alone."""
+
+
+def option(flags: str, text: str, **settings: Any) -> Any:
+    """Return an option: `-o --out PATH`, names and what stands for a value, and its help."""
+    words = flags.split(" ")
+    names = [word for word in words if word.startswith("-")]
+    value = " ".join(word for word in words if not word.startswith("-"))
+    return typer.Option(*names, metavar=value or None, help=text, **settings)
+
 
 MapArgument = Annotated[
     T, typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm).")
@@ -36,133 +49,83 @@ MapOrBuildingArgument = Annotated[
     ),
 ]
 PresetOption = Annotated[
-    T,
-    typer.Option(
-        "--preset",
-        metavar="NAME|FILE",
-        help="A preset's name or its YAML file.",
-        show_default="shortest",
-    ),
+    T, option("--preset NAME|FILE", "A preset's name or its YAML file.", show_default="shortest")
 ]
 SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Override one key, e.g. planner.corridor=route."
-    ),
+    list[str] | None, option("--set KEY=VALUE", "Override one key, e.g. planner.corridor=route.")
 ]
-RadiusOption = Annotated[
-    float | None, typer.Option("--robot-radius", metavar="R", help="Robot radius in metres.")
-]
+RadiusOption = Annotated[float | None, option("--robot-radius R", "Robot radius in metres.")]
 SeedOption = Annotated[
     T,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        help="Seed of random choices: pyramid, sampled pairs or noise; else the model's, the "
-        "preset's or 0.",
+    option(
+        "--seed N",
+        "Seed of random choices: pyramid, sampled pairs or noise; else the model's, the preset's "
+        "or 0.",
     ),
 ]
-OutOption = Annotated[
-    T, typer.Option("-o", "--out", metavar="PATH", help="Where to write the result.")
-]
-PlotOption = Annotated[
-    Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")
-]
+OutOption = Annotated[T, option("-o --out PATH", "Where to write the result.")]
+PlotOption = Annotated[Path | None, option("--plot FILE", "Draw a picture: .png, .pdf or .svg.")]
 AnimationOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--plot", metavar="FILE", help="Write an animation of places, rooms and doors: .gif."
-    ),
+    Path | None, option("--plot FILE", "Write an animation of places, rooms and doors: .gif.")
 ]
-FramesOption = Annotated[
-    int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+FramesOption = Annotated[int, option("--frames N", "Most frames of the animation.", min=2)]
+JsonOption = Annotated[bool, option("--json", "Print one JSON object.")]
 SmoothOption = Annotated[
     str | None,
-    typer.Option(
-        "--smooth",
-        metavar="HOW",
-        help="Shorten the path: none, line-of-sight, or by costs arcs; else the preset's.",
+    option(
+        "--smooth HOW",
+        "Shorten the path: none, line-of-sight, or by costs arcs; else the preset's.",
     ),
 ]
 FreeOption = Annotated[
     float | None,
-    typer.Option(
-        "--free-threshold",
-        metavar="P",
-        help="Occupancy up to which a cell is free; else the map's.",
-    ),
+    option("--free-threshold P", "Occupancy up to which a cell is free; else the map's."),
 ]
 OccupiedOption = Annotated[
     float | None,
-    typer.Option(
-        "--occupied-threshold",
-        metavar="P",
-        help="Occupancy from which on a cell is occupied; else the map's.",
-    ),
+    option("--occupied-threshold P", "Occupancy from which on a cell is occupied; else the map's."),
 ]
 GraphFloorOption = Annotated[
     str | None,
-    typer.Option(
-        "--floor",
-        metavar="NAME",
-        help="Name of the floor in the graph's file: to read one of several, or to write it.",
+    option(
+        "--floor NAME",
+        "Name of the floor in the graph's file: to read one of several, or to write it.",
     ),
 ]
 NoStairsOption = Annotated[
-    bool, typer.Option("--no-stairs", help="For a building: the robot takes no stairs.")
+    bool, option("--no-stairs", "For a building: the robot takes no stairs.")
 ]
 ProfileOption = Annotated[
     str | None,
-    typer.Option(
-        "--profile",
-        metavar="NAME",
-        help="Who goes: visitor, staff, wheelchair, cart, or one of the building's file; heeds "
-        "private rooms, costs of rooms, widths and stairs.",
+    option(
+        "--profile NAME",
+        "Who goes: visitor, staff, wheelchair, cart, or one of the building's file; heeds private "
+        "rooms, costs of rooms, widths and stairs.",
     ),
 ]
-ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
-FrameOption = Annotated[
-    T, typer.Option("--frame", metavar="NAME", help="Name of the map's frame in the file.")
-]
+ForceOption = Annotated[bool, option("--force", "Overwrite an existing file.")]
+FrameOption = Annotated[T, option("--frame NAME", "Name of the map's frame in the file.")]
 ResolutionOption = Annotated[
     T,
-    typer.Option(
-        "--resolution",
-        metavar="R",
-        help="Side of a cell in metres, of the map of a log.",
-        show_default="0.05",
-    ),
+    option("--resolution R", "Side of a cell in metres, of the map of a log.", show_default="0.05"),
 ]
-MergeDistanceOption = Annotated[
-    T, typer.Option("--merge-distance", metavar="U", help="Size of places, U_d, in metres.")
-]
+MergeDistanceOption = Annotated[T, option("--merge-distance U", "Size of places, U_d, in metres.")]
 RegionsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--regions", metavar="N", min=1, help="Also regions above places, of at most N cells."
-    ),
+    int | None, option("--regions N", "Also regions above places, of at most N cells.", min=1)
 ]
 LeastIslandOption = Annotated[
     float,
-    typer.Option(
-        "--least-island",
-        metavar="A",
+    option(
+        "--least-island A",
+        "Leave out islands of free or unexplored cells below A square metres.",
         min=0,
-        help="Leave out islands of free or unexplored cells below A square metres.",
     ),
 ]
 MaxCellsOption = Annotated[
-    int, typer.Option("--max-cells", metavar="N", min=1, help="The most cells that a map may have.")
+    int, option("--max-cells N", "The most cells that a map may have.", min=1)
 ]
 RoomsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--rooms",
-        metavar="FILE",
-        help="Rooms as YAML, in place of a model's or of found ones.",
-    ),
+    Path | None, option("--rooms FILE", "Rooms as YAML, in place of a model's or of found ones.")
 ]
 
 # The option `--costs`: clearance, and masks of Nav2.
@@ -170,10 +133,9 @@ RoomsOption = Annotated[
 
 CostsOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--costs",
-        metavar="WHAT",
-        help="Plan the cheapest path, by clearance[:KEY=VALUE,...], speed:FILE[,KEY=VALUE,...] or "
+    option(
+        "--costs WHAT",
+        "Plan the cheapest path, by clearance[:KEY=VALUE,...], speed:FILE[,KEY=VALUE,...] or "
         "keepout:FILE[,KEY=VALUE,...] (masks of Nav2); may be repeated.",
     ),
 ]
@@ -209,17 +171,17 @@ def parsed_costs(specs: list[str] | None) -> Costs:
     from hybridnav.maps.costs.files import parse_costs  # noqa: PLC0415 - loads numpy
 
     try:
-        found = parse_costs(specs or ())
+        parsed = parse_costs(specs or ())
     except InvalidValueError as error:
         raise UsageError(f"--{error}") from None
     overrides: list[str] = []
-    for spec in found:
+    for spec in parsed:
         if spec.kind == "clearance":
             overrides.append("planner.costs.clearance={}")
             overrides += [
                 f"planner.costs.clearance.{key}={spec.settings[key]!r}" for key in spec.settings
             ]
-    return Costs(tuple(overrides), tuple(spec for spec in found if spec.kind != "clearance"))
+    return Costs(tuple(overrides), tuple(spec for spec in parsed if spec.kind != "clearance"))
 
 
 # The option `--blocked`: closed doors and rooms, obstacles and keepout zones.
@@ -227,12 +189,11 @@ def parsed_costs(specs: list[str] | None) -> Costs:
 
 BlockedOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--blocked",
-        metavar="WHAT",
-        help="Close door:N, room:NAME, or the areas of a GeoJSON FILE or mask: obstacles, off "
-        "which the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre "
-        "alone, as Nav2 takes its masks. May be repeated.",
+    option(
+        "--blocked WHAT",
+        "Close door:N, room:NAME, or the areas of a GeoJSON FILE or mask: obstacles, off which "
+        "the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre alone, as "
+        "Nav2 takes its masks. May be repeated.",
     ),
 ]
 
@@ -261,8 +222,8 @@ def out_of_order(map_file: Path) -> list[str]:
 class Closing:
     """The closures of a command line."""
 
-    given: tuple[str, ...] = ()
-    """As it was given, printable."""
+    texts: tuple[str, ...] = ()
+    """As they were typed, printable."""
     doors: tuple[int, ...] = ()
     rooms: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
@@ -276,11 +237,11 @@ class Closing:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the closures as plain values for JSON: null for none."""
-        return {"blocked": list(self.given) or None}
+        return {"blocked": list(self.texts) or None}
 
     def read(self, grid: hn.OccupancyGrid) -> hn.Blocked | None:
         """Read the files and join all closures; return None for none."""
-        if not self.given:
+        if not self.texts:
             return None
         # They load shapely.
         from hybridnav.closures import Blocked, load_blocked  # noqa: PLC0415
@@ -331,8 +292,8 @@ def parsed_closing(texts: list[str] | None) -> Closing:
             masks.append(_mask(text))
         else:
             files.append(Path(text))
-    given = tuple(map(printable, texts or ()))
-    return Closing(given, tuple(doors), tuple(rooms), tuple(files), tuple(masks))
+    typed = tuple(map(printable, texts or ()))
+    return Closing(typed, tuple(doors), tuple(rooms), tuple(files), tuple(masks))
 
 
 def _mask(text: str) -> CostSpec:

@@ -1,299 +1,321 @@
-"""`hybridnav plan`: from a map file to a route."""
+"""`hybridnav plan`: from a map file to a route, step by step."""
 
 from __future__ import annotations
 
-import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+import itertools
+import json
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+import hybridnav as hn
 from hybridnav._base.extension import extension
-from hybridnav.cli import options
-from hybridnav.cli.common import EXIT_NOT_SOLVED, UsageError, check_new, check_output, check_picture
-from hybridnav.cli.reading import MapOptions, with_map
-from hybridnav.cli.request import (
-    AlternativesOption,
-    OverlapOption,
-    Request,
-    StretchOption,
-    wanted_of,
-)
-from hybridnav.errors import brief
-from hybridnav.guide.words import check_language, languages
-from hybridnav.maps.names import read_point
+from hybridnav._base.files import replace_file
+from hybridnav.cli.common import EXIT_NOT_SOLVED, complain, islands_figures, stage
+from hybridnav.cli.query import PlanOptions, Query, checked_at
+from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
+from hybridnav.cli.rendering import draw, query_of, respond
+from hybridnav.cli.warm import compiling_beside
 
 if TYPE_CHECKING:
-    from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planning.named import At
+    from collections.abc import Sequence
 
-Point = tuple[float, ...]
-
-
-def _point(text: str) -> Point | str:
-    point = read_point(text)
-    if point is None and ":" in text:
-        return text  # of a building: FLOOR:X,Y
-    if point is None:
-        raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {brief(text)}")
-    if not all(map(math.isfinite, point)):
-        raise typer.BadParameter(
-            f"expected finite numbers of metres and radians, got {brief(text)}"
-        )
-    return point
+Seconds = dict[str, float]
+"""Seconds of each stage."""
 
 
-StartOption = Annotated[
-    Any,
-    typer.Option(
-        metavar="X,Y[,YAW]",
-        parser=_point,
-        help="Start in metres; YAW in radians; FLOOR:X,Y in a building.",
-    ),
-]
-GoalOption = Annotated[
-    Any,
-    typer.Option(
-        metavar="X,Y[,YAW]",
-        parser=_point,
-        help="Goal in metres; YAW in radians; FLOOR:X,Y in a building.",
-    ),
-]
-FromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="ROOM|X,Y",
-        help="Start in a room, or at a point; FLOOR:ROOM in a building.",
-    ),
-]
-ToOption = Annotated[
-    str | None,
-    typer.Option(
-        "--to", metavar="ROOM|X,Y", help="Go to a room, or to a point; FLOOR:ROOM in a building."
-    ),
-]
-ViaOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--via", metavar="ROOM|X,Y", help="Waypoint between start and goal; may be repeated."
-    ),
-]
-AtOption = Annotated[
-    str,
-    typer.Option(
-        "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
-    ),
-]
-_POSES = (".csv", ".json", ".geojson")
-"""Endings of files of poses."""
-LanguageOption = Annotated[
-    str,
-    typer.Option(
-        "--language", metavar="CODE", help=f"Language of the words: {', '.join(languages())}."
-    ),
-]
-PosesOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--poses",
-        metavar="FILE",
-        help="Write poses every 5 cm: x, y in metres, yaw in radians, with limits speed and time; "
-        ".csv or .json. Or the line: .geojson.",
-    ),
-]
-BagOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--bag",
-        metavar="NAME",
-        help="Write path and map as a new bag of ROS: NAME.bag of ROS 1, else a folder of ROS 2.",
-    ),
-]
-ProofOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--proof",
-        metavar="FILE",
-        help="Write a proof of the answer, .json, for hybridnav verify or check_proof.py.",
-    ),
-]
-CompareOption = Annotated[
-    bool,
-    typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
-]
-WhyOption = Annotated[
-    bool,
-    typer.Option(
-        "--why", help="Also print the widest robot that could go, and where it is tightest."
-    ),
-]
+def plan(args: PlanOptions) -> None:
+    """Plan a route on MAP from a point or room to another.
 
-WithinOption = Annotated[
-    float | None,
-    typer.Option(
-        "--within",
-        metavar="M",
-        help="If the goal cannot be reached, plan to the nearest point that can, at most so many "
-        "metres from it.",
-    ),
-]
-LeaveZoneOption = Annotated[
-    bool,
-    typer.Option(
-        "--leave-zone",
-        help="Let a start that --blocked or --costs close leave them by the shortest way.",
-    ),
-]
-
-
-@with_map(
-    before="compare",
-    over_floors=lambda: extension("formats", "building").plan_over_floors,
-    alone=("no_stairs",),
-)
-def plan(
-    map_file: options.MapOrBuildingArgument,
-    start: StartOption = None,
-    goal: GoalOption = None,
-    origin: FromOption = None,
-    to: ToOption = None,
-    via: ViaOption = None,
-    at: AtOption = "anywhere",
-    within: WithinOption = None,
-    leave_zone: LeaveZoneOption = False,
-    rooms_file: options.RoomsOption = None,
-    alternatives: AlternativesOption = 1,
-    max_overlap: OverlapOption = None,
-    max_stretch: StretchOption = None,
-    blocked: options.BlockedOption = None,
-    no_stairs: options.NoStairsOption = False,
-    profile: options.ProfileOption = None,
-    costs: options.CostsOption = None,
-    smooth: options.SmoothOption = None,
-    compare: CompareOption = False,
-    why: WhyOption = False,
-    plot: options.PlotOption = None,
-    poses: PosesOption = None,
-    bag: BagOption = None,
-    proof: ProofOption = None,
-    language: LanguageOption = "en",
-    as_json: options.JsonOption = False,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Plan a route on MAP, or over the floors of a building, from a point or room to another.
-
-    Without --rooms, rooms are those of rooms.yaml beside the map, if there. Things that `hybridnav
-    closed` has closed stay closed.
+    MAP may be a building, and the route then leads over its floors. Without --rooms, rooms are
+    those of rooms.yaml beside the map, if there. Things that `hybridnav closed` has closed stay
+    closed.
 
     Exits with 0 when it is solved, or ends within --within of the goal, 1 when it is not, 2 on
     wrong usage, 3 on unreadable input.
+
+    Example: hybridnav plan maps/office/office.yaml --from room-3 --to room-5
     """
-    del no_stairs  # of a building
-    _check_files(plot, poses, bag)
-    check_output(proof, "--proof", (".json",))
-    where = checked_at(at)
-    given = options.parsed_costs(costs)
-    check_language(language)
-    settings = reading.settings(
-        map_file, preset=options.PRESET if given else None, overrides=given.overrides, smooth=smooth
-    )
-    closing = options.parsed_closing([*(blocked or ()), *options.out_of_order(map_file)])
-    first, last = _end("start", start, "from", origin), _end("goal", goal, "to", to)
-    if via and alternatives > 1:
-        raise UsageError("--alternatives does not go with --via")
-    wanted = wanted_of(alternatives, max_overlap, max_stretch)
-    request = Request(
-        map_file=map_file,
-        settings=settings,
-        reading=reading,
-        waypoints=[first, *map(_parsed_waypoint, via or ()), last],
-        closing=closing,
-        profile=profile,
-        costs=given,
-        rooms_file=rooms_file,
-        at=where,
-        within_m=within,
-        leave_zone=leave_zone,
-        wanted=wanted,
-        compare=compare,
-        why=why,
-        plot=plot,
-        poses=poses,
-        bag=bag,
-        proof=proof,
-        language=language,
-        as_json=as_json,
-    )
-    _check_fits(request)
-    if not request.run():
+    if args.is_building:
+        extension("formats", "building").plan_over_floors(args)
+        return
+    query = Query.read(args)
+    if not _answer(query, {}):
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 
-def _check_files(plot: Path | None, poses: Path | None, bag: Path | None) -> None:
-    """Refuse files that cannot be written."""
-    check_picture(plot)
-    check_output(poses, "--poses", _POSES)
-    if bag is not None:
-        check_new(bag, "--bag")
+def _answer(query: Query, seconds: Seconds) -> bool:
+    """Read the map, plan, print, write and draw; return whether it is solved."""
+    args, settings = query.args, query.settings
+    if settings.planner.method == "ompl":
+        hn.refine.ompl.start_ahead()
+    model = args.load(settings, seconds)
+    check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
+    closed, costs = query.closing.read(model.grid), query.costs.read(model.grid)
+    status = outside(model.grid, query.waypoints) if args.plot is None else None
+    if status is not None and (args.within_m is None or "goal" not in status):
+        print_refusal(query, model.grid, status, seconds)
+        return False
+    topology = grow(query, model, seconds)
+    with stage("preparing the planner", seconds, "prepare"):
+        planner = model.planner(settings, topology=topology, costs=costs)
+        planner = planner if args.profile is None else hn.under(planner, args.profile)
+    outcome = find(query, planner, closed, seconds)
+    routes = find_alternatives(query, planner, closed, seconds)
+    figures: dict[str, Any] = {}
+    if routes is not None:
+        figures = alternatives_figures(routes)
+    elif args.compare and isinstance(outcome, hn.PlanResult):
+        figures = compare(plan_on_whole_grid(query, planner, closed, costs), outcome)
+    figures |= left_closures(outcome, closed, planner)
+    figures |= explain(query, planner, outcome, closed, seconds)
+    print_answer(query, planner.grid, outcome, figures, seconds)
+    write_files(args, outcome, planner.grid)
+    if args.plot is not None:
+        optimum_m = figures["optimum_m"] if figures.get("loss") is not None else None
+        shown, on = routes or outcome, (planner.topology, closed, planner.costs)
+        draw(args.plot, shown, query.waypoints, optimum_m, on=on)
+    return outcome.solved or (isinstance(outcome, hn.PlanResult) and outcome.ends_well)
 
-        extension("formats", "bag").check_rosbags("--bag")
+
+# The pyramid, and what is planned on it.
 
 
-def _check_fits(request: Request) -> None:
-    """Refuse files of one path for several, and comparisons of tours."""
-    files = {"--poses": request.poses, "--bag": request.bag, "--proof": request.proof}
-    for option, file in files.items():
-        if file is not None and request.wanted.count > 1:
-            raise UsageError(
-                f"{option} writes one path, and --alternatives asks for more: leave one out"
+def grow(query: Query, model: hn.Model, seconds: Seconds) -> hn.TopologicalMap:
+    """Build the pyramid, with rooms for a tour, while the search is compiled.
+
+    They are those of a file that is named, of the model, of a file in the map's folder, or found.
+    """
+    rooms_file, beside = query.args.rooms_file, query.args.map_file.parent / "rooms.yaml"
+    if rooms_file is None and model.rooms is None and query.is_tour:
+        rooms_file = beside if beside.is_file() else None
+        if rooms_file is None:
+            complain(
+                "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
             )
-    if request.proof is not None and len(request.waypoints) > 2:  # noqa: PLR2004 - start and goal
-        raise UsageError("--proof is of a path without --via: leave one out")
-    if request.within_m is not None and not request.within_m >= 0:
-        raise UsageError(f"--within must be metres, 0 or more, got {request.within_m:g}")
-    if request.is_tour and request.within_m is not None:
-        raise UsageError("--within goes with --start and --goal alone, and files as --blocked")
-    if request.leave_zone and (request.is_tour or request.within_m is not None or request.compare):
-        raise UsageError(
-            "--leave-zone goes with --start, --goal and files as --blocked, without --within and "
-            "--compare: leave one out"
+    settings = query.settings
+    if settings.planner.underlying.method == "shortest" and not model.is_filed:
+        from hybridnav.planning.methods.shortest import announce_mesh  # noqa: PLC0415 - numba
+
+        allowed = settings.planner.allow_unexplored
+        announce_mesh(model.grid.enterable(allow_unexplored=allowed))
+    with compiling_beside(settings) as compiled:
+        topology = grow_topology(
+            model,
+            settings,
+            seconds,
+            rooms_file=rooms_file,
+            find_rooms=query.is_tour,
+            waypoints=query.waypoints,
+            closing=query.closing,
         )
-    if request.is_tour and request.compare:
-        raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
+        compiled()
+    return topology
 
 
-def one_of(option: str, point: Any, other: str, text: str | None) -> Point | str:
-    """Return the start or the goal, from the one of its two options that was used."""
-    if (point is None) == (text is None):
-        what = "missing option" if point is None else "only one is taken, of"
-        raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
-    return point if text is None else text
+def find(
+    query: Query, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
+) -> hn.PlanResult | hn.Tour:
+    """Plan between two points, or a tour."""
+    args, spent = query.args, Seconds()
+    with stage("planning", spent, "plan"):
+        if not query.is_tour:  # the result has the seconds of its stages
+            how: Any = {"within_m": args.within_m, "leave_zone": args.leave_zone}
+            return planner.plan(*query.waypoints, blocked=closed, **how)
+        tour = hn.plan_tour(planner, query.waypoints, at=checked_at(args.at), blocked=closed)
+    counted = sum(sum(result.stats.seconds.values()) for result in tour.results)
+    seconds["plan"] = round(max(spent["plan"] - counted, 0.0), 6)  # what no stage counts
+    return tour
 
 
-def _end(option: str, point: Any, other: str, text: str | None) -> Waypoint:
-    """Return the start or the goal on a map."""
-    given = one_of(option, point, other, text)
-    if isinstance(point, str):
-        raise UsageError(f"--{option}: expected X,Y in metres, or X,Y,YAW, got {point!r:.80}")
-    return _parsed_waypoint(given) if isinstance(given, str) else given
+def find_alternatives(
+    query: Query, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
+) -> hn.Alternatives | None:
+    """Find alternatives between the two waypoints, None if they are not asked for."""
+    args = query.args
+    if args.alternatives == 1:
+        return None
+    with stage("finding alternatives", seconds, "alternatives"):
+        return hn.plan_alternatives(
+            planner,
+            query.waypoints[0],
+            query.waypoints[-1],
+            args.alternatives,
+            max_overlap=args.max_overlap,
+            max_stretch=args.max_stretch,
+            at=checked_at(args.at),
+            blocked=closed,
+        )
 
 
-def _parsed_waypoint(text: str) -> Waypoint:
-    """Return a point if the text is two numbers, or three with a heading, else a name."""
-    point = read_point(text)
-    if point is None:
-        return text
-    if not all(map(math.isfinite, point)):
-        raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.80}")
-    return point
+def plan_on_whole_grid(
+    query: Query,
+    planner: hn.HybridPlanner,
+    closed: hn.Blocked | None,
+    costs: hn.CostLayer | None,
+) -> hn.PlanResult:
+    """Plan between the same points on all cells, by the same costs."""
+    # Loads pydantic, which help can do without.
+    from hybridnav.planning import CostSettings, planner_settings  # noqa: PLC0415
+
+    own = query.settings.planner
+    by = CostSettings(clearance=own.clearance)
+    whole = planner_settings("grid-astar", allow_unexplored=own.allow_unexplored, costs=by)
+    preset = query.settings.model_copy(update={"name": "grid-astar", "planner": whole})
+    start, goal = (waypoint[:2] for waypoint in query.waypoints)
+    on_cells = hn.HybridPlanner(planner.topology, preset=preset, costs=costs)
+    return on_cells.plan(start, goal, blocked=closed)
 
 
-def checked_at(at: str) -> At:
-    """Return the place in a room that is meant."""
-    if at == "anywhere":
-        return "anywhere"
-    if at == "point":
-        return "point"
-    raise UsageError(f"--at must be anywhere or point, got {at!r:.80}")
+# The figures beside a plan.
+
+
+def compare(on_grid: hn.PlanResult, result: hn.PlanResult | None) -> dict[str, Any]:
+    """Return the figures of a plan on the whole grid, and the loss of a result against it."""
+    cost, loss = on_grid.cost if on_grid.solved else None, None
+    alike = result is None or result.metric == on_grid.metric
+    if cost is not None and result is not None and result.solved and alike:
+        loss = result.cost / cost - 1 if cost > 0 else 0.0
+    return {
+        "optimum_m": cost if alike else None,
+        "loss": loss,
+        "grid_length_m": on_grid.path.length_m if on_grid.path is not None else None,
+        "grid_cost": cost,
+        "grid_expanded": on_grid.stats.expanded,
+        "grid_seconds": round(sum(on_grid.stats.seconds.values()), 6),
+    }
+
+
+def alternatives_figures(routes: hn.Alternatives) -> dict[str, Any]:
+    """Return alternatives with the rooms and doors that they pass, and whether they are all."""
+    from hybridnav.planning import COST_METRICS  # noqa: PLC0415 - loads numpy
+
+    listed = []
+    by_costs = bool(routes) and routes[0].result.metric in COST_METRICS
+    for number, route in enumerate(routes):
+        rooms = [
+            (leg.room or f"the {leg.shape}")
+            + (f" ({leg.door.kind} {leg.door.number})" if leg.door else "")
+            for leg in route.tour.legs
+        ]
+        pair = routes[0].tour, route.tour
+        first_m, own_m = (tour.cost if by_costs else tour.length_m for tour in pair)
+        stretch = own_m / first_m if number and first_m > 0 else 1.0
+        listed.append(route.to_dict() | {"rooms": rooms, "stretch": stretch})
+    return {
+        "alternatives": listed,
+        "alternatives_complete": routes.complete,
+        "alternatives_note": routes.note,
+    }
+
+
+def left_closures(
+    outcome: hn.PlanResult | hn.Tour, closed: hn.Blocked | None, planner: hn.HybridPlanner
+) -> dict[str, Any]:
+    """Return what reasons call the closures that a plan leaves; nothing of others."""
+    if not isinstance(outcome, hn.PlanResult) or outcome.leaves_m is None:
+        return {}
+    from hybridnav.reasons.why import each_closure  # noqa: PLC0415 - loads shapely
+    from hybridnav.reasons.why_words import Closure, closure_words  # noqa: PLC0415
+
+    assert outcome.start is not None  # noqa: S101 - every plan has one
+    grid, costs = planner.grid, planner.costs
+    row, col = grid.frame.cell_of(*outcome.start[:2])
+    flat, closures = row * grid.shape[1] + col, each_closure(closed or hn.Blocked())
+    left = [closure for closure, own in closures if flat in own.cells_of(planner.topology)]
+    if costs is not None and flat in costs.closed_flat:
+        left.append(Closure("costs", None))
+    return {"leaves": [closure_words(closure, "en") for closure in left]}
+
+
+def explain(
+    query: Query,
+    planner: hn.HybridPlanner,
+    outcome: hn.PlanResult | hn.Tour,
+    closed: hn.Blocked | None,
+    seconds: Seconds,
+) -> dict[str, Any]:
+    """Explain why there is no path, or, if asked, where a path is tightest."""
+    args = query.args
+    if (outcome.solved and not args.why) or "outside" in outcome.status:
+        return {}
+    from hybridnav.reasons.why import explain_solved  # noqa: PLC0415 - loads shapely
+
+    # A name counts only where the leg may choose its end in the room.
+    may_choose = outcome.solved and args.at == "anywhere" and not planner.needs_headings
+    reasons = []
+    with stage("explaining", seconds, "why"):
+        for leg, names in zip(_results(outcome), itertools.pairwise(query.waypoints), strict=False):
+            if leg.start is None or leg.goal is None or leg.solved != outcome.solved:
+                continue
+            source = leg.proof_source
+            # All that is closed but the way out of a zone that the leg leaves.
+            shut: Any = closed if leg.leaves_m is None or source is None else source[2]
+            named: Any = names if may_choose else (None, None)
+            reasons.append(explain_solved(planner, (leg.start, leg.goal), named, blocked=shut))
+    tightest = min(reasons, key=lambda reason: reason.widest_m, default=None)
+    if tightest is None:
+        return {"why": None}
+    return {"why": tightest.to_dict() | {"words": tightest.words(args.language)}}
+
+
+def _results(outcome: hn.PlanResult | hn.Tour) -> Sequence[hn.PlanResult]:
+    return (outcome,) if isinstance(outcome, hn.PlanResult) else outcome.results
+
+
+# What is printed, and what is written.
+
+
+def print_refusal(
+    query: Query, grid: hn.OccupancyGrid, status: hn.PlanStatus, seconds: Seconds
+) -> None:
+    """Print the answer for points outside the map, as a planner would give it."""
+    refused = refused_result(status, query.settings, query.waypoints)
+    figures: dict[str, Any] = {}
+    if query.args.alternatives > 1:
+        # Loads numba, which help and wrong usage can do without.
+        from hybridnav.guide.alternatives import unplanned  # noqa: PLC0415
+
+        figures = alternatives_figures(unplanned(refused.status))
+    elif query.args.compare:
+        figures = compare(refused, None)
+    outcome = hn.Tour((refused,), ()) if query.is_tour else refused
+    print_answer(query, grid, outcome, figures, seconds)
+
+
+def print_answer(
+    query: Query,
+    grid: hn.OccupancyGrid,
+    outcome: hn.PlanResult | hn.Tour,
+    beside: dict[str, Any],
+    seconds: Seconds,
+) -> None:
+    """Print a plan or tour, and the figures `beside` it."""
+    args = query.args
+    by_costs = bool(query.costs) and args.preset is None
+    figures = outcome.to_dict() | {"map": str(args.map_file), "by_costs": by_costs}
+    if not isinstance(outcome, hn.PlanResult):  # `hn.Tour` would load the words
+        figures["words"] = outcome.words(args.language)
+    islands, closed = islands_figures(grid), query.closing.to_dict()
+    if query.is_tour:
+        waypoints = [each if isinstance(each, str) else list(each) for each in query.waypoints]
+        figures |= {"waypoints": waypoints, "query": query_of(query.waypoints)}
+        figures |= closed | beside | islands
+    else:
+        figures |= islands | closed | beside
+    figures["seconds"] = seconds | figures["seconds"]
+    respond(grid, query.waypoints, figures, as_json=args.as_json)
+
+
+def write_files(
+    args: PlanOptions, outcome: hn.PlanResult | hn.Tour, grid: hn.OccupancyGrid
+) -> None:
+    """Write the poses, the bag and the proof that are asked for."""
+    if args.poses is not None:
+        hn.export_path(outcome, args.poses)
+    if args.bag is not None:
+        extension("formats", "bag").save_bag(args.bag, [outcome], grid=grid)
+    if args.proof is not None:
+        proof = hn.prove(_results(outcome)[0])
+        text = json.dumps(proof, separators=(",", ":"), allow_nan=False)
+        replace_file(args.proof, text.encode())

@@ -33,18 +33,20 @@ def respond(
 
 def draw(
     path: Path,
-    topology: hn.TopologicalMap,
     outcome: hn.PlanResult | hn.Tour | hn.Alternatives,
     waypoints: Sequence[Waypoint],
     optimum_m: float | None,
     *,
-    costs: hn.CostLayer | None,
-    blocked: hn.Blocked | None,
+    on: tuple[hn.TopologicalMap, hn.Blocked | None, hn.CostLayer | None],
 ) -> None:
-    """Save the picture of a plan between two points, of a tour, or of alternatives."""
+    """Save the picture of a plan between two points, of a tour, or of alternatives.
+
+    `on`: the map, what is closed on it, and costs.
+    """
     from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
 
-    query: Any = {"costs": costs, "blocked": blocked}
+    topology, closed, costs = on
+    query: Any = {"costs": costs, "blocked": closed}
     if isinstance(outcome, hn.PlanResult):
         start, goal = (waypoint[:2] for waypoint in waypoints)
         ax = viz.plot_plan(topology, outcome, start=start, goal=goal, optimum_m=optimum_m, **query)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,27 +21,26 @@ from hybridnav.cli.common import (
     islands_line,
     timings,
 )
-from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption
-from hybridnav.cli.reading import MapOptions, grow_topology, load_model, read_preset, with_map
+from hybridnav.cli.map_options import MapOptions
+from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption, option
+from hybridnav.cli.reading import grow_topology, read_preset
 
 if TYPE_CHECKING:
     from hybridnav.search.descent import WatchedDescent
 
 LevelOption = Annotated[
     int | None,
-    typer.Option(
-        "--level",
-        metavar="N",
-        help="Level to describe and draw: 0 the base, -1 the apex; else the apex, or the regions.",
+    option(
+        "--level N",
+        "Level to describe and draw: 0 the base, -1 the apex; else the apex, or the regions.",
     ),
 ]
 WatchOption = Annotated[
     tuple[str, Path] | None,
-    typer.Option(
-        "--watch",
-        metavar="descent FILE",
-        help="Draw how `paper` comes down the levels on a long way, by the preset if it "
-        "is of `paper`: .gif, or a strip, .png.",
+    option(
+        "--watch descent FILE",
+        "Draw how `paper` comes down the levels on a long way, by the preset if it is of `paper`: "
+        ".gif, or a strip, .png.",
     ),
 ]
 ProofArgument = Annotated[
@@ -49,28 +49,33 @@ ProofArgument = Annotated[
 ]
 
 
-@with_map()
-def show(
-    map_file: MapArgument[Path],
-    level: LevelOption = None,
-    regions: RegionsOption = None,
-    plot: PlotOption = None,
-    watch: WatchOption = None,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Show the classes of MAP's cells and the levels of its pyramid."""
-    check_picture(plot)
+@dataclass(frozen=True, kw_only=True)
+class ShowOptions(MapOptions):
+    """The options of `hybridnav show`."""
+
+    level: LevelOption = None
+    regions: RegionsOption = None
+    plot: PlotOption = None
+    watch: WatchOption = None
+
+
+def show(args: ShowOptions) -> None:
+    """Show the classes of MAP's cells and the levels of its pyramid.
+
+    Example: hybridnav show maps/office/office.yaml --plot levels.png
+    """
+    level, watch = args.level, args.watch
+    check_picture(args.plot)
     if watch is not None:
         if watch[0] != "descent":
             raise UsageError(f"--watch must be 'descent FILE', got {printable(watch[0])!r}")
         check_output(watch[1], "--watch", (".gif", ".png", ".pdf", ".svg"))
-    settings = reading.settings(map_file)
+    settings = args.settings()
     seconds: dict[str, float] = {}
-    model = load_model(map_file, settings, seconds, reading)
+    model = args.load(settings, seconds)
     pyramid = grow_topology(model, settings, seconds).pyramid
-    if regions is not None:
-        pyramid = pyramid.with_regions(regions)
+    if args.regions is not None:
+        pyramid = pyramid.with_regions(args.regions)
     if level is None:
         level = -1 if pyramid.region_cells is None else pyramid.region_level
     if not -len(pyramid) <= level < len(pyramid):
@@ -80,10 +85,10 @@ def show(
     shown, descent = pyramid[level], None if watch is None else _watched(pyramid, settings)
     parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
-    if plot is not None:
+    if args.plot is not None:
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
-        viz.save_figure(viz.plot_level(shown), plot)
+        viz.save_figure(viz.plot_level(shown), args.plot)
     if watch is not None and descent is not None:
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
@@ -214,11 +219,14 @@ def check_preset(source: PresetArgument) -> None:
 
 
 def verify(map_file: MapArgument[Path], proof_file: ProofArgument) -> None:
-    """Check a PROOF of a plan on MAP: that its path is free, has its cost, and none costs less.
+    """Check a PROOF of a plan on MAP.
 
-    The same is done by check_proof.py, a script that needs nothing of this package.
+    It is accepted if its path is free and has its cost, and no path costs less. The same is done by
+    check_proof.py, a script that needs nothing of this package.
 
     Exits with 0 when the proof is accepted, 1 when it is rejected, 3 on unreadable input.
+
+    Example: hybridnav verify maps/office/office.yaml proof.json
     """
     from hybridnav import check_proof  # noqa: PLC0415 - loads numpy
 

@@ -152,9 +152,9 @@ def rehearse(file: Path, presets: Iterable[Preset]) -> None:
             continue
         planner = model.planner(preset, topology=model.grown(preset.pyramid, model.rooms))
         for start, goal in zip(pairs[::2], pairs[1::2], strict=True):
-            found = planner.plan(start, goal)
-            if found.solved:
-                found.to_dict()
+            result = planner.plan(start, goal)
+            if result.solved:
+                result.to_dict()
                 if model.rooms is not None and model.rooms.names:
                     hn.plan_tour(planner, [start, model.rooms.names[0]]).words()
                 break
@@ -205,8 +205,8 @@ def compile_search(method: str) -> None:
     # On the cells alone, as `paper` searches inside its corridor.
     settings = planner_settings("grid-astar" if method == "paper" else method)
     start, goal = grid.frame.points_of(np.array(_ENDPOINTS))
-    found = make_method(KnownMap(grid, None), settings).find(Query(_ENDPOINTS, (start, goal)))
-    _ = found.cells
+    outcome = make_method(KnownMap(grid, None), settings).find(Query(_ENDPOINTS, (start, goal)))
+    _ = outcome.cells
 
 
 def compile_plan(preset: str) -> None:

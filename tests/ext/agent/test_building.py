@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.cli.reading import MapOptions
+from hybridnav.cli.map_options import MapOptions
 from hybridnav.ext.agent import TOOLS, BuildingAnswers
 from hybridnav.ext.agent.floors import TOOLS as OVER_FLOORS
 from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
@@ -339,7 +339,7 @@ HOUSE_OF_ALL = house()
 def test_rooms_are_named_over_floors_and_taken_back(tmp_path):
     shutil.copytree(SHIPPED, tmp_path / "maps")
     file = tmp_path / "maps" / "building" / "building.yaml"
-    site = BuildingPage(file, MapOptions(robot_radius_m=0.25)).make(lambda _: None)
+    site = BuildingPage(MapOptions(map_file=file, robot_radius_m=0.25)).make(lambda _: None)
     answers = BuildingAnswers(site, allow_edits=True)
     assert answers.call("close", {"rooms": "archive"})["ok"]
     named = answers.call("name_room", {"room": "floor 2, archive", "name": "attic"})
@@ -360,7 +360,7 @@ def test_what_is_out_of_order_is_closed_for_programs_too(tmp_path):
     file = tmp_path / "maps" / "building" / "building.yaml"
     journal = hn.Journal(file)
     journal.close("link:north lift")
-    site = BuildingPage(file, MapOptions(robot_radius_m=0.25)).make(lambda _: None)
+    site = BuildingPage(MapOptions(map_file=file, robot_radius_m=0.25)).make(lambda _: None)
     answers = BuildingAnswers(site)
     found = answers.call("route", {"start": "office 5", "goal": "2.04"})
     assert [part["ride"]["link"] for part in found["parts"][:1]] == ["east stairs"]

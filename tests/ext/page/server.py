@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.cli.reading import MapOptions
+from hybridnav.cli.map_options import MapOptions
 from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.app import make_app, make_server
 from hybridnav.ext.page.command import BuildingPage
@@ -204,7 +204,7 @@ class Client:
 
 def building_page(file: Path, robot_radius_m: float | None = 0.2) -> BuildingPage:
     """Return what the command makes a page of a building of."""
-    return BuildingPage(file, MapOptions(robot_radius_m=robot_radius_m, max_cells=10**6))
+    return BuildingPage(MapOptions(map_file=file, robot_radius_m=robot_radius_m, max_cells=10**6))
 
 
 def building_site_of(file: Path) -> Site:

@@ -5,52 +5,57 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._version import __version__
 from hybridnav.cli import options
-from hybridnav.cli.reading import MapOptions, with_map
+from hybridnav.cli.map_options import FloorOptions
+from hybridnav.cli.options import OneMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page.command import BuildingPage, EditsOption, MapPage
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from hybridnav.ext.agent.answers import MapAnswers
     from hybridnav.ext.agent.building import BuildingAnswers
 
 
-@with_map(over_floors=lambda: _serve_over_floors)
-def serve(
-    map_file: options.MapOrBuildingArgument,
-    rooms_file: options.RoomsOption = None,
-    allow_edits: EditsOption = False,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Serve MAP as tools of the Model Context Protocol on standard input and output.
+@dataclass(frozen=True, kw_only=True)
+class ServeOptions(FloorOptions):
+    """The options of `hybridnav serve`."""
 
-    Programs ask for rooms, routes and reasons, and get small answers with proofs. Nothing is
-    changed unless --allow-edits is given. MAP may be a building, whose floors answer together. The
-    page of `hybridnav view` gives the same calls as JSON over HTTP. Ends with its input.
+    rooms_file: OneMap[options.RoomsOption] = None
+    allow_edits: EditsOption = False
+
+
+def serve(args: ServeOptions) -> None:
+    """Serve MAP as tools of the Model Context Protocol.
+
+    They are called on standard input and output. Programs ask for rooms, routes and reasons, and
+    get small answers with proofs. Nothing is changed unless --allow-edits is given. MAP may be a
+    building, whose floors answer together. The page of `hybridnav view` gives the same calls as
+    JSON over HTTP. Ends with its input.
+
+    Example: hybridnav serve maps/office/office.yaml
     """
     check_protocol()
-    page = MapPage.read(map_file, rooms_file, options.parsed_costs(None), reading)
-    # Loads numba, which help and wrong usage can do without.
+    # They load numba, which help and wrong usage can do without.
     from hybridnav.ext.agent.answers import MapAnswers  # noqa: PLC0415
-
-    site = page.make(lambda _: None)
-    serve_stdio(MapAnswers(site.sessions[0], allow_edits=allow_edits))
-
-
-def _serve_over_floors(*, map_file: Path, allow_edits: bool, reading: MapOptions) -> None:
-    """Serve a building; see `serve`."""
-    check_protocol()
-    # Loads numba, which help and wrong usage can do without.
     from hybridnav.ext.agent.building import BuildingAnswers  # noqa: PLC0415
 
-    site = BuildingPage(map_file, reading).make(lambda _: None)
-    serve_stdio(BuildingAnswers(site, allow_edits=allow_edits))
+    page = (
+        BuildingPage(args)
+        if args.is_building
+        else MapPage.read(args, args.rooms_file, options.parsed_costs(None))
+    )
+    site = page.make(lambda _: None)
+    edits = args.allow_edits
+    answers = (
+        BuildingAnswers(site, allow_edits=edits)
+        if args.is_building
+        else MapAnswers(site.sessions[0], allow_edits=edits)
+    )
+    serve_stdio(answers)
 
 
 # The Model Context Protocol, by standard input and output.
@@ -110,19 +115,19 @@ async def _serve(answers: MapAnswers | BuildingAnswers) -> None:
     async def list_tools(_: Any, __: Any) -> types.ListToolsResult:
         return types.ListToolsResult(tools=listed)
 
-    async def call_tool(_: Any, asked: types.CallToolRequestParams) -> types.CallToolResult:
-        found = await answered(answers.call, asked.name, asked.arguments or {})
-        png = found.pop("png", None)
+    async def call_tool(_: Any, params: types.CallToolRequestParams) -> types.CallToolResult:
+        reply = await answered(answers.call, params.name, params.arguments or {})
+        png = reply.pop("png", None)
         content: list[Any] = [
             types.TextContent(
-                type="text", text=json.dumps(found, allow_nan=False, ensure_ascii=False)
+                type="text", text=json.dumps(reply, allow_nan=False, ensure_ascii=False)
             )
         ]
         if png is not None:
             data = base64.b64encode(png).decode()
             content.append(types.ImageContent(type="image", data=data, mimeType="image/png"))
         return types.CallToolResult(
-            content=content, structuredContent=found, isError=not found["ok"]
+            content=content, structuredContent=reply, isError=not reply["ok"]
         )
 
     server: Server[Any] = Server(

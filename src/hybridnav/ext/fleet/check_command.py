@@ -1,7 +1,8 @@
-"""`hybridnav check` for the graph of a building of several floors."""
+"""`hybridnav check`: what is wrong with a graph that others have made."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +12,9 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common, options
-from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
+from hybridnav.cli.map_options import FloorOptions
+from hybridnav.cli.options import OfBuilding, OneMap, option
+from hybridnav.cli.reading import check_room_to_be, grow_topology
 from hybridnav.ext.fleet import findings_report as telling
 from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.fleet.fleet_options import respond
@@ -24,83 +27,68 @@ if TYPE_CHECKING:
 
 AlignOption = Annotated[
     bool,
-    typer.Option(
+    option(
         "--align",
-        help="For a building: move the floors of the graph so that its links stop where those of "
-        "the building do.",
+        "For a building: move the floors of the graph so that its links stop where those of the "
+        "building do.",
     ),
 ]
 MatchOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--match",
-        metavar="NAME=FLOOR",
-        help="For a building: the graph calls FLOOR otherwise; may be given several times.",
+    option(
+        "--match NAME=FLOOR",
+        "For a building: the graph calls FLOOR otherwise; may be given several times.",
     ),
 ]
 PairsOption = Annotated[
     int,
-    typer.Option(
-        "--pairs",
-        metavar="N",
+    option(
+        "--pairs N",
+        "For a building: pairs of points whose routes are compared.",
         min=0,
         max=1_000_000,
-        help="For a building: pairs of points whose routes are compared.",
     ),
 ]
 
 
-def _check_over_floors(
-    *,
-    map_file: Path,
-    graph_file: Path,
-    out: Path | None,
-    ignore: list[str] | None,
-    fail_on: str,
-    align: bool,
-    match: list[str] | None,
-    pairs: int,
-    no_stairs: bool,
-    as_json: bool,
-    reading: MapOptions,
-) -> None:
+def _check_over_floors(args: CheckOptions) -> None:
     """Check the graph of a building, and print a summary; see `check`."""
     from hybridnav.ext.fleet import check_building_graph, judge_building_graph, match_graph  # noqa: PLC0415 - on demand
     from hybridnav.ext.fleet.link_nodes import SAME_POINT_M  # noqa: PLC0415
     from hybridnav.graphs import BUILDING_KINDS, KINDS  # noqa: PLC0415
 
-    _check_given(ignore, KINDS | BUILDING_KINDS, fail_on, out)
+    _check_options(args, KINDS | BUILDING_KINDS)
     seconds: dict[str, float] = {}
-    names = _names_of(match or ())
-    with common.stage(f"reading {graph_file}", seconds, "graph"):
-        graph = hn.ext.fleet.load_building_graph(graph_file)
-    building = load_floors(map_file, reading, seconds)
+    names = _names_of(args.match or ())
+    with common.stage(f"reading {args.graph_file}", seconds, "graph"):
+        graph = hn.ext.fleet.load_building_graph(args.graph_file)
+    building = load_floors(args, seconds)
     with common.stage("checking", seconds, "check"):
-        matched = match_graph(building, graph, floors=names, align=align)
-        found = check_building_graph(matched)
+        matched = match_graph(building, graph, floors=names, align=args.align)
+        check = check_building_graph(matched)
     report = None
-    if pairs:
+    if args.pairs:
         with common.stage("comparing routes", seconds, "routes"):
-            report = judge_building_graph(matched, pairs=pairs, stairs=not no_stairs)
+            report = judge_building_graph(matched, pairs=args.pairs, stairs=not args.no_stairs)
     from hybridnav.ext.fleet.findings_report import building_facts, render_building_check  # noqa: PLC0415
 
     cases = () if report is None else report.contradictions
-    whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
-    wrong = _counted(whole, ignore)
-    more = [
+    whole = {"": check.findings} | {name: floor.findings for name, floor in check.floors.items()}
+    wrong = _counted(whole, args.ignore)
+    facts = [(name, _line(text)) for name, text in building_facts(check, report)]
+    lines = _summary(facts, wrong)
+    lines += [
         f"{'' if n else 'routes':<10} {_line(text)}"
         for n, text in enumerate(cases[: telling.SHOWN])
     ]
-    if not align and matched.away_m > SAME_POINT_M:
+    if not args.align and matched.away_m > SAME_POINT_M:
         away = f"links stop up to {matched.away_m:.2f} m from those of the building"
-        more.append(f"hint       {away}: --align, if floors have other frames than their maps")
-    facts = [(name, _line(text)) for name, text in building_facts(found, report)]
-    lines = [*_summary(facts, wrong), *more]
-    respond(_building_figures(found, report, wrong), lines, seconds, as_json=as_json)
-    if out is not None:
-        telling.write_page(render_building_check(found, report), out)
+        lines.append(f"hint       {away}: --align, if floors have other frames than their maps")
+    respond(_building_figures(check, report, wrong), lines, seconds, as_json=args.as_json)
+    if args.out is not None:
+        telling.write_page(render_building_check(check, report), args.out)
     # An answer that the building contradicts is an error.
-    _end(wrong, fail_on, is_refuted=bool(cases))
+    _end(wrong, args.fail_on, is_refuted=bool(cases))
 
 
 def _names_of(texts: Sequence[str]) -> dict[str, str]:
@@ -119,20 +107,20 @@ def _names_of(texts: Sequence[str]) -> dict[str, str]:
 
 
 def _building_figures(
-    found: BuildingGraphCheck,
+    check: BuildingGraphCheck,
     report: BuildingGraphReport | None,
     wrong: Mapping[str, list[Finding]],
 ) -> dict[str, Any]:
     return {
-        "graph": found.matched.name,
-        "robot_radius_m": found.matched.building.robot_radius_m,
+        "graph": check.matched.name,
+        "robot_radius_m": check.matched.building.robot_radius_m,
         "floors": {
-            name: _sizes(check) | {"findings": telling.found_figures(wrong[name])}
-            for name, check in found.floors.items()
+            name: _sizes(floor) | {"findings": telling.found_figures(wrong[name])}
+            for name, floor in check.floors.items()
         },
         "links": {
             link.drawn.name: None if link.own is None else link.own.name
-            for link in found.matched.links
+            for link in check.matched.links
         },
         "findings": telling.found_figures(wrong[""]),
         "routes": None
@@ -158,99 +146,93 @@ GraphArgument = Annotated[
     ),
 ]
 LinesOption = Annotated[
-    bool,
-    typer.Option(
-        "--along-lines", help="Edges run along their lines, for robots that follow these."
-    ),
+    bool, option("--along-lines", "Edges run along their lines, for robots that follow these.")
 ]
 IgnoreOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--ignore", metavar="KIND", help="Leave out findings of a kind; may be given several times."
-    ),
+    option("--ignore KIND", "Leave out findings of a kind; may be given several times."),
 ]
 
 
-@with_map(
-    before="align",
-    over_floors=lambda: _check_over_floors,
-    reads=("preset", "robot_radius_m", "max_cells"),
-    alone=("align", "match", "pairs", "no_stairs"),
-)
-def check(
-    map_file: options.MapOrBuildingArgument,
-    graph_file: GraphArgument,
-    out: options.OutOption[Path | None] = None,
-    floor: options.GraphFloorOption = None,
-    ignore: IgnoreOption = None,
-    fail_on: telling.FailOnOption = telling.FAIL_ON,
-    along_lines: LinesOption = False,
-    rooms_file: options.RoomsOption = None,
-    align: AlignOption = False,
-    match: MatchOption = None,
-    pairs: PairsOption = 400,
-    no_stairs: options.NoStairsOption = False,
-    as_json: options.JsonOption = False,
-    plot: options.PlotOption = None,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Find what is wrong with GRAPH on MAP: edges through walls, nodes in walls, parts that are not
-    connected, doors that no edge passes, damaged entries. On a building, find that on all floors
-    and links, and compare routes over all floors with the shortest ones. --out writes one page with
-    a picture, .html.
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions(FloorOptions):
+    """The options of `hybridnav check`."""
+
+    graph_file: GraphArgument
+    out: options.OutOption[Path | None] = None
+    floor: OneMap[options.GraphFloorOption] = None
+    ignore: IgnoreOption = None
+    fail_on: telling.FailOnOption = telling.FAIL_ON
+    along_lines: OneMap[LinesOption] = False
+    rooms_file: OneMap[options.RoomsOption] = None
+    align: OfBuilding[AlignOption] = False
+    match: OfBuilding[MatchOption] = None
+    pairs: OfBuilding[PairsOption] = 400
+    no_stairs: OfBuilding[options.NoStairsOption] = False
+    as_json: options.JsonOption = False
+    plot: OneMap[options.PlotOption] = None
+
+
+def check(args: CheckOptions) -> None:
+    """Find what is wrong with a route GRAPH on MAP.
+
+    That is edges through walls, nodes in walls, parts that are not connected, doors that no edge
+    passes, damaged entries. On a building, find that on all floors and links, and compare routes
+    over all floors with the shortest ones. --out writes one page with a picture, .html.
 
     Exits with 0 when no error or warning is found, with 1 otherwise (--fail-on), with 2 when it is
     called wrongly, and with 3 when a file cannot be read.
+
+    Example: hybridnav check maps/office/office.yaml graph.geojson --out check.html
     """
+    if args.is_building:
+        _check_over_floors(args)
+        return
     from hybridnav.graphs import KINDS  # noqa: PLC0415 - loads numpy
 
-    del align, match, pairs, no_stairs  # of a building
-    _check_given(ignore, KINDS, fail_on, out)
-    common.check_picture(plot)
-    settings = reading.settings(map_file)
+    _check_options(args, KINDS)
+    common.check_picture(args.plot)
+    settings = args.settings()
     seconds: dict[str, float] = {}
-    with common.stage(f"reading {graph_file}", seconds, "graph"):
-        graph = hn.ext.fleet.load_graph(graph_file, floor=floor)
-    model = load_model(map_file, settings, seconds, reading)
+    with common.stage(f"reading {args.graph_file}", seconds, "graph"):
+        graph = hn.ext.fleet.load_graph(args.graph_file, floor=args.floor)
+    model = args.load(settings, seconds)
     check_room_to_be(model.grid)
-    topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=True)
+    topology = grow_topology(model, settings, seconds, rooms_file=args.rooms_file, find_rooms=True)
     with common.stage("checking", seconds, "check"):
-        found = hn.graphs.check_graph(topology, graph, along_lines=along_lines)
+        checked = hn.graphs.check_graph(topology, graph, along_lines=args.along_lines)
     from hybridnav.ext.fleet.findings_report import check_facts, render_check  # noqa: PLC0415 - on demand
 
-    wrong = _counted({"": found.findings}, ignore)
-    facts = [(name, printable(text)) for name, text in check_facts(found)]
-    respond(_figures(found, wrong[""]), _summary(facts, wrong), seconds, as_json=as_json)
-    if out is not None:
-        telling.write_page(render_check(found), out)
-    if plot is not None:
+    wrong = _counted({"": checked.findings}, args.ignore)
+    facts = [(name, printable(text)) for name, text in check_facts(checked)]
+    respond(_figures(checked, wrong[""]), _summary(facts, wrong), seconds, as_json=args.as_json)
+    if args.out is not None:
+        telling.write_page(render_check(checked), args.out)
+    if args.plot is not None:
         from hybridnav.graphs import plot_graph_check  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand
 
-        save_figure(plot_graph_check(found), plot)
-    _end(wrong, fail_on)
+        save_figure(plot_graph_check(checked), args.plot)
+    _end(wrong, args.fail_on)
 
 
-def _check_given(
-    ignored: list[str] | None, known: Collection[str], level: str, out: Path | None
-) -> None:
-    telling.check_level(level)
-    common.check_output(out, "--out", (".html",))
-    unknown = [kind for kind in ignored or () if kind not in known]
+def _check_options(args: CheckOptions, kinds: Collection[str]) -> None:
+    telling.check_level(args.fail_on)
+    common.check_output(args.out, "--out", (".html",))
+    unknown = [kind for kind in args.ignore or () if kind not in kinds]
     if unknown:
         raise common.UsageError(
-            f"--ignore must be one of {', '.join(known)}, got {unknown[0]!r:.80}"
+            f"--ignore must be one of {', '.join(kinds)}, got {unknown[0]!r:.80}"
         )
 
 
 def _counted(
-    found: Mapping[str, Sequence[Finding]], ignored: list[str] | None
+    all_findings: Mapping[str, Sequence[Finding]], ignored: list[str] | None
 ) -> dict[str, list[Finding]]:
     """Return the findings that count, by the name of their floor; those of the whole by ""."""
     return {
         name: [each for each in findings if each.kind not in (ignored or ())]
-        for name, findings in found.items()
+        for name, findings in all_findings.items()
     }
 
 
@@ -280,14 +262,14 @@ def _sizes(check: GraphCheck) -> dict[str, Any]:
     }
 
 
-def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
+def _figures(check: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
     return {
-        "graph": found.graph.name,
-        "format": found.graph.format,
-        "map": found.grid.name,
-        "robot_radius_m": found.grid.robot_radius_m,
-        **_sizes(found),
-        "doors": {"passed": found.doors[0], "all": found.doors[1]},
-        "rooms": {"with_node": found.rooms[0], "all": found.rooms[1]},
+        "graph": check.graph.name,
+        "format": check.graph.format,
+        "map": check.grid.name,
+        "robot_radius_m": check.grid.robot_radius_m,
+        **_sizes(check),
+        "doors": {"passed": check.doors[0], "all": check.doors[1]},
+        "rooms": {"with_node": check.rooms[0], "all": check.rooms[1]},
         "findings": telling.found_figures(wrong),
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -12,10 +11,9 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common
-from hybridnav.cli.closed import change_closed, list_closed
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
-from hybridnav.cli.plan import checked_at, one_of
-from hybridnav.cli.reading import MapOptions, check_model, read_settings
+from hybridnav.cli.query import check_alternatives, checked_at, one_of
+from hybridnav.cli.reading import check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
 from hybridnav.guide.words import check_language
 from hybridnav.maps.names import place_of_name, read_point
@@ -24,6 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from hybridnav.cli.build import BuildOptions
+    from hybridnav.cli.map_options import FloorOptions, MapOptions
+    from hybridnav.cli.query import PlanOptions
     from hybridnav.ext.fleet import BuildingAlternatives
 
 
@@ -34,121 +35,135 @@ def is_building_file(path: Path) -> bool:
     return is_building(path)
 
 
-def preset_of_floors(reading: MapOptions) -> hn.Preset | None:
-    """Return the preset with what overrides it, None if the building has its own."""
-    if reading.preset is None and not reading.overrides:
-        return None
-    return read_settings(reading.preset, reading.overrides, None, None)
-
-
-def load_floors(
-    file: Path, reading: MapOptions, seconds: dict[str, float]
-) -> hn.ext.fleet.Building:
+def load_floors(args: MapOptions, seconds: dict[str, float]) -> hn.ext.fleet.Building:
     """Load a building as the options say."""
-    preset = preset_of_floors(reading)
-    with common.stage(f"reading {file}", seconds, "load"):
+    with common.stage(f"reading {args.map_file}", seconds, "load"):
         return hn.ext.fleet.load_building(
-            file, robot_radius_m=reading.robot_radius_m, preset=preset, max_cells=reading.max_cells
+            args.map_file,
+            robot_radius_m=args.robot_radius_m,
+            preset=preset_of_floors(args),
+            max_cells=args.max_cells,
         )
 
 
-def plan_over_floors(
-    *,
-    map_file: Path,
-    start: Any,
-    goal: Any,
-    origin: str | None,
-    to: str | None,
-    via: Sequence[str] | None,
-    at: str,
-    alternatives: int,
-    max_stretch: float | None,
-    blocked: Sequence[str] | None,
-    no_stairs: bool,
-    profile: str | None,
-    why: bool,
-    plot: Path | None,
-    language: str,
-    as_json: bool,
-    reading: MapOptions,
-) -> None:
+def preset_of_floors(args: MapOptions) -> hn.Preset | None:
+    """Return the preset with what overrides it, None if the building has its own."""
+    if args.preset is None and not args.overrides:
+        return None
+    return read_settings(args.preset, args.overrides, None, None)
+
+
+def plan_over_floors(args: PlanOptions) -> None:
     """Plan a route over floors, print the answer, and draw it; see `hybridnav plan`."""
     # They load numpy, which help can do without.
-    from hybridnav.ext.fleet.building import legs_of, tightest  # noqa: PLC0415
+    from hybridnav.ext.fleet.building import legs_of  # noqa: PLC0415
 
-    common.check_picture(plot)
-    how: dict[str, Any] = {"stairs": not no_stairs, "at": checked_at(at), "profile": profile}
-    check_language(language)
-    if max_stretch is not None and alternatives == 1:
-        raise common.UsageError(
-            "--max-stretch is for alternatives: add --alternatives N, or leave it out"
-        )
-    if via and alternatives > 1:
-        raise common.UsageError("--alternatives does not go with --via")
-    ends = _typed("start", start, "from", origin), _typed("goal", goal, "to", to)
-    typed = [ends[0], *(via or ()), ends[1]]
+    common.check_picture(args.plot)
+    at = checked_at(args.at)
+    check_language(args.language)
+    check_alternatives(args)
+    start = one_of("start", args.start, "from", args.origin)
+    typed = [_typed(start), *(args.via or ()), _typed(one_of("goal", args.goal, "to", args.to))]
     seconds: dict[str, float] = {}
-    building = load_floors(map_file, reading, seconds)
+    building = load_floors(args, seconds)
     waypoints = [_endpoint(text, building) for text in typed]
-    how["closed_links"], how["blocked"] = _closures(building, blocked or ())
-    shut = [item.what for item in building.journal.items()] if building.journal else []
-    others: BuildingAlternatives | None = None
+    links, blocked = _closures(building, args.blocked or ())
+    how: dict[str, Any] = {"stairs": not args.no_stairs, "at": at, "profile": args.profile}
+    how |= {"closed_links": links, "blocked": blocked}
+    routes: BuildingAlternatives | None = None
     with common.stage("planning", {}, "plan"):
-        if alternatives == 1:
+        if args.alternatives == 1:
             plans: Sequence[hn.ext.fleet.BuildingPlan] = legs_of(building, waypoints, how)
         else:
-            how["max_stretch"] = 2.0 if max_stretch is None else max_stretch
-            plans = others = building.alternatives(waypoints[0], waypoints[1], alternatives, **how)
-    legs = plans if others is None else plans[:1]
-    figures = _tour_figures(legs, waypoints, at, language) if via else legs[0].to_dict()
-    figures |= {
-        "building": str(map_file),
-        "preset": _preset_of(building, plans[0]),
-        "words": [line for leg in legs for line in leg.words(language)],
-        "query": " via ".join(typed[:-1]) + f" to {typed[-1]}",
-        "blocked": [printable(text) for text in [*(blocked or ()), *shut]] or None,
-    }
-    if not legs[-1].solved:
-        figures["why"] |= {"words": list(legs[-1].reasons.get(language, ()))}
-    elif why:
-        figures["why"] = {"words": tightest(building, legs, how["blocked"], language)}
-    if profile is not None:
-        asks = next(one.described for one in building.profiles if one.name == profile)
-        figures["asks"] = asks
-    if others is not None:
-        solved = [other for other in others if other.solved]
-        figures["alternatives"] = [
-            other.to_dict() | {"words": other.words(language)} for other in solved
-        ]
-        figures["alternatives_complete"] = others.complete
-        figures["alternatives_note"] = others.note
+            how["max_stretch"] = 2.0 if args.max_stretch is None else args.max_stretch
+            plans = routes = building.alternatives(
+                waypoints[0], waypoints[-1], args.alternatives, **how
+            )
+    legs = plans if routes is None else plans[:1]
+    figures = _plan_figures(args, building, legs, waypoints, typed)
+    figures |= _reasons(args, building, legs, blocked) | _alternatives_figures(args, routes)
     figures["seconds"] = seconds | figures["seconds"]
-    whole = json.dumps(figures, allow_nan=False) + "\n" if as_json else None
-    common.answer(whole or _summary(map_file, building, figures))
-    if plot is not None:
+    text = json.dumps(figures, allow_nan=False) + "\n" if args.as_json else None
+    common.answer(text or _summary(args.map_file, building, figures))
+    if args.plot is not None:
         # They load matplotlib.
         from hybridnav.ext.fleet.plot import plot_building  # noqa: PLC0415
         from hybridnav.viz import save_figure  # noqa: PLC0415
 
-        save_figure(plot_building(building, plans)[0], plot)
+        save_figure(plot_building(building, plans)[0], args.plot)
     if not legs[-1].solved:
         raise typer.Exit(common.EXIT_NOT_SOLVED)
 
 
+def _plan_figures(
+    args: PlanOptions,
+    building: hn.ext.fleet.Building,
+    legs: Sequence[hn.ext.fleet.BuildingPlan],
+    waypoints: Sequence[Any],
+    typed: list[str],
+) -> dict[str, Any]:
+    """Return the figures of a plan or tour, its words, and what is closed."""
+    figures = _tour_figures(legs, waypoints, args) if args.via else legs[0].to_dict()
+    shut = [item.what for item in building.journal.items()] if building.journal else []
+    return figures | {
+        "building": str(args.map_file),
+        "preset": _preset_of(building, legs[0]),
+        "words": [line for leg in legs for line in leg.words(args.language)],
+        "query": " via ".join(typed[:-1]) + f" to {typed[-1]}",
+        "blocked": [printable(text) for text in [*(args.blocked or ()), *shut]] or None,
+    }
+
+
+def _reasons(
+    args: PlanOptions,
+    building: hn.ext.fleet.Building,
+    legs: Sequence[hn.ext.fleet.BuildingPlan],
+    blocked: dict[str, hn.Blocked],
+) -> dict[str, Any]:
+    """Return why there is no path or, if asked, where it is tightest; and what a profile asks."""
+    # Loads numpy, which help can do without.
+    from hybridnav.ext.fleet.building import tightest  # noqa: PLC0415
+
+    reasons: dict[str, Any] = {}
+    if not legs[-1].solved:
+        words = list(legs[-1].reasons.get(args.language, ()))
+        reasons["why"] = legs[-1].to_dict()["why"] | {"words": words}
+    elif args.why:
+        reasons["why"] = {"words": tightest(building, legs, blocked, args.language)}
+    for profile in building.profiles:
+        if profile.name == args.profile:
+            reasons["asks"] = profile.described
+    return reasons
+
+
+def _alternatives_figures(args: PlanOptions, routes: BuildingAlternatives | None) -> dict[str, Any]:
+    if routes is None:
+        return {}
+    return {
+        "alternatives": [
+            route.to_dict() | {"words": route.words(args.language)}
+            for route in routes
+            if route.solved
+        ],
+        "alternatives_complete": routes.complete,
+        "alternatives_note": routes.note,
+    }
+
+
 def _tour_figures(
-    legs: Sequence[hn.ext.fleet.BuildingPlan], waypoints: Sequence[Any], at: str, language: str
+    legs: Sequence[hn.ext.fleet.BuildingPlan], waypoints: Sequence[Any], args: PlanOptions
 ) -> dict[str, Any]:
     """Return the figures of a tour, with those of its legs.
 
     Bounds add up where no stop leaves a choice: else the tour has none, and each leg its own.
     """
-    each = [leg.to_dict() | {"words": leg.words(language)} for leg in legs]
+    each = [leg.to_dict() | {"words": leg.words(args.language)} for leg in legs]
     solved = legs[-1].solved
     sums = ("length_m", "charge_m", "cost", "travel_s")
     figures = each[-1] | {name: sum(leg[name] for leg in each) if solved else None for name in sums}
     for name in ("floors", "rides", "results", "instructions"):
         figures[name] = [item for leg in each for item in leg[name]]
-    is_fixed = at == "point" or not any(_is_name(stop) for stop in waypoints[1:-1])
+    is_fixed = args.at == "point" or not any(_is_name(stop) for stop in waypoints[1:-1])
     bound = sum(leg.lower_bound for leg in legs) if solved and is_fixed else None
     gap = None if bound is None else figures["cost"] / bound - 1 if bound else 0.0
     seconds: dict[str, float] = {}
@@ -170,10 +185,9 @@ def _preset_of(building: hn.ext.fleet.Building, plan: hn.ext.fleet.BuildingPlan)
     return building.floors[0].planner.preset.name
 
 
-def _typed(option: str, point: Any, other: str, text: str | None) -> str:
+def _typed(end: str | tuple[float, ...]) -> str:
     """Return the text of a start or a goal."""
-    given = one_of(option, point, other, text)
-    return given if isinstance(given, str) else ",".join(f"{number:g}" for number in given)
+    return end if isinstance(end, str) else ",".join(f"{number:g}" for number in end)
 
 
 def _closures(
@@ -198,9 +212,9 @@ def _closures(
         else:
             texts.setdefault(building.floor(kind).name, []).append(rest)
     closed_on = {}
-    for name, given in texts.items():
+    for name, things in texts.items():
         grid = building.floor(name).planner.grid
-        closed = parsed_closing(given).read(grid)
+        closed = parsed_closing(things).read(grid)
         if closed is not None:
             closed_on[name] = closed
     return links, closed_on
@@ -280,46 +294,28 @@ def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:
     return text
 
 
-def close_over_floors(
-    *,
-    map_file: Path,
-    close: Sequence[str] | None,
-    open_again: Sequence[str] | None,
-    why: str | None,
-    as_json: bool,
-    reading: MapOptions,
-) -> None:
-    """Close and open links, doors and rooms of a building; see `hybridnav closed`."""
-    loaded: list[hn.ext.fleet.Building] = []
+def check_closing_over_floors(args: FloorOptions, items: Sequence[hn.OutOfOrder]) -> None:
+    """Refuse things that are not in a building; see `hybridnav closed`."""
+    from hybridnav.ext.fleet.checks import check_closing  # noqa: PLC0415 - loads numpy
 
-    def check(item: hn.OutOfOrder) -> None:
-        """Refuse what is not in the building, which is read once."""
-        loaded.append(loaded[0] if loaded else load_floors(map_file, reading, {}))
-        from hybridnav.ext.fleet.checks import check_closing  # noqa: PLC0415 - loads numpy
-
-        check_closing(item, loaded[0].floors, loaded[0].links)
-
-    change_closed(map_file, close or (), open_again or (), why, check=check)
-    list_closed(map_file, as_json=as_json)
+    building = load_floors(args, {})
+    for item in items:
+        check_closing(item, building.floors, building.links)
 
 
-def build_over_floors(
-    *, map_file: Path, out: Path, preset: Sequence[str] | None, compress: bool, reading: MapOptions
-) -> None:
+def build_over_floors(args: BuildOptions) -> None:
     """Prepare a building for planning, write it to a model, and print a summary."""
+    out = args.out
     check_model(out)
-    if len(preset or ()) > 1:
-        raise common.UsageError("--preset is taken once for a building: its floors have one")
     seconds: dict[str, float] = {}
-    reading = replace(reading, preset=preset[0] if preset else None)
-    building = load_floors(map_file, reading, seconds)
+    building = load_floors(args, seconds)
     with (
         common.stage("preparing", seconds, "prepare"),
         common.progress_bar("preparing floors") as advance,
     ):
         building.prepare(progress=advance)
     with common.stage(f"writing {out}", seconds, "write"):
-        hn.save(building, out, compress=compress)
+        hn.save(building, out, compress=args.compress)
     names = ", ".join(printable(floor.name) for floor in building.floors)
     links = ", ".join(printable(link.name) for link in building.links) or "none"
     lines = [

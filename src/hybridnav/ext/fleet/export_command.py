@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
 
 import hybridnav as hn
 from hybridnav._base.clock import clock
 from hybridnav._base.files import printable
 from hybridnav.cli import common, options
-from hybridnav.cli.reading import MapOptions, check_room_to_be, grow_topology, load_model, with_map
-from hybridnav.ext.fleet import fleet_options as given
+from hybridnav.cli.map_options import FloorOptions
+from hybridnav.cli.options import OneMap, option
+from hybridnav.cli.reading import check_room_to_be, grow_topology
+from hybridnav.ext.fleet import fleet_options as targets
 from hybridnav.ext.fleet.command import load_floors
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from hybridnav.ext.fleet import Building
-    from hybridnav.graphs import Excess, GraphReport, RouteGraph
+    from hybridnav.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
 
 _ENDINGS = {
     "nav2": (".geojson", ".json"),
-    **given.ENDINGS,
+    **targets.ENDINGS,
     "rooms": (".csv", ".geojson"),
     "places": (".csv", ".geojson"),
     "indoorgml": (".json",),
@@ -35,131 +35,136 @@ _PARTS = ("rooms", "places", "indoorgml")
 _SHOWN = 8
 """Ids in a line about changes."""
 
-FormatOption = Annotated[
-    str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
-]
+FormatOption = Annotated[str, option("--format NAME", f"What to write: {', '.join(_ENDINGS)}.")]
 SpacingOption = Annotated[
     float | None,
-    typer.Option(
-        "--spacing",
-        metavar="D",
-        help="Distance in metres between the lanes of a hall, by default 4, less in arenas.",
+    option(
+        "--spacing D",
+        "Distance in metres between the lanes of a hall, by default 4, less in arenas.",
     ),
 ]
 
 
-@with_map(
-    before="as_json",
-    over_floors=lambda: _export_over_floors,
-    reads=("preset", "robot_radius_m", "seed", "max_cells"),
-)
-def export(
-    map_file: options.MapOrBuildingArgument,
-    out: options.OutOption[Path | None] = None,
-    force: options.ForceOption = False,
-    bundle: given.BundleOption = None,
-    costs: options.CostsOption = None,
-    operations: given.OperationsOption = False,
-    kind: FormatOption = "nav2",
-    points: given.PointsOption = None,
-    keep: given.KeepOption = None,
-    spacing_m: SpacingOption = None,
-    lanes_m: given.LanesOption = None,
-    frame: options.FrameOption[str] = "map",
-    floor: options.GraphFloorOption = None,
-    anchor: given.AnchorOption = None,
-    vehicles: given.VehiclesOption = None,
-    no_doors: given.NoDoorsOption = False,
-    report: given.ReportOption = None,
-    rooms_file: options.RoomsOption = None,
-    as_json: options.JsonOption = False,
-    plot: options.PlotOption = None,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
-    5050, its rooms or places, or both as IndoorGML.
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions(FloorOptions):
+    """The options of `hybridnav export`."""
 
-    The file ends in .geojson; for rmf in .yaml, for osm in .osm, for lif and indoorgml in .json;
-    that of rooms and places in .geojson or .csv. In rmf, osm and lif the floor is called 0 without
-    --floor.
+    out: options.OutOption[Path | None] = None
+    force: options.ForceOption = False
+    bundle: OneMap[targets.BundleOption] = None
+    costs: OneMap[options.CostsOption] = None
+    operations: OneMap[targets.OperationsOption] = False
+    kind: FormatOption = "nav2"
+    points: OneMap[targets.PointsOption] = None
+    keep: OneMap[targets.KeepOption] = None
+    spacing_m: SpacingOption = None
+    lanes_m: OneMap[targets.LanesOption] = None
+    frame: OneMap[options.FrameOption[str]] = "map"
+    floor: OneMap[options.GraphFloorOption] = None
+    anchor: targets.AnchorOption = None
+    vehicles: targets.VehiclesOption = None
+    no_doors: targets.NoDoorsOption = False
+    report: OneMap[targets.ReportOption] = None
+    rooms_file: OneMap[options.RoomsOption] = None
+    as_json: options.JsonOption = False
+    plot: OneMap[options.PlotOption] = None
+
+
+def export(args: ExportOptions) -> None:
+    """Write a graph of MAP for Nav2, Open-RMF, OSM or VDA 5050.
+
+    It is a graph of free space, for Nav2's route server, Open-RMF, OpenStreetMap or VDA 5050; or
+    MAP's rooms or places, or both as IndoorGML. The file ends in .geojson; for rmf in .yaml, for
+    osm in .osm, for lif and indoorgml in .json; that of rooms and places in .geojson or .csv. In
+    rmf, osm and lif the floor is called 0 without --floor.
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050, or as IndoorGML.
+
+    Example: hybridnav export maps/office/office.yaml -o graph.geojson --report 100
     """
-    others = {"--out": out, f"--format {kind}": kind != "nav2"}
-    robot = given.Bundle.checked(bundle, given.Bundle(tuple(costs or ()), operations), others)
-    out = bundle or _checked_out(kind, out, force=force)
-    common.check_picture(plot)
-    fleet = given.Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    if args.is_building:
+        _export_over_floors(args)
+        return
+    kind = args.kind
+    robot = targets.Bundle.checked(
+        args.bundle,
+        targets.Bundle(tuple(args.costs or ()), args.operations),
+        {"--out": args.out, f"--format {kind}": kind != "nav2"},
+    )
+    out = args.bundle or _checked_out(args)
+    common.check_picture(args.plot)
+    fleet = targets.Fleet.read(kind, args.floor, args.anchor, args.vehicles, no_doors=args.no_doors)
     of_graphs = {
-        "--points": points,
-        "--keep": keep,
-        "--spacing": spacing_m,
-        "--lanes": lanes_m,
-        "--report": report,
-        "--plot": plot,
+        "--points": args.points,
+        "--keep": args.keep,
+        "--spacing": args.spacing_m,
+        "--lanes": args.lanes_m,
+        "--report": args.report,
+        "--plot": args.plot,
     }
     homes = [each for each in _ENDINGS if each not in _PARTS]
-    given.check_homes(of_graphs, homes, f"--format {kind}")
-    named, lifts = given.read_points(points) if points else ({}, ())
-    settings = reading.settings(map_file)
+    targets.check_homes(of_graphs, homes, f"--format {kind}")
+    named, lifts = targets.read_points(args.points) if args.points else ({}, ())
+    settings = args.settings()
     seconds: dict[str, float] = {}
-    model = load_model(map_file, settings, seconds, reading)
+    model = args.load(settings, seconds)
     check_room_to_be(model.grid)
     topology = grow_topology(
-        model, settings, seconds, rooms_file=rooms_file, find_rooms=kind != "places"
+        model, settings, seconds, rooms_file=args.rooms_file, find_rooms=kind != "places"
     )
     if kind in _PARTS:
         with common.stage(f"writing {out}", seconds, "write"):
-            parts = _write_parts(topology, kind, (out, map_file), frame)
-        given.respond(*parts, seconds, as_json=as_json)
+            parts = _write_parts(topology, kind, (out, args.map_file), args.frame)
+        targets.respond(*parts, seconds, as_json=args.as_json)
         return
-    own = floor if keep is not None and keep.suffix in given.ENDINGS.get(kind, ()) else None
-    before = None if keep is None else hn.ext.fleet.load_graph(keep, floor=own)
-    began = clock()
-    with common.progress_bar("building the graph") as advance:
-        graph = hn.graphs.build_lane_graph(
-            topology, spacing_m=spacing_m, points=named, keep=before, progress=advance
-        )
-        if lanes_m is not None:
-            graph = hn.graphs.keep_right(topology, graph, apart_m=lanes_m)
-    seconds["graph"] = round(clock() - began, 6)
+    graph, before = _built(args, topology, named, seconds)
     with common.stage(f"writing {out}", seconds, "write"):
         aim = fleet or (robot and robot._replace(lifts=lifts))
-        missing = list(_write_graph(topology, graph, aim, out, frame))
-        graph, keepout = given.opened(graph, robot)  # as the file holds it
-        missing += given.left_out(topology, graph)
-    pairs = given.LOSS_PAIRS if report is None and fleet is not None else report
+        missing = list(_write_graph(topology, graph, aim, out, args.frame))
+        graph, keepout = targets.opened(graph, robot)  # as the file holds it
+        missing += targets.left_out(topology, graph)
+    pairs = targets.LOSS_PAIRS if args.report is None and fleet is not None else args.report
     judged = None
     if pairs is not None:
         with common.stage("comparing routes", seconds, "report"):
             judged = hn.graphs.judge_route_graph(graph, pairs=pairs)
-    figures = _figures(graph, judged) | {"graph": str(out), "map": str(map_file)}
+    figures = _figures(graph, judged) | {"graph": str(out), "map": str(args.map_file)}
     ids = _ids_line(graph) if fleet is None else []
     lines = [*_summary(out, graph, judged), *_left_out_lines(missing), *ids]
     changes = {} if before is None else hn.graphs.graph_changes(before, graph)
     figures |= {"left_out": missing} | ({"changes": changes} if changes else {})
-    given.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=as_json)
-    given.warn_of_loss({graph.grid.name: judged} if judged is not None and fleet else {})
-    given.draw(graph, keepout, plot)
+    targets.respond(figures, [*lines, *_change_lines(changes)], seconds, as_json=args.as_json)
+    targets.warn_of_loss({graph.grid.name: judged} if judged is not None and fleet else {})
+    targets.draw(graph, keepout, args.plot)
 
 
-def _export_over_floors(
-    *,
-    map_file: Path,
-    out: Path | None,
-    force: bool,
-    kind: str,
-    spacing_m: float | None,
-    anchor: str | None,
-    vehicles: list[str] | None,
-    no_doors: bool,
-    as_json: bool,
-    reading: MapOptions,
-) -> None:
+def _built(
+    args: ExportOptions,
+    topology: hn.TopologicalMap,
+    points: dict[str, tuple[float, float]],
+    seconds: dict[str, float],
+) -> tuple[RouteGraph, WaypointGraph | None]:
+    """Return the graph of a map, and the one of `--keep`, None without."""
+    keep = args.keep
+    own = keep is not None and keep.suffix in targets.ENDINGS.get(args.kind, ())
+    before = (
+        None if keep is None else hn.ext.fleet.load_graph(keep, floor=args.floor if own else None)
+    )
+    began = clock()
+    with common.progress_bar("building the graph") as advance:
+        graph = hn.graphs.build_lane_graph(
+            topology, spacing_m=args.spacing_m, points=points, keep=before, progress=advance
+        )
+        if args.lanes_m is not None:
+            graph = hn.graphs.keep_right(topology, graph, apart_m=args.lanes_m)
+    seconds["graph"] = round(clock() - began, 6)
+    return graph, before
+
+
+def _export_over_floors(args: ExportOptions) -> None:
     """Write the graph of a building, and print a summary; see `export`."""
-    out = _checked_out(kind, out, force=force)
-    fleet = given.Fleet.read(kind, None, anchor, vehicles, no_doors=no_doors)
+    out, kind = _checked_out(args), args.kind
+    fleet = targets.Fleet.read(kind, None, args.anchor, args.vehicles, no_doors=args.no_doors)
     if fleet is None and kind != "indoorgml":
         raise common.UsageError(
             f"--format {kind} is for one map, and this is a building: take rmf, osm, lif or "
@@ -168,25 +173,25 @@ def _export_over_floors(
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
 
     seconds: dict[str, float] = {}
-    building = load_floors(map_file, reading, seconds)
+    building = load_floors(args, seconds)
     if fleet is None:
         with common.stage(f"writing {out}", seconds, "write"):
-            parts = _write_indoorgml(building, out, map_file)
-        given.respond(*parts, seconds, as_json=as_json)
+            parts = _write_indoorgml(building, out, args.map_file)
+        targets.respond(*parts, seconds, as_json=args.as_json)
         return
     reports: list[GraphReport] = []
     bare: list[str] = []
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
-        built = hn.graphs.build_lane_graph(topology, spacing_m=spacing_m)
-        bare.extend(f"{topology.grid.name}: {each}" for each in given.left_out(topology, built))
-        reports.append(hn.graphs.judge_route_graph(built, pairs=given.LOSS_PAIRS))
+        built = hn.graphs.build_lane_graph(topology, spacing_m=args.spacing_m)
+        bare.extend(f"{topology.grid.name}: {each}" for each in targets.left_out(topology, built))
+        reports.append(hn.graphs.judge_route_graph(built, pairs=targets.LOSS_PAIRS))
         return built
 
     began = clock()
     with common.progress_bar("building the graphs") as advance:
         graph = hn.ext.fleet.building_graph(
-            building, name=map_file.stem, build=judging, progress=advance
+            building, name=args.map_file.stem, build=judging, progress=advance
         )
     judged = dict(zip((floor.name for floor in graph.floors), reports, strict=True))
     seconds["graph"] = round(clock() - began, 6)
@@ -194,7 +199,7 @@ def _export_over_floors(
         left_out = [*fleet.write_building(align_floors(graph), out), *bare]
     figures = {
         "graph": str(out),
-        "map": str(map_file),
+        "map": str(args.map_file),
         "floors": {
             floor.name: {"nodes": floor.graph.n_nodes, "edges": floor.graph.n_edges}
             for floor in graph.floors
@@ -210,12 +215,12 @@ def _export_over_floors(
         lines.append(f"{'nearest':>10} {_line(judged[floor.name].nearest)}")
     links = ", ".join(printable(link.name) for link in graph.links) or "none"
     lines += [f"links      {links}", f"robot      radius {building.robot_radius_m:g} m"]
-    given.respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=as_json)
-    given.warn_of_loss(judged)
+    targets.respond(figures, [*lines, *_left_out_lines(left_out)], seconds, as_json=args.as_json)
+    targets.warn_of_loss(judged)
 
 
 def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
-    """Return the lines of a summary about changes, none where no graph was given."""
+    """Return the lines of a summary about changes, none where no graph was targets."""
     lines = []
     for kind, ids in changes.items():
         for what, names in ids.items():
@@ -229,14 +234,15 @@ def _left_out_lines(left_out: Iterable[str]) -> list[str]:
     return [f"left out   {printable(each)}" for each in left_out]
 
 
-def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
+def _checked_out(args: ExportOptions) -> Path:
     """Refuse formats that are none, files of other ones, and to write over a file."""
+    out, kind = args.out, args.kind
     if out is None:
         raise common.UsageError("--out is missing: give a file, or a folder with --bundle")
     if kind not in _ENDINGS:
         raise common.UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     common.check_output(out, "--out", _ENDINGS[kind])
-    if out.is_file() and not force:
+    if out.is_file() and not args.force:
         raise common.UsageError(f"{printable(out)} exists: add --force to write over it")
     return out
 
@@ -244,12 +250,12 @@ def _checked_out(kind: str, out: Path | None, *, force: bool) -> Path:
 def _write_graph(
     topology: hn.TopologicalMap,
     graph: RouteGraph,
-    aim: given.Fleet | given.Bundle | None,
+    aim: targets.Fleet | targets.Bundle | None,
     out: Path,
     frame: str,
 ) -> tuple[str, ...]:
     """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
-    if isinstance(aim, given.Fleet):
+    if isinstance(aim, targets.Fleet):
         return aim.write(topology, graph, out)
     if aim is not None:
         return hn.graphs.export_bundle(topology, graph, out, frame=frame, **aim._asdict())

@@ -6,10 +6,9 @@ import base64
 from importlib import resources
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-import typer
-
 from hybridnav._base.files import printable, replace_file
 from hybridnav.cli.common import UsageError
+from hybridnav.cli.options import option
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,10 +24,9 @@ _LEVELS = ("error", "warning", "note", "never")
 
 FailOnOption = Annotated[
     str,
-    typer.Option(
-        "--fail-on",
-        metavar="LEVEL",
-        help="Exit with 1 from findings of this level on: error, warning, note; never: exit with 0 "
+    option(
+        "--fail-on LEVEL",
+        "Exit with 1 from findings of this level on: error, warning, note; never: exit with 0 "
         "whatever is found.",
     ),
 ]

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-import typer
-
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, answer, complain, timings
+from hybridnav.cli.options import option
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
@@ -28,77 +27,65 @@ LOSS_PAIRS, _MOST_LOSS = 400, 0.1
 
 KeepOption = Annotated[
     Path | None,
-    typer.Option(
-        "--keep",
-        metavar="FILE",
-        help="A graph of lanes of the map as it was, whose nodes keep their places and ids.",
+    option(
+        "--keep FILE",
+        "A graph of lanes of the map as it was, whose nodes keep their places and ids.",
     ),
 ]
 PointsOption = Annotated[
     Path | None,
-    typer.Option(
-        "--points",
-        metavar="FILE",
-        help="YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes "
-        "get a node with the name at each. Its section lifts: has points of lifts.",
+    option(
+        "--points FILE",
+        "YAML of named points, NAME: [x, y], or poses of geometry_msgs as in a bundle: lanes get "
+        "a node with the name at each. Its section lifts: has points of lifts.",
     ),
 ]
 LanesOption = Annotated[
     float | None,
-    typer.Option(
-        "--lanes",
-        metavar="APART",
-        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
-        "the distance in metres between the robots.",
+    option(
+        "--lanes APART",
+        "Where two robots fit side by side, a lane on the right for each direction; APART is the "
+        "distance in metres between the robots.",
     ),
 ]
 ReportOption = Annotated[
     int | None,
-    typer.Option(
-        "--report",
-        metavar="N",
+    option(
+        "--report N",
+        "Compare the routes of N random pairs with shortest paths.",
         min=1,
         max=1_000_000,
-        help="Compare the routes of N random pairs with shortest paths.",
     ),
 ]
 AnchorOption = Annotated[
     str | None,
-    typer.Option(
-        "--anchor",
-        metavar="LAT,LON[,DEG]",
-        help="For osm: latitude and longitude of the origin of the map frame, and the direction of "
-        "its y axis, clockwise from north.",
+    option(
+        "--anchor LAT,LON[,DEG]",
+        "For osm: latitude and longitude of the origin of the map frame, and the direction of its "
+        "y axis, clockwise from north.",
     ),
 ]
 VehiclesOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--vehicle",
-        metavar="TYPE",
-        help="For lif: a type of vehicle, MANUFACTURER.SERIES; may be given several times.",
+    option(
+        "--vehicle TYPE",
+        "For lif: a type of vehicle, MANUFACTURER.SERIES; may be given several times.",
     ),
 ]
 NoDoorsOption = Annotated[
     bool,
-    typer.Option(
-        "--no-doors", help="For rmf: name no doors, which robots would ask to open and wait for."
-    ),
+    option("--no-doors", "For rmf: name no doors, which robots would ask to open and wait for."),
 ]
 BundleOption = Annotated[
     Path | None,
-    typer.Option(
-        "--bundle",
-        metavar="DIR",
-        help="Write all that Nav2 needs into a folder, in place of --out: graph, masks for costmap "
+    option(
+        "--bundle DIR",
+        "Write all that Nav2 needs into a folder, in place of --out: graph, masks for costmap "
         "filters of rooms and of --costs, poses, parameters.",
     ),
 ]
 OperationsOption = Annotated[
-    bool,
-    typer.Option(
-        "--operations", help="With --bundle: edges through doors and to lifts call a service."
-    ),
+    bool, option("--operations", "With --bundle: edges through doors and to lifts call a service.")
 ]
 
 
@@ -110,23 +97,23 @@ class Bundle(NamedTuple):
     lifts: tuple[str, ...] = ()
 
     @classmethod
-    def checked(cls, folder: Path | None, given: Bundle, others: dict[str, Any]) -> Bundle | None:
+    def checked(cls, folder: Path | None, bundle: Bundle, others: dict[str, Any]) -> Bundle | None:
         """Return the options, None for no bundle. Refuse folders that hold other files, costs that
         are no masks, and options that do not go with a bundle, or without one.
 
-        Raises `InvalidValueError` or `UsageError` when one of them is given.
+        Raises `InvalidValueError` or `UsageError` when one of them is bundle.
         """
         from hybridnav.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
 
-        for option, value in others.items() if folder else given._asdict().items():
+        for flag, value in others.items() if folder else bundle._asdict().items():
             if value:
-                wrong = f"{option} does not go with" if folder else f"--{option} needs"
+                wrong = f"{flag} does not go with" if folder else f"--{flag} needs"
                 raise UsageError(f"{wrong} --bundle: leave it out")
         if folder is None:
             return None
-        checked_masks(given.costs)
+        checked_masks(bundle.costs)
         check_bundle(folder)
-        return given
+        return bundle
 
 
 def left_out(topology: hn.TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
@@ -221,19 +208,19 @@ def read_points(path: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, 
     `UsageError` when it is no mapping of names to points or poses, or has a name twice."""
     from hybridnav._base.yaml_file import read_yaml  # noqa: PLC0415 - help needs no YAML
 
-    given, lifts = read_yaml(path, what="points", error=MapError), {}
-    if isinstance(given.get("lifts"), dict) and _pair(given["lifts"]) is None:
-        lifts = given.pop("lifts")
-    found: dict[str, tuple[float, float]] = {}
-    for name, value in (*given.items(), *lifts.items()):
+    entries, lifts = read_yaml(path, what="points", error=MapError), {}
+    if isinstance(entries.get("lifts"), dict) and _pair(entries["lifts"]) is None:
+        lifts = entries.pop("lifts")
+    points: dict[str, tuple[float, float]] = {}
+    for name, value in (*entries.items(), *lifts.items()):
         at = _pair(value)
-        if at is None or str(name) in found:
+        if at is None or str(name) in points:
             raise UsageError(
                 f"points {printable(path)}: {brief(name)} must be [x, y] in metres or a pose with "
                 f"a position, and be there once, got {brief(value)}"
             )
-        found[str(name)] = at
-    return found, tuple(map(str, lifts))
+        points[str(name)] = at
+    return points, tuple(map(str, lifts))
 
 
 def _pair(value: Any) -> tuple[float, float] | None:
@@ -244,12 +231,12 @@ def _pair(value: Any) -> tuple[float, float] | None:
     return pair_of(pose.get("position", pose) if isinstance(pose, dict) else pose)
 
 
-def check_homes(given: dict[str, Any], homes: Iterable[str], chosen: str) -> None:
+def check_homes(values: dict[str, Any], homes: Iterable[str], chosen: str) -> None:
     """Refuse options that are not None where what is chosen, as `--format rmf`, is no home."""
     what, _, got = chosen.partition(" ")
-    for option, value in given.items():
+    for flag, value in values.items():
         if value is not None and got not in homes:
-            raise UsageError(f"{option} is for {what} {', '.join(homes)}, got {got}: leave it out")
+            raise UsageError(f"{flag} is for {what} {', '.join(homes)}, got {got}: leave it out")
 
 
 def warn_of_loss(judged: dict[str, GraphReport]) -> None:

@@ -7,11 +7,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast, get_args
 
-import typer
-
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common, options
+from hybridnav.cli.options import option
 from hybridnav.cli.reading import check_room_to_be
 from hybridnav.ext.live.map_command import map_lines
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -22,35 +21,26 @@ if TYPE_CHECKING:
 
 StartOption = Annotated[
     str | None,
-    typer.Option(
-        "--start",
-        metavar="X,Y",
-        help="Where the robot wakes up, in metres.",
+    option(
+        "--start X,Y",
+        "Where the robot wakes up, in metres.",
         show_default="the point farthest from walls",
     ),
 ]
-RangeOption = Annotated[
-    float, typer.Option("--range", metavar="R", help="Range of the laser in metres.")
-]
-NoiseOption = Annotated[
-    float, typer.Option("--noise", metavar="S", help="Standard deviation of readings in metres.")
-]
+RangeOption = Annotated[float, option("--range R", "Range of the laser in metres.")]
+NoiseOption = Annotated[float, option("--noise S", "Standard deviation of readings in metres.")]
 ByOption = Annotated[
     str,
-    typer.Option(
-        "--by",
-        metavar="RULE",
-        help="Which goal comes next: path, the nearest; frontier, the nearest, even if it has "
-        "become known on the way; room, those of its room first.",
+    option(
+        "--by RULE",
+        "Which goal comes next: path, the nearest; frontier, the nearest, even if it has become "
+        "known on the way; room, those of its room first.",
     ),
 ]
 GoalsOption = Annotated[
     int | None,
-    typer.Option(
-        "--most-goals",
-        metavar="N",
-        min=1,
-        help="End after N choices: of goals, of drives back, of looks again.",
+    option(
+        "--most-goals N", "End after N choices: of goals, of drives back, of looks again.", min=1
     ),
 ]
 
@@ -70,9 +60,11 @@ def explore(
     max_cells: options.MaxCellsOption = DEFAULT_MAX_CELLS,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Let a simulated robot explore MAP, and print its drive and its knowledge.
+    """Let a simulated robot explore MAP, and print what it knows.
 
     --out writes the robot's map, a ROS map (.yaml).
+
+    Example: hybridnav explore maps/figure1/figure1.yaml --robot-radius 0.1 --most-goals 3
     """
     point = None if start is None else _point(start)
     common.check_output(out, "--out", (".yaml", ".yml"))
@@ -82,7 +74,7 @@ def explore(
     world = hn.load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells).grid
     check_room_to_be(world)
     if out is not None:
-        _check_kept(map_file, out)
+        _check_replaces(map_file, out)
     from hybridnav.ext.live import explore as exploring  # noqa: PLC0415 - loads numba
 
     maps = _Maps(frames)
@@ -151,14 +143,14 @@ def _point(text: str) -> tuple[float, float]:
     return point[0], point[1]
 
 
-def _check_kept(map_file: Path, out: Path) -> None:
+def _check_replaces(map_file: Path, out: Path) -> None:
     """Refuse a map that would replace the floor plan, its image, or the image beside it."""
     from hybridnav.maps.files.ros import files_of  # noqa: PLC0415 - on demand
 
-    kept = {map_file.with_suffix(ending).resolve() for ending in (".yaml", ".yml", ".pgm")}
+    files = {map_file.with_suffix(ending).resolve() for ending in (".yaml", ".yml", ".pgm")}
     if map_file.suffix.lower() in {".yaml", ".yml"}:
-        kept |= {file.resolve() for file in files_of(map_file)}
-    if not kept.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
+        files |= {file.resolve() for file in files_of(map_file)}
+    if not files.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
         raise common.UsageError(
             f"--out {str(out)!r:.80} would replace the floor plan, expected another name: "
             "choose one"
@@ -183,7 +175,7 @@ def _figures(done: Exploration) -> str:
 
 
 def _summary(done: Exploration, world: hn.OccupancyGrid, out: Path | None) -> str:
-    known = math.floor(1000 * done.share_known) / 10  # 100 % means all
+    percent = math.floor(1000 * done.share_known) / 10  # 100 % means all
     ended = "no goal is left: a door may be closed in the map"
     if done.share_known == 1.0:
         ended = "nothing in reach is unknown"
@@ -192,7 +184,7 @@ def _summary(done: Exploration, world: hn.OccupancyGrid, out: Path | None) -> st
     lines = [
         *map_lines(done.grid, world.name if out is None else out),
         f"driven     {done.driven_m:.1f} m, {len(done.points):,} scans, {done.n_goals:,} goals",
-        f"known      {known:g} % of what the robot can reach, {ended}",
+        f"known      {percent:g} % of what the robot can reach, {ended}",
         f"given up   {done.n_given_up:,} cells that stayed unexplored from beside them",
         f"doubts     {done.n_looks_again:,} spots where doubtful cells or gaps were seen again",
         f"seconds    {common.timings(done.seconds)}",

@@ -13,6 +13,7 @@ from hybridnav._base.clock import clock
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_writable, extent_line, progress_bar
+from hybridnav.cli.options import option
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
@@ -59,54 +60,34 @@ LogArgument = Annotated[
 ]
 TopicOption = Annotated[
     str | None,
-    typer.Option(
-        "--topic",
-        metavar="NAME",
-        help="Topic of a bag: of scans, or of a map, whose last message is written.",
-    ),
+    option("--topic NAME", "Topic of a bag: of scans, or of a map, whose last message is written."),
 ]
 YawOption = Annotated[
     float | None,
-    typer.Option(
-        "--yaw",
-        metavar="RAD",
-        help="Yaw of the map of --topic in a bag, where its quaternion is zero and states none.",
+    option(
+        "--yaw RAD",
+        "Yaw of the map of --topic in a bag, where its quaternion is zero and states none.",
     ),
 ]
 MaxRangeOption = Annotated[
-    float,
-    typer.Option("--max-range", metavar="R", help="Readings of R metres or more are no obstacles."),
+    float, option("--max-range R", "Readings of R metres or more are no obstacles.")
 ]
-MinRangeOption = Annotated[
-    float, typer.Option("--min-range", metavar="R", help="Readings up to R metres are none.")
-]
+MinRangeOption = Annotated[float, option("--min-range R", "Readings up to R metres are none.")]
 ClearRangeOption = Annotated[
-    float,
-    typer.Option(
-        "--clear-range", metavar="R", help="Metres that a beam without a return makes free."
-    ),
+    float, option("--clear-range R", "Metres that a beam without a return makes free.")
 ]
 ToleranceOption = Annotated[
-    float,
-    typer.Option(
-        "--tolerance", metavar="R", help="Metres before its end that a beam does not make free."
-    ),
+    float, option("--tolerance R", "Metres before its end that a beam does not make free.")
 ]
-HitOption = Annotated[
-    float,
-    typer.Option("--hit", metavar="P", help="Occupancy of a cell after one scan that hit it."),
-]
+HitOption = Annotated[float, option("--hit P", "Occupancy of a cell after one scan that hit it.")]
 PassOption = Annotated[
-    float,
-    typer.Option("--pass", metavar="P", help="Occupancy of a cell after one scan that passed it."),
+    float, option("--pass P", "Occupancy of a cell after one scan that passed it.")
 ]
 LeastOption = Annotated[
     float,
-    typer.Option(
-        "--least",
-        metavar="P",
-        help="Least occupancy of a cell: 0.02 lets later scans undo earlier ones, by 0 all count "
-        "alike.",
+    option(
+        "--least P",
+        "Least occupancy of a cell: 0.02 lets later scans undo earlier ones, by 0 all count alike.",
     ),
 ]
 
@@ -129,10 +110,13 @@ def map(  # noqa: A001 - the command's name
     force: options.ForceOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map.
+    """Make a map of the laser scans in LOG, or of a map in it.
 
-    It is a ROS map (.yaml), beside it the image. Scans that need more cells than --max-cells are
-    left out. The robot of a bag moves in --frame, else in map, odom or the root.
+    Poses of the scans are taken as they are. The result is a ROS map (.yaml), beside it the image.
+    Scans that need more cells than --max-cells are left out. The robot of a bag moves in --frame,
+    else in map, odom or the root.
+
+    Example: hybridnav map drive.mcap -o map.yaml
     """
     if out.suffix.lower() not in {".yaml", ".yml"}:
         raise UsageError(f"--out must end in .yaml or .yml, got '{printable(out)}'")
@@ -145,9 +129,9 @@ def map(  # noqa: A001 - the command's name
         if file.exists() and not force:
             raise UsageError(f"{printable(file)} exists: add --force to write over it")
     if topic is not None and is_bag(log_file):
-        grid = _kept(log_file, topic, yaw_rad)
+        grid = _last_map(log_file, topic, yaw_rad)
         if grid is not None:
-            _write_kept(grid, out, as_json)
+            _write_map(grid, out, as_json)
             return
     if yaw_rad is not None:
         raise UsageError(
@@ -176,7 +160,7 @@ def map(  # noqa: A001 - the command's name
     answer(describe(grid, log, seconds, out))
 
 
-def _kept(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid | None:
+def _last_map(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid | None:
     """Return the last map of a topic, None for a topic without maps."""
     from hybridnav.ext.live.files.bag_files import GRID, Bag  # noqa: PLC0415 - on demand
 
@@ -185,7 +169,7 @@ def _kept(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid | No
     return hn.ext.live.load_bag_map(bag, topic=topic, yaw_rad=yaw_rad, robot_radius_m=0.0)
 
 
-def _write_kept(grid: hn.OccupancyGrid, out: Path, as_json: bool) -> None:  # noqa: FBT001 - private
+def _write_map(grid: hn.OccupancyGrid, out: Path, as_json: bool) -> None:  # noqa: FBT001 - private
     """Write the map of a bag."""
     hn.write_ros_map(grid, out)
     rows, cols = grid.shape

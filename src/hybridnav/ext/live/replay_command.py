@@ -12,6 +12,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common, options
+from hybridnav.cli.options import option
 from hybridnav.errors import MapError
 from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -31,19 +32,12 @@ FilesArgument = Annotated[
         help="A CARMEN log (.log, or packed by gzip), a bag of ROS, or map files (.yaml) in order.",
     ),
 ]
-EveryOption = Annotated[
-    int,
-    typer.Option("--every", metavar="N", min=1, help="Scans of a log from one map to the next."),
-]
+EveryOption = Annotated[int, option("--every N", "Scans of a log from one map to the next.", min=1)]
 ScansOption = Annotated[
-    int | None,
-    typer.Option("--scans", metavar="N", min=1, help="Scans of a log to read.", show_default="all"),
+    int | None, option("--scans N", "Scans of a log to read.", min=1, show_default="all")
 ]
 RoomsEveryOption = Annotated[
-    int,
-    typer.Option(
-        "--rooms-every", metavar="N", min=1, help="Maps from one update of the rooms to the next."
-    ),
+    int, option("--rooms-every N", "Maps from one update of the rooms to the next.", min=1)
 ]
 
 
@@ -61,9 +55,12 @@ def replay(
     frames: options.FramesOption = 60,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Follow a map that changes: a log scan by scan, or GRIDS one after the other.
+    """Follow a map that changes, and print how stable places are.
 
-    Rooms of --rooms are those of the first map, and their names are followed.
+    It is that of a log, scan by scan, or of GRIDS, one after the other. Rooms of --rooms are those
+    of the first map, and their names are followed.
+
+    Example: hybridnav replay monday.yaml friday.yaml --plot changes.gif
     """
     common.check_output(plot, "--plot", (".gif",))
     is_log = _is_log(files)
@@ -93,11 +90,11 @@ def replay(
             figures.add(step)
             if animation is not None:
                 animation.add(step)
-    found = figures.figures() | ({} if log is None else {"log": log.summary()})
+    values = figures.figures() | ({} if log is None else {"log": log.summary()})
     if animation is not None and plot is not None:
         animation.save(plot)
-    common.answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _summary(found))
-    raise typer.Exit(common.EXIT_NOT_SOLVED if found["faults"] else common.EXIT_SOLVED)
+    common.answer(json.dumps(values, allow_nan=False) + "\n" if as_json else _summary(values))
+    raise typer.Exit(common.EXIT_NOT_SOLVED if values["faults"] else common.EXIT_SOLVED)
 
 
 def _is_log(files: Sequence[Path]) -> bool:
@@ -173,48 +170,52 @@ class _Log:
                 return
 
 
-def _summary(found: dict[str, Any]) -> str:
-    rows, cols = found["cells"]
-    doors = found["doors"]
+def _summary(figures: dict[str, Any]) -> str:
+    rows, cols = figures["cells"]
+    doors = figures["doors"]
     counted = ["places", "rooms", "doors"]
     lines = [
-        f"maps       {found['maps']:,}, the last of {cols} x {rows} cells",
-        "now        " + ", ".join(f"{found[f'n_{kind}']:,} {kind}" for kind in counted),
-        *(line for kind in counted[:-1] for line in _identities(kind, found[kind])),
+        f"maps       {figures['maps']:,}, the last of {cols} x {rows} cells",
+        "now        " + ", ".join(f"{figures[f'n_{kind}']:,} {kind}" for kind in counted),
+        *(line for kind in counted[:-1] for line in _identities(kind, figures[kind])),
         "doors      " + ", ".join(f"{count:,} {event}" for event, count in doors.items()),
     ]
-    if found["lost_names"]:
-        lines.append(f"names      lost with their rooms: {', '.join(found['lost_names'])}")
-    if "log" in found:
-        lines.append(f"log        {found['log']}")
-    n_levels, faults = found["levels"], found["faults"]
+    if figures["lost_names"]:
+        lines.append(f"names      lost with their rooms: {', '.join(figures['lost_names'])}")
+    if "log" in figures:
+        lines.append(f"log        {figures['log']}")
+    n_levels, faults = figures["levels"], figures["faults"]
     lines += [f"check      {fault}" for fault in faults]
     if not faults:
         lines.append(f"check      {n_levels} levels, each boundary of their fields is one arc")
     return "\n".join(lines) + "\n"
 
 
-def _identities(kind: str, found: dict[str, Any]) -> list[str]:
+def _identities(kind: str, counts: dict[str, Any]) -> list[str]:
     """Return lines on the updates of places or rooms."""
-    if not found["updates"]:
+    if not counts["updates"]:
         return [f"{kind:<10} no update"]
-    events = ", ".join(f"{found[event]:,} {event}" for event in ("born", "died", "merged", "split"))
-    times = f"median {found['median_ms']:.1f} ms, 95 % below {found['p95_ms']:.1f} ms"
-    cells = f"{found['flipped_cells']:,.1f} cells an update, {found['flipped_share']:.3%} of those"
+    events = ", ".join(
+        f"{counts[event]:,} {event}" for event in ("born", "died", "merged", "split")
+    )
+    times = f"median {counts['median_ms']:.1f} ms, 95 % below {counts['p95_ms']:.1f} ms"
+    cells = (
+        f"{counts['flipped_cells']:,.1f} cells an update, {counts['flipped_share']:.3%} of those"
+    )
     return [
-        f"{kind:<10} {found['updates']:,} updates, {times}; {events}",
+        f"{kind:<10} {counts['updates']:,} updates, {times}; {events}",
         (
-            f"{'flips':<10} {cells} that stay free: {found['flipped_by_merging']:.0%} by merging, "
-            f"{found['flipped_by_cutting_off']:.0%} by cutting off"
+            f"{'flips':<10} {cells} that stay free: {counts['flipped_by_merging']:.0%} by merging, "
+            f"{counts['flipped_by_cutting_off']:.0%} by cutting off"
         ),
         (
-            f"{'':<10} {_ever(found['untouched'])} untouched {kind} ever; with no change beside "
-            f"them {_ever(found['apart'])}, nor in {kind} beside them {_ever(found['far'])}"
+            f"{'':<10} {_ever(counts['untouched'])} untouched {kind} ever; with no change beside "
+            f"them {_ever(counts['apart'])}, nor in {kind} beside them {_ever(counts['far'])}"
         ),
     ]
 
 
-def _ever(found: dict[str, Any]) -> str:
+def _ever(counts: dict[str, Any]) -> str:
     """Return how many places of a kind flip, and the share."""
-    share = found["flipped"] / max(found["places"], 1)
-    return f"{found['flipped']:,} of {found['places']:,} ({share:.2%})"
+    share = counts["flipped"] / max(counts["places"], 1)
+    return f"{counts['flipped']:,} of {counts['places']:,} ({share:.2%})"

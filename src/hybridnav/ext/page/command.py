@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_output
-from hybridnav.cli.reading import MapOptions, check_room_to_be, load_model, with_map
+from hybridnav.cli.map_options import FloorOptions, MapOptions
+from hybridnav.cli.options import OneMap, option
+from hybridnav.cli.reading import check_room_to_be
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
 from hybridnav.maps.names import read_point
@@ -37,96 +37,61 @@ _FAR_M = 1e6
 _POINT = r"[^:]+,[^:]+"
 
 SaveOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--save", metavar="FILE", help="Write the page into one .html file instead of serving it."
-    ),
+    Path | None, option("--save FILE", "Write the page into one .html file instead of serving it.")
 ]
 RouteOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--route",
-        metavar="X,Y:X,Y",
-        help="A route of the saved page, in metres; FLOOR:X,Y:FLOOR:X,Y in a building. May be "
-        "repeated.",
+    option(
+        "--route X,Y:X,Y",
+        "A route of the saved page, in metres; FLOOR:X,Y:FLOOR:X,Y in a building. May be repeated.",
     ),
 ]
-PortOption = Annotated[
-    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port on 127.0.0.1; 0 for any.")
-]
-BrowserOption = Annotated[
-    bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
-]
+PortOption = Annotated[int, option("--port N", "Port on 127.0.0.1; 0 for any.", min=0, max=65535)]
+BrowserOption = Annotated[bool, option("--browser/--no-browser", "Open the page in the browser.")]
 EditsOption = Annotated[
     bool,
-    typer.Option(
+    option(
         "--allow-edits",
-        help="Let programs that call the server close and open doors and rooms, and name rooms.",
+        "Let programs that call the server close and open doors and rooms, and name rooms.",
     ),
 ]
 
 
-@with_map(over_floors=lambda: _view_over_floors)
-def view(
-    map_file: options.MapOrBuildingArgument,
-    save: SaveOption = None,
-    routes: RouteOption = None,
-    port: PortOption = 0,
-    browser: BrowserOption = True,
-    allow_edits: EditsOption = False,
-    rooms_file: options.RoomsOption = None,
-    costs: options.CostsOption = None,
-    *,
-    reading: MapOptions,
-) -> None:
-    """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it.
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions(FloorOptions):
+    """The options of `hybridnav view`."""
 
-    Without --rooms, rooms are those of rooms.yaml beside the map, if there. MAP may be a building:
-    the page then has its floors.
+    save: SaveOption = None
+    routes: RouteOption = None
+    port: PortOption = 0
+    browser: BrowserOption = True
+    allow_edits: EditsOption = False
+    rooms_file: OneMap[options.RoomsOption] = None
+    costs: OneMap[options.CostsOption] = None
+
+
+def view(args: ViewOptions) -> None:
+    """Open MAP as a page: click routes, close doors, name rooms.
+
+    The page is on 127.0.0.1; Ctrl-C ends it. Without --rooms, rooms are those of rooms.yaml beside
+    the map, if there. MAP may be a building: the page then has its floors.
+
+    Example: hybridnav view maps/office/office.yaml --save office.html
     """
-    _check_save(save, routes)
-    for text in routes or ():
-        _ends(text, ("",))
-    page = MapPage.read(map_file, rooms_file, options.parsed_costs(costs), reading)
-    _show(page, save, routes, port, browser=browser, allow_edits=allow_edits)
-
-
-def _view_over_floors(
-    *,
-    map_file: Path,
-    save: Path | None,
-    routes: list[str] | None,
-    port: int,
-    browser: bool,
-    allow_edits: bool,
-    reading: MapOptions,
-) -> None:
-    """Open a building as a page; see `view`."""
-    _check_save(save, routes)
-    page = BuildingPage(map_file, reading)
-    _show(page, save, routes, port, browser=browser, allow_edits=allow_edits)
-
-
-def _check_save(save: Path | None, routes: list[str] | None) -> None:
-    check_output(save, "--save", (".html",))
-    if routes and save is None:
+    check_output(args.save, "--save", (".html",))
+    if args.routes and args.save is None:
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
-
-
-def _show(
-    source: MapPage | BuildingPage,
-    save: Path | None,
-    routes: list[str] | None,
-    port: int,
-    *,
-    browser: bool,
-    allow_edits: bool,
-) -> None:
-    """Write a page into a file, or serve it."""
-    if save is not None:
-        _save(source.make(lambda _: None), save, routes or ())
+    page: MapPage | BuildingPage
+    if args.is_building:
+        page = BuildingPage(args)
     else:
-        _serve(source, port, browser=browser, allow_edits=allow_edits)
+        for text in args.routes or ():
+            _ends(text, ("",))
+        page = MapPage.read(args, args.rooms_file, options.parsed_costs(args.costs))
+    if args.save is not None:
+        _save(page.make(lambda _: None), args.save, args.routes or ())
+    else:
+        _serve(page, args.port, browser=args.browser, allow_edits=args.allow_edits)
 
 
 def _serve(source: MapPage | BuildingPage, port: int, *, browser: bool, allow_edits: bool) -> None:
@@ -139,8 +104,7 @@ def _serve(source: MapPage | BuildingPage, port: int, *, browser: bool, allow_ed
 
             webbrowser.open(address)
 
-    folder = source.folder
-    serve(source.opening(), folder, port=port, allow_edits=allow_edits, ready=ready)
+    serve(source.opening(), source.folder, port=port, allow_edits=allow_edits, ready=ready)
 
 
 @dataclass(frozen=True)
@@ -155,20 +119,20 @@ class MapPage:
     journal: hn.Journal
 
     @classmethod
-    def read(cls, file: Path, rooms_file: Path | None, costs: Costs, reading: MapOptions) -> Self:
+    def read(cls, args: MapOptions, rooms_file: Path | None, costs: Costs) -> Self:
         """Read a map, and its rooms."""
         # These load numba, which help and wrong usage can do without.
         import hybridnav as hn  # noqa: PLC0415
         from hybridnav.ext.page.kept import RoomsFile  # noqa: PLC0415
 
         preset = options.PRESET if costs else None
-        settings = reading.settings(file, preset=preset, overrides=costs.overrides)
-        model = load_model(file, settings, {}, reading)
+        settings = args.settings(preset, overrides=costs.overrides)
+        model = args.load(settings, {})
         check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
-        path = file.parent / _ROOMS if rooms_file is None else rooms_file
-        kept = RoomsFile(path.parent, path.name)
+        path = args.map_file.parent / _ROOMS if rooms_file is None else rooms_file
+        file, journal = RoomsFile(path.parent, path.name), hn.Journal(args.map_file)
         rooms = hn.load_rooms(path, model.grid) if path.exists() else model.rooms
-        return cls(model, settings, kept, rooms, costs.read(model.grid), hn.Journal(file))
+        return cls(model, settings, file, rooms, costs.read(model.grid), journal)
 
     @property
     def folder(self) -> Path:
@@ -209,8 +173,12 @@ class MapPage:
 class BuildingPage:
     """The page of a building."""
 
-    file: Path
-    reading: MapOptions
+    args: MapOptions
+
+    @property
+    def file(self) -> Path:
+        """The file of the building."""
+        return self.args.map_file
 
     @property
     def folder(self) -> Path:
@@ -230,9 +198,9 @@ class BuildingPage:
         lowest = load_floor(
             entries.floors[0],
             self.folder,
-            robot_radius_m=self.reading.robot_radius_m,
-            preset=preset_of_floors(self.reading),
-            max_cells=self.reading.max_cells,
+            robot_radius_m=self.args.robot_radius_m,
+            preset=preset_of_floors(self.args),
+            max_cells=self.args.max_cells,
         )
         names = [floor.name for floor in entries.floors]
         return Opening(lowest.grid, self.make, name=self.file.stem, floors=names)
@@ -244,7 +212,7 @@ class BuildingPage:
         entries, name = self._entries(), self.file.stem
         n_floors = 0 if entries is None else len(entries.floors)
         tell(f"reading {n_floors} floors" if n_floors != 1 else "reading the floor")
-        building = load_floors(self.file, self.reading, {})
+        building = load_floors(self.args, {})
         if entries is None:
             return Site.of_building(building, name)
         files = _rooms_files(entries.floors, self.folder)
@@ -262,14 +230,14 @@ def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsF
     """Return the files of rooms that a description names in its folder, by floor."""
     from hybridnav.ext.page.kept import RoomsFile  # noqa: PLC0415 - loads numpy
 
-    found = {}
+    files = {}
     for entry in floors:
         if entry.rooms_file is None:
             continue
         path = folder / entry.rooms_file
         if path.parent.resolve().is_relative_to(folder.resolve()):
-            found[entry.name] = RoomsFile(path.parent, path.name)
-    return found
+            files[entry.name] = RoomsFile(path.parent, path.name)
+    return files
 
 
 # The page as a file.
@@ -299,16 +267,16 @@ def _ends(text: str, names: Sequence[str]) -> list[tuple[int, tuple[float, ...]]
     """Return the floors and points of a route as it was typed, `X,Y:X,Y` for a map."""
     before = {f"{name}:" if name else "": number for number, name in enumerate(names)}
     floor = "|".join(re.escape(each) for each in sorted(before, key=len, reverse=True))
-    found = re.fullmatch(rf"({floor})({_POINT}):({floor})({_POINT})", text)
+    match = re.fullmatch(rf"({floor})({_POINT}):({floor})({_POINT})", text)
     expected = "must be X,Y:X,Y in metres"
     if names[0]:
         listed = f"{', '.join(names):.200}"
         expected = f"of a building must be FLOOR:X,Y:FLOOR:X,Y, floors of {listed}"
     refusal = f"--route {expected}, got {text!r:.80}"
-    if found is None:
+    if match is None:
         raise UsageError(refusal)
     ends = []
-    for prefix, typed in (found.group(1, 2), found.group(3, 4)):
+    for prefix, typed in (match.group(1, 2), match.group(3, 4)):
         point = read_point(typed)
         if point is None or len(point) != _TWO or not all(abs(part) < _FAR_M for part in point):
             no_point = f"--route: {typed!r:.80} is no point X,Y in metres"
