@@ -379,7 +379,8 @@ class Planning:
             points = self.grid.frame.points_of(found.cells)
             length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
             path, cost_m = Path(found.cells, points, length_m), found.cost_m
-            return solved(path, found.lower_bound_m, metric="weighted", weighted_cost=cost_m)
+            least = found.optimum or found.lower_bound_m
+            return solved(path, least, metric="weighted", weighted_cost=cost_m)
         began = clock()
         finish = costs.arcs if request.smooth == "arcs" else costs.line
         path, cost_m = finish(found.cells, request.poses, request.closed)

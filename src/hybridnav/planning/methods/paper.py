@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from hybridnav import route as routes
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
-from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
+from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, on_cells, round_closed
 from hybridnav.route.route import Route, RouteOfPlaces
@@ -149,17 +149,18 @@ class MaxDistance(Method):
         down, corridor = descent.corridor(*query.cells)
         route = self._route_of(down.places)
         found = self._refined(query, began, corridor, route, down.expanded_fields)
-        if found is None or not found.has_path or not self._is_plain:
+        if found is None or not found.has_path or self._own is not None:
             return found
         return replace(found, optimum=partial(self._optimum_m, query, found.cells))
 
     def _optimum_m(self, query: Query, cells: LongArray) -> float:
-        """Return the length of a shortest path of cells, metres, by A* on the whole map."""
+        """Return the least cost of a path of cells, metres, by A* on the whole map."""
         search = self._refiner.search.search
         closed = None if query.closed is None else query.closed.flat
         best = search(*query.cells, blocked=closed)
-        lengths = [path_length_in_cells(each) for each in (cells, best.cells) if each is not None]
-        return min(lengths) * self._topology.grid.resolution_m
+        cost = self._refiner.cost_in_cells
+        costs = [cost(each) for each in (cells, best.cells) if each is not None]
+        return min(costs) * self._topology.grid.resolution_m
 
     def _along(self, search: MaxDistanceSearch, query: Query, began: float) -> Found | None:
         """Return the path in the fields of the places, None to search the whole map."""
