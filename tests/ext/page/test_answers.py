@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.ext.page.tiles import Layer, map_layer, palette
+from hybridnav.ext.page.tiles import MapLayer, map_layer, palette
 from tests.ext.page.server import query_of
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def test_halved_tiles_are_averages_of_all_cells() -> None:
     rng = np.random.default_rng(0)
     index = rng.integers(0, 2, (700, 531)).astype(np.uint8)
     table = np.array([[0, 0, 0, 255], [255, 255, 255, 255]], dtype=np.uint8)
-    layer = Layer(index, {"light": table, "dark": table})
+    layer = MapLayer(index, {"light": table, "dark": table})
     assert layer.n_zooms == 3
     for zoom in range(layer.n_zooms):
         side = 256 << zoom

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav._base.files import printable, replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import map_facts
-from hybridnav.ext.page.tiles import TILE, Layer, Theme, hex_colours, map_layer
+from hybridnav.ext.page.tiles import TILE, MapLayer, Theme, hex_colours, map_layer
 from hybridnav.graphs import build_lane_graph
 from hybridnav.graphs.files import export_nav2
 from hybridnav.guide.words import languages
@@ -153,7 +153,7 @@ def _map(session: Session, most_cells: int) -> dict[str, Any]:
     }
 
 
-def _tiles(layer: Layer, most_cells: int) -> dict[str, Any]:
+def _tiles(layer: MapLayer, most_cells: int) -> dict[str, Any]:
     """Return the tiles of a layer as addresses that hold their data, for both themes."""
     rows, cols = layer.index.shape
     first = 0
@@ -406,7 +406,7 @@ class Cells:
             "rooms": nothing | {"notice": ""},
         }
 
-    def layer(self, name: str) -> Layer:
+    def layer(self, name: str) -> MapLayer:
         """Return the layer `map`.
 
         Raises `PreparingError` when another one is asked for.

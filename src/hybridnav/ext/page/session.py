@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.closures import Journal
     from hybridnav.ext.page.kept import RoomsFile
     from hybridnav.ext.page.requests import At, Change, Edit, Save, Stand
-    from hybridnav.ext.page.tiles import Layer
+    from hybridnav.ext.page.tiles import MapLayer
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.models import Model
@@ -86,7 +86,7 @@ class Session:
         self.grid = topology.grid
         self._file = file
         self._lock = threading.RLock()
-        self._layers: dict[str, Layer] = {}
+        self._layers: dict[str, MapLayer] = {}
         self._most: dict[str, float] = {}
         self._changes: list[tuple[dict[str, Any], RoomLabels]] = []
         """Changes that are not saved, each with the rooms before it."""
@@ -171,7 +171,7 @@ class Session:
             ordered = sorted(range(len(names)), key=lambda at: natural_key(names[at]))
             return {"version": self.version, "rings": [rings[at] for at in ordered]}
 
-    def layer(self, name: str) -> Layer:
+    def layer(self, name: str) -> MapLayer:
         """Return a layer: `map`, `rooms`, `level-3`, or `costs-` and a preset.
 
         Raises
@@ -186,7 +186,7 @@ class Session:
                     del self._layers[old]
             return self._layers[name]
 
-    def _drawn(self, name: str) -> Layer:
+    def _drawn(self, name: str) -> MapLayer:
         kind, _, which = name.partition("-")
         if name == "map":
             return map_layer(self.grid)

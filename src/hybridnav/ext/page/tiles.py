@@ -62,7 +62,7 @@ def palette(theme: Theme) -> ByteArray:
 
 
 @dataclass(eq=False)
-class Layer:
+class MapLayer:
     """A picture of a whole map by the index of a colour for each cell."""
 
     index: ByteArray
@@ -132,8 +132,8 @@ class Layer:
         return ((sums + 2) // 4).astype(np.uint8)
 
 
-def _layer(index: ByteArray) -> Layer:
-    return Layer(index, {"light": palette("light"), "dark": palette("dark")})
+def _layer(index: ByteArray) -> MapLayer:
+    return MapLayer(index, {"light": palette("light"), "dark": palette("dark")})
 
 
 def _ground(grid: OccupancyGrid) -> ByteArray:
@@ -144,12 +144,12 @@ def _ground(grid: OccupancyGrid) -> ByteArray:
     return index
 
 
-def map_layer(grid: OccupancyGrid) -> Layer:
+def map_layer(grid: OccupancyGrid) -> MapLayer:
     """Return the layer of the classes of cells."""
     return _layer(_ground(grid))
 
 
-def level_layer(level: Level) -> Layer:
+def level_layer(level: Level) -> MapLayer:
     """Return the layer of the fields of a level, neighbours in different colours."""
     colours = colour_vertices(level.arcs, level.n_vertices)
     first = np.where(level.classes == CellClass.FREE, _PLACES, _UNEXPLORED_PLACES)
@@ -160,7 +160,7 @@ def level_layer(level: Level) -> Layer:
     return _layer(index)
 
 
-def rooms_layer(labels: RoomLabels, grid: OccupancyGrid) -> Layer:
+def rooms_layer(labels: RoomLabels, grid: OccupancyGrid) -> MapLayer:
     """Return the layer of the rooms, neighbours in different colours."""
     colours = colour_vertices(_beside(labels), len(labels.names))
     index = _ground(grid)
@@ -193,7 +193,7 @@ def cost_table(closed: bool) -> ByteArray:  # noqa: FBT001 - a colour more or no
     return table
 
 
-def costs_layer(grid: OccupancyGrid, costs: CostLayer) -> tuple[Layer, float]:
+def costs_layer(grid: OccupancyGrid, costs: CostLayer) -> tuple[MapLayer, float]:
     """Return the overlay of the costs of free cells, and the greatest factor."""
     free = grid.classes == CellClass.FREE
     most = float(costs.factors[free].max(initial=1.0))
@@ -204,7 +204,7 @@ def costs_layer(grid: OccupancyGrid, costs: CostLayer) -> tuple[Layer, float]:
     table = cost_table(costs.closed is not None)
     if costs.closed is not None:
         index[costs.closed & free] = 255
-    return Layer(index, {"light": table, "dark": table}), most
+    return MapLayer(index, {"light": table, "dark": table}), most
 
 
 def hex_colours(theme: Theme) -> Sequence[str]:
