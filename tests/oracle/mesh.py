@@ -71,7 +71,7 @@ def corners_in_use(mesh: ConvexMesh) -> set[tuple[int, ...]]:
 
 def edges_between_corners(mesh: ConvexMesh) -> set[tuple[int, int]]:
     """The edges of the graph of corners, each of which has its reverse."""
-    edges = find_edges(mesh, MeshSearch(mesh).arrays)
+    edges = find_edges(mesh.arrays)
     assert edges is not None
     first, heads = edges
     tails = np.repeat(np.arange(len(mesh.corners)), np.diff(first[::2]))

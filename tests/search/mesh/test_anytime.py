@@ -43,7 +43,7 @@ def between(search: MeshSearch, start: Cell, goal: Cell, **effort: Any) -> MeshP
 
 
 def interrupted(
-    search: MeshSearch, start: Cell, goal: Cell, monkeypatch: pytest.MonkeyPatch, **effort: Any
+    search: MeshSearch, start: Cell, goal: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[MeshPath]:
     """The answers of a search that is stopped after one step, after two, and so on, until it is
     done before it is stopped."""
@@ -53,16 +53,10 @@ def interrupted(
         monkeypatch.setattr(
             "hybridnav.search.mesh.search.perf_counter", lambda now=clock: next(now)
         )
-        found = between(search, start, goal, budget_s=steps, **effort)
+        found = between(search, start, goal, budget_s=steps)
         yield found
         if next(clock) <= steps:
             return
-
-
-def length_of(path: NDArray[Any] | None) -> float:
-    """Length of a path, in cells."""
-    assert path is not None
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 _ROUNDED = """
@@ -106,30 +100,6 @@ def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int, kind:
         assert (path.positions is None) == math.isinf(path.length_cells)
     # What was stopped leaves nothing behind.
     assert between(search, start, goal).length_cells == optimum
-
-
-@settings(max_examples=examples(40), deadline=None)
-@given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
-def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
-    classes: Any, seed: int, kind: str
-) -> None:
-    free = classes == CellClass.FREE
-    assume(free.any())
-    search = search_of(build_mesh(free), kind)
-    start, middle, goal = some_cells(free, seed, 3)
-    halves = between(search, start, middle).positions, between(search, middle, goal).positions
-    first, then = (np.empty((0, 2)) if half is None else half for half in halves)
-    assume(len(first) and len(then))
-    known = np.concatenate([first, then[1:]])
-    plain = between(search, start, goal)
-    with pytest.MonkeyPatch.context() as patch:
-        found = list(interrupted(search, start, goal, patch, known=known))
-    for path in found:
-        assert path.lower_bound_cells <= plain.length_cells + SLACK
-        assert plain.length_cells - SLACK <= path.length_cells <= length_of(known) + SLACK
-        assert length_of(path.positions) == pytest.approx(path.length_cells)
-    assert found[-1].length_cells == pytest.approx(plain.length_cells)
-    assert found[-1].lower_bound_cells == found[-1].length_cells
 
 
 @settings(max_examples=examples(40), deadline=None)

@@ -26,7 +26,7 @@ from hybridnav.search.mesh import (
     build_mesh,
     shortest_paths,
 )
-from hybridnav.search.mesh.kernels.polyanya import edges_of
+from hybridnav.search.mesh.kernels.corner_graph import edges_of
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
     KINDS,
@@ -121,7 +121,7 @@ def test_a_graph_with_an_edge_without_its_reverse_is_not_used(
             first, heads = edges_of(*given)
             return first - (first > edge), np.delete(heads, edge)
 
-        monkeypatch.setattr("hybridnav.search.mesh.kernels.polyanya.edges_of", all_but_one)
+        monkeypatch.setattr("hybridnav.search.mesh.kernels.corner_graph.edges_of", all_but_one)
         search = MeshSearch(mesh)
         search.prepare()
         assert search.is_prepared

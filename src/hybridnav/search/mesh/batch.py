@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.threads import SHARES, cores
 from hybridnav.search.mesh.kernels.polyanya import WORK_FULL
 from hybridnav.search.mesh.kernels.queries import ANSWERS_FULL, many
-from hybridnav.search.mesh.search import NO_LIMIT, SURE, MeshSearch, rounded_into
+from hybridnav.search.mesh.search import NO_LIMIT, SURE, MeshSearch, doubled, rounded_into
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, LongArray
@@ -109,19 +108,17 @@ def _one_by_one(
     length, bound = np.empty(count), np.empty(count)
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
-    effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    graph, works = search.engine()
-    place, asked = search.place, (where, endpoints)
-    arrays: Any = search.blocks if graph is None else graph.arrays
+    effort, asked = (1.0 + epsilon, NO_LIMIT), (where, endpoints)
+    graph, works = search.engine
     at = n = 0
-    with works.lent() as work:
-        while at < count:
-            rest = place, asked, work.arrays, work.bounds, effort
-            found = (length, bound, starts, positions), at, n
-            at, n, short = many(search.arrays, arrays, *rest, *found)
-            if short == WORK_FULL:
-                work.make_room()
-            elif short == ANSWERS_FULL:
-                positions = np.concatenate([positions, np.empty_like(positions)])
+    work = works.take()
+    while at < count:
+        found = (length, bound, starts, positions), at, n
+        at, n, short = many(search.arrays, graph, asked, work, effort, *found)
+        if short == WORK_FULL:
+            work = doubled(work)
+        elif short == ANSWERS_FULL:
+            positions = np.concatenate([positions, np.empty_like(positions)])
+    works.give(work)
     bound = np.where(bound >= length, length, bound * SURE)
     return MeshPaths(length, bound, starts, positions[:n])

@@ -5,14 +5,14 @@ graph of its corners at which paths bend, with landmarks.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pythoncdt
 
 from hybridnav._base.copies import copies_alike
 from hybridnav.search.contraction import contract, have_reverses
-from hybridnav.search.mesh.kernels import polyanya as kernels
+from hybridnav.search.mesh.kernels import corner_graph as kernels
 from hybridnav.search.mesh.kernels.blocks import (
     WALL,
     are_free,
@@ -22,6 +22,7 @@ from hybridnav.search.mesh.kernels.blocks import (
     sides_of_triangles,
 )
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER, kinds_of, walls_of
+from hybridnav.search.mesh.kernels.state import Blocks, Corners, Hierarchy, Mesh
 from hybridnav.search.mesh.kernels.views import arcs_of, classes_that_follow
 
 if TYPE_CHECKING:
@@ -80,6 +81,19 @@ class ConvexMesh:
         finishes: IntArray = np.roll(self.begins, -1)
         finishes[self.first[1:] - 1] = self.begins[self.first[:-1]]
         return finishes
+
+    @property
+    def arrays(self) -> Mesh:
+        """The mesh as kernels take it."""
+        rows, cols = np.ascontiguousarray(self.corners.T, dtype=np.float64)
+        sides = self.begins, self.finishes, self.twins, self.polygon_of
+        return Mesh(cols, rows, self.kinds, self.first, *sides, self.component, self.polygon_at)
+
+    @property
+    def blocks(self) -> Blocks:
+        """The blocks as kernels take them."""
+        up = self.block_up
+        return Blocks(self.block_of, self.block_head, up, self.component, self.depth)
 
     @property
     def is_convex(self) -> BoolArray:
@@ -236,20 +250,18 @@ class CornerGraph:
     """float64 (n, landmarks), distances in free space in cells, infinite if there is no path."""
 
     @property
-    def arrays(self) -> tuple[Any, ...]:
-        """The arrays in the order of the kernels."""
-        return self.first, self.heads, self.landmark_distances
+    def arrays(self) -> Corners:
+        """The graph as kernels take it."""
+        return Corners(self.first, self.heads, self.landmark_distances)
 
 
-def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray, IntArray] | None:
+def find_edges(mesh: Mesh) -> tuple[LongArray, IntArray] | None:
     """Find the edges between the corners of a mesh.
 
     Parameters
     ----------
     mesh
-        The mesh.
-    arrays
-        Arrays for the kernel `successors`.
+        `arrays` of a `ConvexMesh`.
 
     Returns
     -------
@@ -262,7 +274,7 @@ def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray,
     S. Oh, H. W. Leong: Edge N-level sparse visibility graphs: fast optimal any-angle pathfinding
     using hierarchical taut paths, 2017.
     """
-    first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * len(mesh.corners))
+    first, heads = kernels.edges_of(mesh, _MOST_EDGES * len(mesh.kinds))
     if first[-1] < 0 or not have_reverses(first[::2], heads):
         return None
     for array in (first, heads):
@@ -270,17 +282,13 @@ def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray,
     return first, heads
 
 
-def add_landmarks(
-    mesh: ConvexMesh, arrays: tuple[object, ...], edges: tuple[LongArray, IntArray]
-) -> CornerGraph:
+def add_landmarks(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerGraph:
     """Add landmarks to the edges between the corners of a mesh.
 
     Parameters
     ----------
     mesh
-        The mesh.
-    arrays
-        Arrays for the kernel `successors`.
+        `arrays` of a `ConvexMesh`.
     edges
         Edges of `find_edges`.
 
@@ -289,7 +297,7 @@ def add_landmarks(
     A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph theory, 2005
     (each landmark is the corner farthest from those before).
     """
-    (first, heads), n = edges, len(mesh.corners)
+    (first, heads), n = edges, len(mesh.kinds)
     degrees = first[2::2] - first[:-2:2]
     number = _LANDMARKS if n < MANY_CORNERS else _MORE_LANDMARKS
     table = np.empty((n, number if len(heads) else 0))
@@ -300,7 +308,7 @@ def add_landmarks(
         part[mesh.begins[of_slot >= 0]] = of_slot[of_slot >= 0]
         inside = part == np.bincount(part, weights=degrees).argmax()
         source = int(np.where(inside, degrees, -1).argmax())
-        kernels.landmarks_of(arrays, (first, heads), mesh.component, source, table)
+        kernels.landmarks_of(mesh, (first, heads), source, table)
     table.flags.writeable = False
     return CornerGraph(first, heads, table)
 
@@ -339,22 +347,18 @@ class CornerHierarchy:
     """int64 (4, 64), the classes that may follow each class on a shortest path."""
 
     @property
-    def arrays(self) -> tuple[Any, ...]:
-        """The arrays in the order of the kernels."""
-        return self.first, self.arcs, self.middles, self.follow
+    def arrays(self) -> Hierarchy:
+        """The hierarchy as kernels take it."""
+        return Hierarchy(self.first, self.arcs, self.middles, self.follow)
 
 
-def contract_corners(
-    mesh: ConvexMesh, arrays: tuple[object, ...], edges: tuple[LongArray, IntArray]
-) -> CornerHierarchy | None:
+def contract_corners(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerHierarchy | None:
     """Contract the graph of the corners of a mesh.
 
     Parameters
     ----------
     mesh
-        The mesh.
-    arrays
-        Arrays for the kernel `successors`.
+        `arrays` of a `ConvexMesh`.
     edges
         Edges of the kernel `edges_of`.
 
@@ -372,8 +376,8 @@ def contract_corners(
     n_free = np.count_nonzero(mesh.polygon_at >= 0)
     if _LOOKED_AN_EDGE * len(edges[1]) > _MOST_LOOKED * n_free:
         return None
-    most = n_free * (_MOST_LOOKED if len(mesh.corners) < MANY_CORNERS else _MORE_LOOKED)
-    first, arcs = arcs_of(arrays, *edges)
+    most = n_free * (_MOST_LOOKED if len(mesh.kinds) < MANY_CORNERS else _MORE_LOOKED)
+    first, arcs = arcs_of(mesh, *edges)
     follow = classes_that_follow()
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
     if len(arcs) and not len(found[1]):

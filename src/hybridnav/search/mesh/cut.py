@@ -76,7 +76,7 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     blocks = blocks_of(polygons[0], *polygons[2:])
     is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
     is_gone[cut] = True
-    blocks[3][is_gone] = -1  # without a component
+    blocks.component[is_gone] = -1
     arrays = (vertices.corners, vertices.kinds, *polygons, mesh.polygon_at, *blocks)
     for array in arrays:
         array.flags.writeable = False

@@ -37,19 +37,19 @@ class MeshLabels:
 
     def __init__(self, search: MeshSearch, graph: CornerHierarchy) -> None:
         mesh = search.mesh
-        self._mesh, self._place = search.arrays, (mesh.component, mesh.polygon_at)
+        self._mesh = search.arrays
         self._hierarchy = mesh.kinds, graph.first, graph.arcs, graph.follow
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 
     def placed(self, ends: Ends) -> Placed:
         """Return points with the polygons that contain them."""
         cells, points = ends[0], rounded_into(*ends)
-        return points, *polygons_of_points(self._mesh, self._place, (cells, points))
+        return points, *polygons_of_points(self._mesh, (cells, points))
 
     def labels(self, ends: Placed) -> Labels:
         """Return the labels of ends."""
         work = climbing_room(self.n_corners)
-        return labels_of_points(self._mesh, self._hierarchy, ends, _view_room(), work)
+        return labels_of_points(self._mesh, self._hierarchy, ends, work)
 
     goal_labels = labels
 
@@ -58,7 +58,7 @@ class MeshLabels:
         points, offset, listed = goals
         begin, order = by_number(listed, self._n_polygons)
         members = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(offset))[order]
-        straight_costs(self._mesh, starts, (points, begin, members), _view_room(), table)
+        straight_costs(self._mesh, starts, (points, begin, members), table)
 
     def lengths(self, table: LongArray) -> FloatArray:
         """Return costs as lengths in cells."""
@@ -76,7 +76,7 @@ class ViewLabels(MeshLabels):
 
     def __init__(self, search: MeshSearch, edges: tuple[LongArray, IntArray]) -> None:
         mesh = search.mesh
-        self._mesh, self._place = search.arrays, (mesh.component, mesh.polygon_at)
+        self._mesh = search.arrays
         self._edges = edges
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 
@@ -98,8 +98,4 @@ class ViewLabels(MeshLabels):
 
     def goal_labels(self, ends: Placed) -> Labels:
         """Return the corners that each goal sees."""
-        return views_of_points(self._mesh, ends, _view_room())
-
-
-def _view_room() -> tuple[IntArray, FloatArray, IntArray]:
-    return np.empty((ROOM, 2), np.int32), np.empty((ROOM, 4)), np.empty(ROOM, np.int32)
+        return views_of_points(self._mesh, ends)

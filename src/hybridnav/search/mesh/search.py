@@ -6,7 +6,7 @@ import math
 import threading
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,20 +15,27 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
-from hybridnav._base.trig import hypots
-from hybridnav.search.mesh.build import (
-    MANY_CORNERS,
-    CornerHierarchy,
-    add_landmarks,
-    contract_corners,
-    find_edges,
-)
-from hybridnav.search.mesh.kernels import polyanya
+from hybridnav.search.mesh.build import MANY_CORNERS, add_landmarks, contract_corners, find_edges
+from hybridnav.search.mesh.kernels.polyanya import DONE, N_COUNTS, WORK_FULL
 from hybridnav.search.mesh.kernels.queries import answer
+from hybridnav.search.mesh.kernels.state import (
+    GROWING,
+    Blocks,
+    CornerWork,
+    Heap,
+    Hierarchy,
+    HierarchyWork,
+    IntervalWork,
+)
+from hybridnav.search.mesh.kernels.views import view_room
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.search.mesh.build import ConvexMesh, CornerGraph
+    from hybridnav.search.mesh.build import ConvexMesh, CornerGraph, CornerHierarchy
+    from hybridnav.search.mesh.kernels.state import Corners
+
+    Graph = Blocks | Corners | Hierarchy
+    Work = IntervalWork | CornerWork | HierarchyWork
 
 
 KERNEL = answer
@@ -63,82 +70,33 @@ class MeshPath(NamedTuple):
     """Intervals, or corners, that the search expanded."""
 
 
-class _Work:
-    """Work arrays of one query, of any kind."""
-
-    def __init__(self, mesh: ConvexMesh) -> None:
-        self.endpoints = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
-        self.counts = np.zeros(polyanya.N_COUNTS, dtype=np.int64)
-        self.bounds = np.zeros(2)
-        self.told = self.counts, self.bounds
-        self.heap = np.empty(_ROOM), np.empty(_ROOM, np.int32)
-
-    def make_room(self) -> None:
-        """Make room for twice as many entries."""
-        self.heap = _doubled(self.heap)
-
-
-class _IntervalWork(_Work):
-    """Work arrays of a query of intervals."""
-
-    def __init__(self, mesh: ConvexMesh) -> None:
-        super().__init__(mesh)
-        n_blocks, n_corners = len(mesh.block_head), len(mesh.corners)
-        self.opened = np.zeros(n_blocks, np.bool_), np.empty(n_blocks, np.int32)
-        self.corners = np.full(n_corners, np.inf), np.empty(n_corners, np.int32)
-        self.nodes = np.empty((_ROOM, 4), np.int32), np.empty((_ROOM, 5))
-
-    def make_room(self) -> None:
-        super().make_room()
-        self.nodes = _doubled(self.nodes)
-
-    @property
-    def arrays(self) -> tuple[object, ...]:
-        """The arrays in the order of `query`."""
-        nodes = *self.nodes, *self.heap, *self.corners, self.counts, self.bounds
-        return *self.endpoints, *self.opened, nodes
+def _work_for(mesh: ConvexMesh, graph: Graph) -> Work:
+    """Return the work arrays of one query."""
+    n, n_polygons = len(mesh.corners), mesh.n_polygons
+    heap = Heap(np.empty(_ROOM), np.empty(_ROOM, np.int32))
+    counts, bounds = np.zeros(N_COUNTS, np.int64), np.zeros(2)
+    every = np.empty(n_polygons, np.int32), np.empty(n_polygons, np.int32), counts, bounds
+    touched = np.empty(n, np.int32)
+    if isinstance(graph, Blocks):
+        is_open, marked = np.zeros(len(graph.head), np.bool_), np.empty(len(graph.head), np.int32)
+        nodes, best = (np.empty((_ROOM, 4), np.int32), np.empty((_ROOM, 5))), np.full(n, np.inf)
+        return IntervalWork(*every, is_open, marked, *nodes, heap, best, touched)
+    room = view_room(_ROOM)
+    if isinstance(graph, Hierarchy):
+        heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
+        return HierarchyWork(*every, room, np.full((n, 4), FAR), touched, *heaps)
+    costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
+    corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, touched
+    goal_bounds = np.empty((2, graph.landmark_distances.shape[1]))
+    return CornerWork(*every, room, *corners, heap, goal_bounds)
 
 
-class _CornerWork(_Work):
-    """Work arrays of a query of corners."""
-
-    def __init__(self, mesh: ConvexMesh, n_landmarks: int) -> None:
-        super().__init__(mesh)
-        n = len(mesh.corners)
-        self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
-        costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
-        self.corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, np.empty(n, np.int32)
-        self.goal_bounds = np.empty((2, n_landmarks))
-
-    def make_room(self) -> None:
-        super().make_room()
-        self.views = _doubled(self.views)
-
-    @property
-    def arrays(self) -> tuple[object, ...]:
-        """The arrays in the order of `query_corners`."""
-        tail = self.goal_bounds, self.counts, self.bounds
-        return *self.endpoints, self.views, self.corners, self.heap, *tail
-
-
-class _HierarchyWork(_Work):
-    """Work arrays of a query of the hierarchy of corners."""
-
-    def __init__(self, mesh: ConvexMesh) -> None:
-        super().__init__(mesh)
-        n = len(mesh.corners)
-        self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
-        self.records, self.touched = np.full((n, 4), FAR), np.empty(n, np.int32)
-        self.heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
-
-    def make_room(self) -> None:
-        self.heaps, self.views = _doubled(self.heaps), _doubled(self.views)
-
-    @property
-    def arrays(self) -> tuple[object, ...]:
-        """The arrays in the order of `query_hierarchy`."""
-        tail = self.heaps, self.counts, self.bounds
-        return *self.endpoints, self.views, self.records, self.touched, *tail
+def doubled(room: Any) -> Any:
+    """Return work arrays, or a part of them, with room for twice as many entries."""
+    if isinstance(room, np.ndarray):
+        return np.concatenate([room, room])
+    grown = {name: doubled(getattr(room, name)) for name in GROWING.intersection(room._fields)}
+    return room._replace(**grown)
 
 
 @copies_alike
@@ -171,13 +129,8 @@ class MeshSearch:
 
     def __init__(self, mesh: ConvexMesh) -> None:
         self.mesh = mesh
-        rows, cols = np.ascontiguousarray(mesh.corners.T, dtype=np.float64)
-        sides = mesh.begins, mesh.finishes, mesh.twins, mesh.polygon_of
-        self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
-        tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
-        self.blocks, self.place = (mesh.block_of, tree), (mesh.component, mesh.polygon_at)
-        self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
-        self.corner_works: Pool[Any]
+        self.arrays = mesh.arrays
+        self._use(mesh.blocks)
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
@@ -210,13 +163,11 @@ class MeshSearch:
         with self._lock:
             if self.is_prepared:
                 return
-            edges = find_edges(self.mesh, self.arrays)
+            edges = find_edges(self.arrays)
             progress(1, 2)
             graph: CornerGraph | CornerHierarchy | None = None
             if edges is not None:
-                graph = contract_corners(self.mesh, self.arrays, edges)
-                if graph is None:
-                    graph = add_landmarks(self.mesh, self.arrays, edges)
+                graph = contract_corners(self.arrays, edges) or add_landmarks(self.arrays, edges)
             self.adopt(edges, graph)
             progress(2, 2)
 
@@ -227,18 +178,14 @@ class MeshSearch:
 
         None stands for a graph that was found not to be worth its memory.
         """
-        if isinstance(graph, CornerHierarchy):
-            self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
-        elif graph is not None:
-            n_landmarks = graph.landmark_distances.shape[1]
-            self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
+        if graph is not None:
+            self._use(graph.arrays)
         self.edges, self._graph = edges, graph
         self.is_prepared = True
 
-    def engine(self) -> tuple[CornerGraph | CornerHierarchy | None, Pool[Any]]:
-        """Return what answers queries, None for the mesh itself, and its work arrays."""
-        graph = self._graph
-        return graph, self.works if graph is None else self.corner_works
+    def _use(self, graph: Graph) -> None:
+        # In one step, for the queries of other threads.
+        self.engine = graph, Pool(partial(_work_for, self.mesh, graph))
 
     def path(
         self,
@@ -247,7 +194,6 @@ class MeshSearch:
         *,
         epsilon: float = 0.0,
         budget_s: float | None = None,
-        known: FloatArray | None = None,
     ) -> MeshPath:
         """Find a shortest path between two positions.
 
@@ -262,10 +208,6 @@ class MeshSearch:
             bound.
         budget_s
             Seconds after which the search ends with the best path so far, None for no limit.
-        known
-            float64 (n, 2), a path from start to goal in free space: the answer until the search
-            finds a shorter one. With epsilon the search ends as soon as this path is proved good
-            enough; without epsilon it saves little.
 
         Returns
         -------
@@ -273,63 +215,29 @@ class MeshSearch:
             A shortest path, unless epsilon or the budget ends the search earlier.
         """
         until = math.inf if budget_s is None else perf_counter() + budget_s
-        if budget_s is None and self.is_worth_a_graph:
+        if budget_s is None and not self.is_prepared and self.is_worth_a_graph:
             if len(self.mesh.corners) < MANY_CORNERS:
                 self.prepare()
             else:
                 behind(self._begun, self.prepare)
-        upper = math.inf
-        if known is not None:
-            first, last = (round_into(*end) for end in zip(cells, positions, strict=True))
-            known = np.concatenate([[first], known[1:-1], [last]])
-            upper = float(hypots(*np.diff(known, axis=0).T).sum())
-        (row, col), (to_row, to_col) = positions
-        ends = (*cells[0], *cells[1]), (col, row, to_col, to_row)
-        graph, works = self.engine()
-        arrays = self.blocks if graph is None else graph.arrays
-        work, effort = works.take(), (upper, epsilon, until)
-        _, path, length, bound, expanded = self._run(arrays, ends, work, effort)
+        graph, works = self.engine
+        work = works.take()
+        limit = step = NO_LIMIT if until == math.inf else SLICE
+        while True:
+            effort = 1.0 + epsilon, limit
+            found = answer(self.arrays, graph, cells, positions, work, effort)
+            status, path, length, bound, expanded = found
+            if status == DONE:
+                break
+            if status == WORK_FULL:
+                work = doubled(work)
+            else:
+                limit = -1 if perf_counter() >= until else limit + step
         works.give(work)
-        if graph is None and not self.is_prepared:
+        if not self.is_prepared:
             self.expanded += expanded
         bound = length if bound >= length else bound * SURE
-        return MeshPath(path if len(path) else known, length, bound, expanded)
-
-    def _run(
-        self,
-        graph: tuple[Any, ...],
-        ends: tuple[tuple[int, ...], tuple[float, ...]],
-        work: Any,
-        effort: tuple[float, float, float],
-    ) -> tuple[int, FloatArray, float, float, int]:
-        """Run a kernel in slices until it is done, or out of time; see `answer`."""
-        upper, epsilon, until = effort
-        step = NO_LIMIT if until == math.inf else SLICE
-        limit = step if until else 0
-        while True:
-            left = upper, 1.0 + epsilon, limit
-            found = answer(self.arrays, graph, self.place, ends, (work.arrays, work.told), left)
-            status = found[0]
-            if status == polyanya.DONE:
-                return cast("tuple[int, FloatArray, float, float, int]", found)
-            if status == polyanya.WORK_FULL:
-                work.make_room()
-            elif perf_counter() >= until:
-                limit = -1
-            else:
-                limit += step
-
-
-def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return copies with room for twice as many rows."""
-    return tuple(np.concatenate([array, array]) for array in arrays)
-
-
-def round_into(cell: Cell, position: Position) -> Position:
-    """Round a position, and move it into the closed square of its cell."""
-    row, col = (round(value * GRAIN) / GRAIN for value in position)
-    top, left = float(cell[0]), float(cell[1])
-    return min(max(row, top), top + 1.0), min(max(col, left), left + 1.0)
+        return MeshPath(path if len(path) else None, length, bound, expanded)
 
 
 def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:

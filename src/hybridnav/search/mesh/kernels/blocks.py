@@ -7,6 +7,7 @@ part of the map behind a single polygon is entered only towards an end.
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav.search.mesh.kernels.state import Blocks
 
 
 @guarded
@@ -15,11 +16,6 @@ def blocks_of(first, twins, polygon_of):
     """Return the blocks (biconnected components) of the graph of polygons, and their tree.
 
     J. Hopcroft, R. Tarjan: Algorithm 447, efficient algorithms for graph manipulation, 1973.
-
-    Returns int32 (s,) block of each slot, -1 for walls; int32 (b,) the polygon of each block that
-    is nearest to the root; int32 (p,) the block through which a polygon is reached from the root,
-    -1 for a root; int32 (p,) the component of each polygon; int32 (p,) steps from the root in the
-    tree of blocks.
     """
     n = len(first) - 1
     block_of = np.full(len(twins), -1, np.int32)
@@ -106,17 +102,17 @@ def blocks_of(first, twins, polygon_of):
     for polygon in order:
         if up[polygon] >= 0:
             depth[polygon] = depth[head_of[up[polygon]]] + 1
-    return block_of, head_of[:n_blocks].copy(), up, component, depth
+    return Blocks(block_of, head_of[:n_blocks].copy(), up, component, depth)
 
 
 @njit(cache=True, nogil=True)
-def open_blocks(block_head, block_up, depth, start, goal, is_open, marked, n):
+def open_blocks(blocks, start, goal, is_open, marked, n):
     """Open the blocks between two polygons of one component; return the index behind the last one.
 
     Parameters
     ----------
-    block_head, block_up, depth
-        int32 (b,), (p,) and (p,), from `blocks_of`.
+    blocks
+        The `Blocks` of the mesh.
     start, goal
         Polygons.
     is_open
@@ -124,17 +120,18 @@ def open_blocks(block_head, block_up, depth, start, goal, is_open, marked, n):
     marked, n
         int32, receives newly opened blocks from index n on.
     """
+    depth = blocks.depth
     while start != goal:
         if depth[start] < depth[goal]:
             start, goal = goal, start
-        block = block_up[start]
+        block = blocks.up[start]
         if not is_open[block]:
             is_open[block] = True
             marked[n] = block
             n += 1
-        if depth[goal] == depth[start] and block_up[goal] == block:
+        if depth[goal] == depth[start] and blocks.up[goal] == block:
             break
-        start = block_head[block]
+        start = blocks.head[block]
     return n
 
 

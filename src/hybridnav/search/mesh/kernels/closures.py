@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
+from hybridnav.search.mesh.kernels.state import Closure
 
 _MARGIN = 1e-6
 """Rounding of the point where a segment meets a row of cells, in cells."""
@@ -22,24 +23,22 @@ def closure_of(flat, n_cols):
     """Sort closed cells into rows.
 
     `flat`: int64 (m,), flat cells that were free, sorted, each once; `n_cols`: columns of the map.
-    Returns int64 (4,) first and last row, first and last column of the closed cells; int64 offsets
-    of the cells of each of these rows; int64 their columns.
     """
     cols = flat % n_cols
     if len(flat) == 0:
-        return np.array([1, 0, n_cols, -1]), np.zeros(1, np.int64), cols
+        return Closure(np.array([1, 0, n_cols, -1]), np.zeros(1, np.int64), cols)
     box = np.array([flat[0] // n_cols, flat[-1] // n_cols, cols.min(), cols.max()])
     starts = np.zeros(box[1] - box[0] + 2, np.int64)
     for cell in flat:
         starts[cell // n_cols - box[0] + 1] += 1
-    return box, np.cumsum(starts), cols
+    return Closure(box, np.cumsum(starts), cols)
 
 
 @njit(cache=True, nogil=True)
 def _first_from(closure, row, col):
     """Return the range of the closed cells of a row that lie in a column or behind it."""
-    box, starts, cols = closure
-    low, high = starts[row - box[0]], starts[row - box[0] + 1]
+    starts, cols, first = closure.starts, closure.cols, closure.box[0]
+    low, high = starts[row - first], starts[row - first + 1]
     end = high
     while low < high:
         middle = (low + high) >> 1
@@ -53,11 +52,11 @@ def _first_from(closure, row, col):
 @njit(cache=True, nogil=True)
 def _is_closed(closure, row, col):
     """Return whether a cell was free and is closed."""
-    box, _, cols = closure
+    box = closure.box
     if row < box[0] or row > box[1] or col < box[2] or col > box[3]:
         return False
     at, end = _first_from(closure, row, col)
-    return at < end and cols[at] == col
+    return at < end and closure.cols[at] == col
 
 
 @njit(cache=True, nogil=True)
@@ -71,7 +70,7 @@ def _is_shut(closure, free, row, col):
 @njit(cache=True, nogil=True)
 def _is_at_closed(closure, x, y):
     """Return whether a lattice point is a corner of a closed cell."""
-    box = closure[0]
+    box = closure.box
     if y < box[0] or y > box[1] + 1 or x < box[2] or x > box[3] + 1:
         return False
     row, col = int(y), int(x)
@@ -147,10 +146,11 @@ def _is_beside(box, ax, ay, bx, by):
 def _crosses(closure, free, ax, ay, bx, by):
     """Return whether a segment that is legal in free space is illegal with cells closed.
 
-    `closure`, `free`: see `closure_of`; `ax`, `ay`, `bx`, `by`: the segment. Its endpoints are not
-    tested: a path that goes on in another direction must be tested there.
+    `closure`: a `Closure`; `free`: bool (rows, cols), before it; `ax`, `ay`, `bx`, `by`: the
+    segment. Its endpoints are not tested: a path that goes on in another direction must be tested
+    there.
     """
-    box, starts, cols = closure
+    box, starts, cols = closure.box, closure.starts, closure.cols
     if not _is_beside(box, ax, ay, bx, by) or (ax == bx and ay == by):
         return False
     segment = (ax, ay, bx, by)
@@ -176,7 +176,7 @@ def path_crosses(closure, free, path):
 
     An end at a corner of a closed cell counts, because the cell of the end decides.
 
-    `closure`, `free`: see `closure_of`; `path`: float64 (n, 2), (row, col) in grid units: the
+    `closure`, `free`: see `_crosses`; `path`: float64 (n, 2), (row, col) in grid units: the
     start, the corners at which it turns, the goal.
     """
     for k in range(len(path)):

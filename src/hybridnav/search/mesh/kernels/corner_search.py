@@ -26,6 +26,7 @@ from hybridnav.search.mesh.kernels.polyanya import (
     push,
     put_corner,
 )
+from hybridnav.search.mesh.kernels.state import Bend, Target
 from hybridnav.search.mesh.kernels.views import distance, lobe_of, see_from_point
 
 _SLACK = 1e-9
@@ -36,20 +37,18 @@ directions."""
 
 
 @njit(cache=True, nogil=True)
-def look(mesh, where, endpoints, rooms, bounds):
+def look(mesh, cells, endpoints, work):
     """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
     Parameters
     ----------
     mesh, endpoints
         See `successors`.
-    where
-        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_endpoints`.
-    rooms
-        int32 room for the polygons of start and goal, room of `see_from_point`.
-    bounds
-        Receives the length and lower bound of the answer: infinite if the endpoints are not
-        connected, their distance if they see each other.
+    cells
+        See `polygons_of_endpoints`.
+    work
+        A `CornerWork` or `HierarchyWork`. Its bounds receive the length and lower bound of the
+        answer: infinite if the endpoints are not connected, their distance if they see each other.
 
     Returns
     -------
@@ -58,90 +57,79 @@ def look(mesh, where, endpoints, rooms, bounds):
         goal sees and then those that the start sees; the indices at which both lists end.
     """
     sx, sy, tx, ty = endpoints
-    component, polygon_at, cells = where
-    starts, goals, room = rooms
-    how, n_starts, n_goals = polygons_of_endpoints(
-        mesh, component, polygon_at, cells, endpoints, starts, goals
-    )
+    starts, goals = work.starts, work.goals
+    how, n_starts, n_goals = polygons_of_endpoints(mesh, cells, endpoints, starts, goals)
     if how == APART:
-        bounds[:] = np.inf
+        work.bounds[:] = np.inf
         return DONE, 0, 0
     if how == SPLIT:
-        nowhere = (0.0, 0.0, starts[:0])
-        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
+        nowhere = Target(0.0, 0.0, starts[:0])
+        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, work.room, 0)
         if n < 0:
             return WORK_FULL, 0, 0
-        target = (tx, ty, goals[:n_goals])
-        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, room, n)
+        target = Target(tx, ty, goals[:n_goals])
+        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, work.room, n)
         if n_all < 0:
             return WORK_FULL, 0, 0
         if not is_seen:
             return PAUSED, n, n_all
-    bounds[:] = hypot(tx - sx, ty - sy)
+    work.bounds[:] = hypot(tx - sx, ty - sy)
     return DONE, 0, 0
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def query_corners(mesh, graph, where, endpoints, work, effort):
+def query_corners(mesh, graph, cells, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
-    `mesh`, `endpoints`: see `successors`; `graph`: int64 (2 n + 1,) and int32 (m,) of `edges_of`;
-    float64 (n, landmarks) of `landmarks_of`; `where`: see `look`; `work`: arrays of one query: room
-    for the polygons of the endpoints; room of `see_from_point`; cost of corners (infinite),
-    estimate, corner before, length to the goal (infinite), corners touched; keys and values of the
-    heap; float64 (2, landmarks) bounds of the goal; counts and bounds; `effort`: see `query`.
-    Result: see `query`.
+    `mesh`, `endpoints`: see `successors`; `graph`: `Corners`; `cells`: see `polygons_of_endpoints`;
+    `work`: a `CornerWork`; `effort`: see `answer`. Result: see `query_intervals`.
     """
-    starts, goals, room, corners, heap, _, counts, bounds = work
-    costs, _, _, to_goal, touched = corners
-    upper, factor, limit = effort
+    seen, counts, bounds = work.room.seen, work.counts, work.bounds
+    factor, limit = effort
     none = np.empty((0, 2))
     if not counts[BEGUN]:
         counts[:] = 0
         counts[LAST] = -1
-        bounds[UPPER], bounds[LOWER] = upper, 0.0
-        status, n, n_all = look(mesh, where, endpoints, (starts, goals, room), bounds)
-        if n_all - n > len(heap[0]):
+        bounds[UPPER], bounds[LOWER] = np.inf, 0.0
+        status, n, n_all = look(mesh, cells, endpoints, work)
+        if n_all - n > len(work.heap.keys):
             status = WORK_FULL
         if status == WORK_FULL:
             return WORK_FULL, none
         if status == DONE:
             return DONE, none if bounds[UPPER] == np.inf else _path_through(
-                mesh, endpoints, corners[2], -1
+                mesh, endpoints, work.came, -1
             )
-        seen = room[2][:n], room[2][n:n_all]
-        _seed(mesh, graph[2], endpoints, seen, work)
+        _seed(mesh, graph.landmark_distances, endpoints, (seen[:n], seen[n:n_all]), work)
         counts[BEGUN], counts[MARKED] = 1, n
     status = DONE
     if limit >= 0:
         status = _advance(mesh, graph, endpoints, work, factor, limit)
     if status != DONE:
         return status, none
-    for corner in room[2][: counts[MARKED]]:
-        to_goal[corner] = np.inf
-    for corner in touched[: counts[TOUCHED]]:
-        costs[corner] = np.inf
+    for corner in seen[: counts[MARKED]]:
+        work.to_goal[corner] = np.inf
+    for corner in work.touched[: counts[TOUCHED]]:
+        work.costs[corner] = np.inf
     counts[BEGUN] = 0
     if counts[LAST] < 0:
         return DONE, none
-    return DONE, _path_through(mesh, endpoints, corners[2], counts[LAST])
+    return DONE, _path_through(mesh, endpoints, work.came, counts[LAST])
 
 
 @njit(cache=True, nogil=True)
 def _seed(mesh, table, endpoints, seen, work):
     """Mark the corners that see the goal, and reach those that the start sees."""
-    cx, cy = mesh[0], mesh[1]
     sx, sy, tx, ty = endpoints
     from_goal, from_start = seen
     n_landmarks = table.shape[1]
-    corners, goal_bounds, counts = work[3], work[5], work[6]
-    to_goal = corners[3]
+    to_goal, goal_bounds = work.to_goal, work.goal_bounds
     # The distance of the goal from a landmark lies between these two, in the graph.
     goal_bounds[0] = np.inf
     goal_bounds[1] = -np.inf
     for corner in from_goal:
-        to_goal[corner] = distance(cx[corner], cy[corner], tx, ty)
+        to_goal[corner] = distance(mesh.x[corner], mesh.y[corner], tx, ty)
         for k in range(n_landmarks):
             reached = table[corner, k]
             if reached < np.inf:
@@ -150,9 +138,8 @@ def _seed(mesh, table, endpoints, seen, work):
     for k in range(n_landmarks):
         if goal_bounds[0, k] == np.inf:
             goal_bounds[0, k], goal_bounds[1, k] = -np.inf, np.inf
-    counts[SIZE] = 0
-    bend = (sx, sy, sx, sy, 0.0)
-    _relax(mesh, table, endpoints, work, -1, bend, 0.0, from_start)
+    work.counts[SIZE] = 0
+    _relax(mesh, table, endpoints, work, -1, Bend(sx, sy, sx, sy, 0.0), 0.0, from_start)
 
 
 @njit(cache=True, nogil=True)
@@ -162,24 +149,23 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
     `mesh`, `endpoints`: see `successors`; `graph`, `work`: see `query_corners`; `factor`, `limit`:
     see `advance`.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
-    first, heads, table = graph
-    _, _, _, corners, heap, _, counts, bounds = work
-    costs, estimates, came, _, _ = corners
+    cx, cy, kinds = mesh.x, mesh.y, mesh.kinds
+    first, costs, heap = graph.first, work.costs, work.heap
+    counts, bounds = work.counts, work.bounds
     sx, sy, _, _ = endpoints
-    keys, values = heap
+    keys, values = heap.keys, heap.values
     status = DONE
     while counts[SIZE]:
         # The corner with the least estimate, unless it was reached by a cheaper path since.
         here, key = values[0], keys[0]
-        if key > costs[here] + estimates[here]:
+        if key > costs[here] + work.estimates[here]:
             counts[SIZE] = pop(heap, counts[SIZE])
             continue
         # Paths of equal length are all found: one of them is chosen.
         if key * factor > bounds[UPPER] + _TIE:
             break
         # Its edges in the quadrant into which a path may go on.
-        x, y, kind, before = cx[here], cy[here], kinds[here], came[here]
+        x, y, kind, before = cx[here], cy[here], kinds[here], work.came[here]
         px, py = (sx, sy) if before < 0 else (cx[before], cy[before])
         dx, dy = x - px, y - py
         place = 2 * here + lobe_of(kind, dx, dy)
@@ -195,8 +181,8 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
         counts[EXPANDED] += 1
         # The blocked cell lies on the left of the path here, or on the right.
         hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
-        bend = (px, py, x, y, hand)
-        _relax(mesh, table, endpoints, work, here, bend, costs[here], heads[low:high])
+        heads, bend = graph.heads[low:high], Bend(px, py, x, y, hand)
+        _relax(mesh, graph.landmark_distances, endpoints, work, here, bend, costs[here], heads)
     least = min(keys[0], bounds[UPPER]) if counts[SIZE] else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
     return status
@@ -213,27 +199,25 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
     table
         Result of `landmarks_of`.
     work
-        Arrays of the query; see `query_corners`.
+        A `CornerWork`.
     before, cost_before
         Number of the corner, and its cost in cells.
     bend
-        x and y of the point before, x and y of the corner, and the hand to which a path bends
-        there: 1 for the left, 0 for either.
+        A `Bend` there.
     heads
         int32, the corners to reach.
     """
-    cx, cy = mesh[0], mesh[1]
-    px, py, x, y, hand = bend
+    cx, cy, costs, came = mesh.x, mesh.y, work.costs, work.came
+    x, y, goal_bounds = bend.x, bend.y, work.goal_bounds
     _, _, tx, ty = endpoints
-    _, _, _, corners, heap, goal_bounds, counts, bounds = work
-    costs, estimates, came, to_goal, touched = corners
+    counts, bounds = work.counts, work.bounds
     size, n_touched, upper = counts[SIZE], counts[TOUCHED], bounds[UPPER]
     for corner in heads:
         wx, wy = cx[corner], cy[corner]
         # Only if that is cheaper, or as cheap and first in the order of directions.
         cost = cost_before + distance(x, y, wx, wy)
         known = costs[corner]
-        if cost > known + _TIE or turn_of(px, py, x, y, wx, wy) * hand < 0.0:
+        if cost > known + _TIE or turn_of(bend.px, bend.py, x, y, wx, wy) * bend.hand < 0.0:
             continue
         is_new, is_tied = known == np.inf, cost >= known - _TIE
         if is_tied and not _is_first(_point(mesh, endpoints, came[corner]), (x, y), (wx, wy)):
@@ -246,9 +230,9 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
                 if reached < np.inf:
                     left = max(left, goal_bounds[0, k] - reached, reached - goal_bounds[1, k])
         else:
-            left = estimates[corner]
+            left = work.estimates[corner]
         # A corner over which no path is as short as the best one stays as it is.
-        through = cost + to_goal[corner]
+        through = cost + work.to_goal[corner]
         if min(through, cost + left) > upper + _TIE:
             continue
         came[corner] = before
@@ -263,12 +247,12 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
             counts[LAST] = corner if is_next else last
         # A corner that is reached first is noted, so that its cost is reset afterwards.
         if is_new:
-            estimates[corner] = left
-            touched[n_touched] = corner
+            work.estimates[corner] = left
+            work.touched[n_touched] = corner
             n_touched += 1
         costs[corner] = cost
         if cost + left <= upper + _TIE:
-            size = push(heap, size, cost + left, corner)
+            size = push(work.heap, size, cost + left, corner)
     counts[SIZE], counts[TOUCHED], bounds[UPPER] = size, n_touched, upper
 
 
@@ -277,7 +261,7 @@ def _point(mesh, endpoints, corner):
     """Return a corner, or the start for -1."""
     if corner < 0:
         return endpoints[0], endpoints[1]
-    return mesh[0][corner], mesh[1][corner]
+    return mesh.x[corner], mesh.y[corner]
 
 
 @njit(cache=True, nogil=True)
@@ -307,7 +291,7 @@ def _path_through(mesh, endpoints, came, corner):
     path[n, 0], path[n, 1] = ty, tx
     at = corner
     while at >= 0:
-        n = put_corner(path, n, mesh[0][at], mesh[1][at])
+        n = put_corner(path, n, mesh.x[at], mesh.y[at])
         at = came[at]
     n = put_corner(path, n, sx, sy)
     return path[n:].copy()

@@ -175,7 +175,7 @@ def touched_polygons(corners, sides, place, cells):
 @njit(cache=True, nogil=True)
 def _polygons_near(corners, sides, component, cells, n_cols):
     """Return the polygons whose bounds meet those of some cells, without removed ones."""
-    first, begins = sides[:2]
+    first, begins, _, _ = sides
     bottom = left = np.int64(1) << 40
     top = right = -bottom
     for cell in cells:

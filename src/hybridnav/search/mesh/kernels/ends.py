@@ -7,26 +7,35 @@ from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.kernels.labels import climb, grow_rows
 from hybridnav.search.mesh.kernels.intervals import polygon_in, polygons_with
-from hybridnav.search.mesh.kernels.views import class_of, cost_of, lobe_of, see_from_point
+from hybridnav.search.mesh.kernels.state import Target, Targets
+from hybridnav.search.mesh.kernels.views import (
+    class_of,
+    cost_of,
+    lobe_of,
+    see_from_point,
+    view_room,
+)
+
+_ROOM = 4096
+"""Initial room of views."""
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def polygons_of_points(mesh, place, ends):
+def polygons_of_points(mesh, ends):
     """Return the polygons that contain each point: int64 (n + 1,) offsets and int32.
 
-    `mesh`: see `successors`; `place`: component of polygons, and the polygon of each cell; `ends`:
-    int64 (n, 2) free cells, float64 (n, 2) points in their closed squares, (row, col).
+    `mesh`: a `Mesh`; `ends`: int64 (n, 2) free cells, float64 (n, 2) points in their closed
+    squares, (row, col).
     """
-    component, polygon_at = place
     cells, points = ends
-    inside = np.empty(len(component), np.int32)
+    inside = np.empty(len(mesh.component), np.int32)
     offset = np.zeros(len(cells) + 1, np.int64)
     listed = np.empty(4 * len(cells), np.int32)
     n = 0
     for k in range(len(cells)):
         row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
-        inner = polygon_in(mesh, component, polygon_at, row, col)
+        inner = polygon_in(mesh, row, col)
         n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
         while n + n_inside > len(listed):
             listed = grow(listed)
@@ -43,27 +52,27 @@ def _seen(mesh, ends, k, target, room):
     y, x, inside = points[k, 0], points[k, 1], listed[offset[k] : offset[k + 1]]
     found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
     while found < 0:
-        room = grow_rows(room[0]), grow_rows(room[1]), np.empty(2 * len(room[2]), np.int32)
+        room = view_room(2 * len(room.seen))
         found, _ = see_from_point(mesh, x, y, inside, target, room, 0)
-    return room[2][:found], room
+    return room.seen[:found], room
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def views_of_points(mesh, ends, room):
+def views_of_points(mesh, ends):
     """Return the corners that points see, with the costs to them, as labels.
 
-    `mesh`: see `successors`; `ends`: float64 (n, 2) points, (row, col); the polygons that contain
-    them, see `polygons_of_points`; `room`: see `see_from_point`. Returns int64 (n + 1,) offsets;
-    int32 corners, int64 costs in `UNITS`.
+    `mesh`: a `Mesh`; `ends`: float64 (n, 2) points, (row, col); the polygons that contain them, see
+    `polygons_of_points`. Returns int64 (n + 1,) offsets; int32 corners, int64 costs in `UNITS`.
     """
-    cx, cy = mesh[0], mesh[1]
+    cx, cy = mesh.x, mesh.y
     points, _, listed = ends
+    room = view_room(_ROOM)
     offset = np.zeros(len(points) + 1, np.int64)
     nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
     for k in range(len(points)):
         y, x = points[k, 0], points[k, 1]
-        seen, room = _seen(mesh, ends, k, (0.0, 0.0, listed[:0]), room)
+        seen, room = _seen(mesh, ends, k, Target(0.0, 0.0, listed[:0]), room)
         while n + len(seen) > len(nodes):
             nodes, costs = grow(nodes), grow(costs)
         for corner in seen:
@@ -75,20 +84,20 @@ def views_of_points(mesh, ends, room):
 
 @guarded
 @njit(cache=True, nogil=True)
-def labels_of_points(mesh, hierarchy, ends, room, work):
+def labels_of_points(mesh, hierarchy, ends, work):
     """Return the labels of points, as `views_of_points` returns views.
 
-    `mesh`, `ends`, `room`: see `views_of_points`; `hierarchy`, `work`: see `climb`.
+    `mesh`, `ends`: see `views_of_points`; `hierarchy`, `work`: see `climb`.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    cx, cy, kinds = mesh.x, mesh.y, mesh.kinds
     points, _, listed = ends
     records, heap = work
-    follow = hierarchy[3]
+    follow, room = hierarchy[3], view_room(_ROOM)
     offset = np.zeros(len(points) + 1, np.int64)
     nodes, costs, n = np.empty(4096, np.int32), np.empty(4096, np.int64), 0
     for k in range(len(points)):
         y, x = points[k, 0], points[k, 1]
-        seen, room = _seen(mesh, ends, k, (0.0, 0.0, listed[:0]), room)
+        seen, room = _seen(mesh, ends, k, Target(0.0, 0.0, listed[:0]), room)
         to_seen, may_follow = np.empty(len(seen), np.int64), np.empty(len(seen), np.int64)
         for i in range(len(seen)):
             corner = seen[i]
@@ -105,16 +114,16 @@ def labels_of_points(mesh, hierarchy, ends, room, work):
 
 @guarded
 @njit(cache=True, nogil=True)
-def straight_costs(mesh, starts, goals, room, table):
+def straight_costs(mesh, starts, goals, table):
     """Set the entries of a table whose ends see each other to the costs of straight lines.
 
-    `mesh`, `starts`, `room`: see `views_of_points`; `goals`: float64 (m, 2) points; int64 (p + 1,)
+    `mesh`, `starts`: see `views_of_points`; `goals`: float64 (m, 2) points; int64 (p + 1,)
     and int32, the goals in each polygon; `table`: int64 (n, m) costs in `UNITS`; changed.
     """
     points, offset, listed = starts
     to_points, begin, members = goals
-    is_seen = np.zeros(len(to_points), np.bool_)
-    target = (begin, members, to_points, is_seen)
+    is_seen, room = np.zeros(len(to_points), np.bool_), view_room(_ROOM)
+    target = Targets(begin, members, to_points, is_seen)
     for k in range(len(points)):
         y, x = points[k, 0], points[k, 1]
         _, room = _seen(mesh, starts, k, target, room)
@@ -130,11 +139,11 @@ def straight_costs(mesh, starts, goals, room, table):
 def costs_to_corners(mesh, edges, point, view, work):
     """Search all corners from a point, on a graph that is not contracted; return the heap.
 
-    `mesh`: see `successors`; `edges`: int64 (2 n + 1,) and int32 (m,) of `edges_of`; `point`:
+    `mesh`: a `Mesh`; `edges`: int64 (2 n + 1,) and int32 (m,) of `edges_of`; `point`:
     float64 (2,), (row, col); `view`: int32 corners that the point sees, int64 costs to them;
     `work`: int64 (n,) costs (`FAR`), filled in; int32 (n,) corners before; int64 heap.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    cx, cy, kinds = mesh.x, mesh.y, mesh.kinds
     first, heads = edges
     costs, came, heap = work
     size = 0

@@ -20,8 +20,6 @@ _LEFT, _RIGHT = 1, 2
 WHOLE_SIDE = _LEFT | _RIGHT
 # Columns of a node's reals: cost of the root, points on the rays.
 G, _LX, _LY, _RX, _RY = 0, 1, 2, 3, 4
-# Indices in `mesh`, the arrays of a mesh.
-_CX, _CY, _KINDS, _FIRST, _BEGINS, _STOPS, _TWINS, _POLYGON_OF = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 @njit(cache=True, nogil=True)
@@ -90,11 +88,11 @@ def estimate(x, y, lx, ly, rx, ry, tx, ty):
 @njit(cache=True, nogil=True)
 def estimate_of(mesh, endpoints, whole, real, node):
     """Return the estimate of the rest of a path from a node's root."""
-    cx, cy = mesh[_CX], mesh[_CY]
+    cx, cy = mesh.x, mesh.y
     sx, sy, tx, ty = endpoints
     slot, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
     x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
-    a, b = mesh[_BEGINS][slot], mesh[_STOPS][slot]
+    a, b = mesh.begins[slot], mesh.finishes[slot]
     if root in (a, b):
         return hypot(tx - x, ty - y)
     lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
@@ -142,7 +140,7 @@ def along(mesh, x, y, u, w):
 
     A path that continues behind the side bends to the right at its right end.
     """
-    cx, cy = mesh[_CX], mesh[_CY]
+    cx, cy = mesh.x, mesh.y
     from_u = abs(cx[u] - x) + abs(cy[u] - y)
     from_w = abs(cx[w] - x) + abs(cy[w] - y)
     return (u, -1) if from_u < from_w else (w, 1)
@@ -155,7 +153,7 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
     Parameters
     ----------
     mesh
-        float64 x and y of corners, uint8 kinds, int32 first, begins, finishes, twins, polygon_of.
+        A `Mesh`.
     blocks
         int32 block of each slot, and bool whether the search may enter each block.
     endpoints
@@ -167,14 +165,15 @@ def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
     node, n
         Number of the node, and of all nodes.
     """
-    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
+    cx, cy, kinds, first = mesh.x, mesh.y, mesh.kinds, mesh.first
+    begins, finishes, twins = mesh.begins, mesh.finishes, mesh.twins
     block_of, is_open = blocks
     sx, sy, tx, ty = endpoints
     whole, real = nodes
     entry, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
     g = real[node, G]
     x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
-    polygon = polygon_of[entry]
+    polygon = mesh.polygon_of[entry]
     low, high = first[polygon], first[polygon + 1]
     a, b = begins[entry], finishes[entry]
 
@@ -262,7 +261,7 @@ def _hidden(mesh, corner, near, far, is_cut, hand):
     corner to the root; the marks of the interval, without that of its near end if the far end is
     cut off.
     """
-    cx, cy = mesh[_CX], mesh[_CY]
+    cx, cy = mesh.x, mesh.y
     if is_cut:
         return corner, 0.0, 0
     if (
@@ -271,7 +270,7 @@ def _hidden(mesh, corner, near, far, is_cut, hand):
     ):
         # Behind a wall on one line with it: two bends at once.
         dx, dy = cx[near] - cx[corner], cy[near] - cy[corner]
-        if not turns(mesh[_KINDS][near], dx, dy, hand):
+        if not turns(mesh.kinds[near], dx, dy, hand):
             return -1, 0.0, 0
         return near, hypot(dx, dy), -1 - corner
     return corner, 0.0, WHOLE_SIDE
@@ -287,13 +286,14 @@ def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
     mesh, blocks, endpoints, is_goal, nodes, node, n
         See `successors`.
     """
-    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
+    cx, cy, kinds, first = mesh.x, mesh.y, mesh.kinds, mesh.first
+    begins, finishes, twins = mesh.begins, mesh.finishes, mesh.twins
     block_of, is_open = blocks
     _, _, tx, ty = endpoints
     whole, real = nodes
     entry, root, g = whole[node, SLOT], whole[node, ROOT], real[node, G]
     x, y = cx[root], cy[root]
-    polygon = polygon_of[entry]
+    polygon = mesh.polygon_of[entry]
     if is_goal:
         n = _put_goal(nodes, n, root, node, g + hypot(tx - x, ty - y))
     for slot in range(first[polygon], first[polygon + 1]):
@@ -319,17 +319,13 @@ APART, MET, SPLIT = -1, 1, 0
 
 
 @njit(cache=True, nogil=True)
-def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts, goals):
+def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
     """Find the polygons that contain the endpoints of a query.
 
     Parameters
     ----------
     mesh, endpoints
         See `successors`.
-    component
-        int32 (p,) of `blocks_of`.
-    polygon_at
-        int32 (rows, cols), the polygon at the centre of each cell.
     cells
         Row and column of the start's cell, then of the goal's; free ones.
     starts, goals
@@ -342,9 +338,9 @@ def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts,
     """
     sx, sy, tx, ty = endpoints
     from_row, from_col, to_row, to_col = cells
-    inner = polygon_in(mesh, component, polygon_at, from_row, from_col)
-    last = polygon_in(mesh, component, polygon_at, to_row, to_col)
-    if component[inner] != component[last]:
+    inner = polygon_in(mesh, from_row, from_col)
+    last = polygon_in(mesh, to_row, to_col)
+    if mesh.component[inner] != mesh.component[last]:
         return APART, 0, 0
     n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
     n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
@@ -356,16 +352,16 @@ def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts,
 
 
 @njit(cache=True, nogil=True)
-def polygon_in(mesh, component, polygon_at, row, col):
+def polygon_in(mesh, row, col):
     """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
-    cx, cy, _, first, begins, finishes, _, _ = mesh
-    polygon = polygon_at[row, col]
+    cx, cy, first, component = mesh.x, mesh.y, mesh.first, mesh.component
+    polygon = mesh.polygon_at[row, col]
     if polygon >= 0 and component[polygon] >= 0:
         return polygon
     for other in range(len(first) - 2, -1, -1):
         holds = component[other] >= 0
         for slot in range(first[other], first[other + 1]):
-            u, w = begins[slot], finishes[slot]
+            u, w = mesh.begins[slot], mesh.finishes[slot]
             holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
         if holds:
             return other
@@ -390,7 +386,8 @@ def polygons_with(mesh, inner, row, col, x, y, found):
     found
         int32, room for the polygons, as many as the mesh has; their number is returned.
     """
-    cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
+    cx, cy, first, twins = mesh.x, mesh.y, mesh.first, mesh.twins
+    begins, finishes = mesh.begins, mesh.finishes
     found[0] = inner
     n = 1
     at = 0
@@ -406,7 +403,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
             # The segment from the centre to the point meets no wall: its polygons are connected.
             if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
                 continue
-            other = polygon_of[twins[slot]]
+            other = mesh.polygon_of[twins[slot]]
             is_known = False
             for k in range(n):
                 is_known = is_known or found[k] == other

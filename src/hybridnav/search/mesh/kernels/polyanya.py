@@ -6,11 +6,13 @@ M. L. Cui, D. D. Harabor, A. Grastien: Compromise-free pathfinding on a navigati
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow
-from hybridnav._base.kernels.exact import GRAIN, turn_of
+from hybridnav._base.kernels.exact import turn_of
 from hybridnav._base.trig import hypot
+from hybridnav.search.mesh.kernels.blocks import open_blocks
 from hybridnav.search.mesh.kernels.intervals import (
+    APART,
     ENDS,
+    MET,
     PARENT,
     ROOT,
     SLOT,
@@ -18,11 +20,11 @@ from hybridnav.search.mesh.kernels.intervals import (
     G,
     along,
     estimate_of,
+    polygons_of_endpoints,
     put,
     successors,
     turns,
 )
-from hybridnav.search.mesh.kernels.views import distance, see_quadrant, view_room, walls_at
 
 DONE, PAUSED, WORK_FULL = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;
@@ -36,8 +38,90 @@ N_COUNTS = 9
 # Reals: the length of the best path known, a lower bound on every path.
 UPPER, LOWER = 0, 1
 
+_OPENED, _SEEDED = 1, 2
+"""Stages of a query: its blocks are opened; its first nodes are written."""
 _SAME = 1e-9
 """Difference of two costs of a root that counts as none, in cells."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def query_intervals(mesh, blocks, cells, endpoints, work, effort):
+    """Find a shortest path between two points, or resume the search.
+
+    Parameters
+    ----------
+    mesh, endpoints
+        See `successors`.
+    blocks
+        The `Blocks` of the mesh.
+    cells
+        Row and column of the start's cell, then of the goal's; free ones.
+    work
+        An `IntervalWork`.
+    effort
+        `factor` and `limit` of `advance`; a limit below zero ends the query.
+
+    Returns
+    -------
+    tuple
+        `DONE`, `PAUSED` or `WORK_FULL`; when done the path, float64 (n, 2) as (row, col), without
+        rows if there is none.
+    """
+    starts, goals, whole = work.starts, work.goals, work.whole
+    counts, bounds = work.counts, work.bounds
+    factor, limit = effort
+    none = np.empty((0, 2))
+
+    # Not begun. Endpoints in different components or in one polygon need no search, and leave
+    # nothing to clean up.
+    if not counts[BEGUN]:
+        counts[:] = 0
+        counts[LAST] = -1
+        bounds[UPPER], bounds[LOWER] = np.inf, 0.0
+        how, counts[STARTS], counts[GOALS] = polygons_of_endpoints(
+            mesh, cells, endpoints, starts, goals
+        )
+        if how == APART:
+            bounds[:] = np.inf
+            return DONE, none
+        if how == MET:
+            bounds[:] = hypot(endpoints[2] - endpoints[0], endpoints[3] - endpoints[1])
+            return DONE, path_to(mesh, endpoints, whole, -1)
+
+        # A shortest path stays in the blocks between its endpoints (see `open_blocks`). An endpoint
+        # on a side lies in several polygons: the blocks of all pairs are opened.
+        n = 0
+        for start in starts[: counts[STARTS]]:
+            for goal in goals[: counts[GOALS]]:
+                n = open_blocks(blocks, start, goal, work.is_open, work.marked, n)
+        counts[MARKED] = n
+        counts[BEGUN] = _OPENED
+    entered = (blocks.block_of, work.is_open)
+    status = DONE
+
+    # Opened. Without room for the first nodes the stage stays, and the next call writes them anew.
+    if counts[BEGUN] == _OPENED:
+        status = seed(mesh, entered, endpoints, starts[: counts[STARTS]], work)
+        if status == DONE:
+            counts[BEGUN] = _SEEDED
+
+    # Seeded. Each call resumes the search; the stage stays until the answer is good enough.
+    if status == DONE and limit >= 0:
+        status = advance(mesh, entered, endpoints, goals[: counts[GOALS]], work, factor, limit)
+    if status != DONE:
+        return status, none
+
+    # Done. Only what the query touched is reset, so its cost does not depend on the size of the
+    # mesh.
+    for k in range(counts[TOUCHED]):
+        work.best[work.touched[k]] = np.inf
+    for k in range(counts[MARKED]):
+        work.is_open[work.marked[k]] = False
+    counts[BEGUN] = 0
+    if counts[LAST] < 0:
+        return DONE, none
+    return DONE, path_to(mesh, endpoints, whole, counts[LAST])
 
 
 @njit(cache=True, nogil=True)
@@ -45,22 +129,20 @@ def seed(mesh, blocks, endpoints, starts, work):
     """Write the first nodes of a search, the sides of the start's polygons.
 
     `mesh`, `blocks`, `endpoints`: see `successors`; `starts`: int32 polygons that contain the
-    start; `work`: nodes as int32 (n, 4) and float64 (n, 5), keys and values of the heap, best cost
-    of each corner (infinite), int32 corners touched, counts and bounds. Result: `DONE` or
-    `WORK_FULL`.
+    start; `work`: an `IntervalWork`. Result: `DONE` or `WORK_FULL`.
     """
-    cx, cy, kinds, first, begins, finishes, twins, _ = mesh
+    cx, cy, kinds, first = mesh.x, mesh.y, mesh.kinds, mesh.first
     block_of, is_open = blocks
     sx, sy, _, _ = endpoints
-    whole, real, keys, values, _, _, counts, bounds = work
+    whole, real = work.whole, work.real
     n = size = 0
     for polygon in starts:
         if n + first[polygon + 1] - first[polygon] > len(whole):
             return WORK_FULL
         for slot in range(first[polygon], first[polygon + 1]):
-            if twins[slot] < 0 or not is_open[block_of[slot]]:
+            if mesh.twins[slot] < 0 or not is_open[block_of[slot]]:
                 continue
-            u, w = begins[slot], finishes[slot]
+            u, w = mesh.begins[slot], mesh.finishes[slot]
             ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
             root, g = -1, 0.0
             if turn_of(sx, sy, ux, uy, wx, wy) == 0:
@@ -72,12 +154,12 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = hypot(x - sx, y - sy)
-            put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
+            put((whole, real), n, mesh.twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
             key = g + estimate_of(mesh, endpoints, whole, real, n)
-            if key < bounds[UPPER]:
-                size = push((keys, values), size, key, n)
+            if key < work.bounds[UPPER]:
+                size = push(work.heap, size, key, n)
                 n += 1
-    counts[N], counts[SIZE] = n, size
+    work.counts[N], work.counts[SIZE] = n, size
     return DONE
 
 
@@ -96,7 +178,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
     goals
         int32 polygons that contain the goal.
     work
-        See `seed`.
+        An `IntervalWork`.
     factor
         The answer is good enough when it is at most this factor times the lower bound; >= 1.
     limit
@@ -107,14 +189,14 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
     int
         `DONE`, `PAUSED` or `WORK_FULL`.
     """
-    first, polygon_of = mesh[3], mesh[7]
-    whole, real, keys, values, best, _, counts, bounds = work
-    heap = (keys, values)
+    first, polygon_of = mesh.first, mesh.polygon_of
+    whole, real, heap = work.whole, work.real, work.heap
+    counts, bounds = work.counts, work.bounds
     size, status = counts[SIZE], DONE
     while size and status == DONE:
-        top, key = np.int64(values[0]), keys[0]
+        top, key = np.int64(heap.values[0]), heap.keys[0]
         root = whole[top, ROOT]
-        if root >= 0 and real[top, G] > best[root] + _SAME:
+        if root >= 0 and real[top, G] > work.best[root] + _SAME:
             size = pop(heap, size)
             continue
         if key * factor >= bounds[UPPER]:
@@ -146,7 +228,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
                     if estimated < bounds[UPPER]:
                         size = push(heap, size, max(key, estimated), new)
     counts[SIZE] = size
-    least = min(keys[0], bounds[UPPER]) if size else bounds[UPPER]
+    least = min(heap.keys[0], bounds[UPPER]) if size else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
     return status
 
@@ -158,7 +240,8 @@ def _keep(work, made, n):
 
     Return the only node to expand, -1 for none or several.
     """
-    whole, real, _, _, best, touched, counts, bounds = work
+    whole, real, best = work.whole, work.real, work.best
+    counts, bounds = work.counts, work.bounds
     kept = made
     n_open = 0
     only = -1
@@ -175,7 +258,7 @@ def _keep(work, made, n):
                     continue
                 if g < best[root]:
                     if best[root] == np.inf:
-                        touched[counts[TOUCHED]] = root
+                        work.touched[counts[TOUCHED]] = root
                         counts[TOUCHED] += 1
                     best[root] = g
             only = kept
@@ -196,10 +279,10 @@ def path_to(mesh, endpoints, whole, node):
 
     It holds the start, the corners at which it turns, and the goal.
 
-    `mesh`, `endpoints`: see `successors`; `whole`: nodes, see `seed`; `node`: the last node of the
-    path, -1 if the path is one segment.
+    `mesh`, `endpoints`: see `successors`; `whole`: nodes of an `IntervalWork`; `node`: the last one
+    of the path, -1 if the path is one segment.
     """
-    cx, cy = mesh[0], mesh[1]
+    cx, cy = mesh.x, mesh.y
     sx, sy, tx, ty = endpoints
     at, room = node, 2
     while at >= 0:
@@ -234,13 +317,26 @@ def put_corner(path, n, x, y):
     return n - 1
 
 
+@njit(cache=True, nogil=True)
+def path_through(mesh, endpoints, nodes):
+    """Return the path through some corners, see `path_to`."""
+    sx, sy, tx, ty = endpoints
+    n = len(nodes) + 1
+    path = np.empty((n + 1, 2))
+    path[n, 0], path[n, 1] = ty, tx
+    for k in range(len(nodes) - 1, -1, -1):
+        n = put_corner(path, n, mesh.x[nodes[k]], mesh.y[nodes[k]])
+    n = put_corner(path, n, sx, sy)
+    return path[n:].copy()
+
+
 # Kernels of a binary heap of keys and values.
 
 
 @njit(cache=True, nogil=True)
 def push(heap, size, key, value):
     """Put an entry into a binary heap; return the new size."""
-    keys, values = heap
+    keys, values = heap.keys, heap.values
     at = size
     while at > 0:
         above = (at - 1) >> 1
@@ -255,7 +351,7 @@ def push(heap, size, key, value):
 @njit(cache=True, nogil=True)
 def pop(heap, size):
     """Take the least entry out of a binary heap; return the new size."""
-    keys, values = heap
+    keys, values = heap.keys, heap.values
     size -= 1
     key, value = keys[size], values[size]
     at = 0
@@ -271,142 +367,3 @@ def pop(heap, size):
         at = below
     keys[at], values[at] = key, value
     return size
-
-
-# Kernels of the graph of corners: its edges, and distances in it from landmarks.
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def edges_of(mesh, component, limit):
-    """Find the edges of the graph.
-
-    An edge joins two corners that see each other, and at both of which a path along the segment
-    between them may bend.
-
-    `mesh`: see `successors`; `component`: int32 (p,), below 0 for polygons that were cut out;
-    `limit`: most edges. Returns int64 (2 n + 1,) first edge of each corner and quadrant, see
-    `lobe_of`; int32 (m,) the corner at which each edge ends. Each edge occurs in both directions.
-    If there are more edges than the limit, the last entry of the first array is -1.
-    """
-    kinds = mesh[2]
-    n = len(kinds)
-    wall = walls_at(mesh, component)
-    room = view_room(1024)
-    nowhere = 0.0, 0.0, np.empty(0, np.int32)
-    first = np.zeros(2 * n + 1, np.int64)
-    heads = np.empty(16 * n, np.int32)
-    m = 0
-    for corner in range(n):
-        for lobe in range(2):
-            found = 0
-            if kinds[corner] < 4 and wall[corner] >= 0:
-                found, room = see_quadrant(mesh, corner, wall[corner], lobe, nowhere, room)
-            if m + found > limit:
-                first[2 * n] = -1
-                return first, heads[:0].copy()
-            while m + found > len(heads):
-                heads = grow(heads)
-            heads[m : m + found] = room[2][:found]
-            m += found
-            first[2 * corner + lobe + 1] = m
-    return first, heads[:m].copy()
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def landmarks_of(mesh, graph, component, source, table):
-    """Compute the distances of all corners from landmarks, in free space.
-
-    Those in the graph are longer where a shortest path leaves the landmark, or arrives, in the
-    quadrant opposite to the blocked cell.
-
-    Parameters
-    ----------
-    mesh
-        See `successors`.
-    graph
-        The graph of `edges_of`.
-    component
-        See `edges_of`.
-    source
-        The first landmark: the others are in the same part of the graph. Each is the corner
-        farthest from those before.
-    table
-        float64 (n, landmarks), filled in.
-    """
-    cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
-    (offsets, heads), (n, number) = graph, table.shape
-    wall = walls_at(mesh, component)
-    room = view_room(1024)
-    heap = np.empty(n), np.empty(n, np.int32)
-    arrived, nearest = np.empty((number, n)), np.full(n, np.inf)
-    points = np.stack((cy, cx), axis=1)
-    landmark = source
-    for k in range(number):
-        # One row for each landmark while they are found.
-        distances = arrived[k]
-        distances[:] = np.inf
-        # The first segment may leave in the third quadrant, for any corner that is seen there.
-        is_seen = np.zeros(n, np.bool_)
-        sight = first, begins, points, is_seen
-        _, room = see_quadrant(mesh, landmark, wall[landmark], 2, sight, room)
-        # Corners of a polygon round the landmark are seen because it is convex, itself too.
-        slot = wall[landmark]
-        while slot >= 0:
-            low, high = first[polygon_of[slot]], first[polygon_of[slot] + 1]
-            is_seen[begins[low:high]] = True
-            slot = twins[slot - 1 if slot > low else high - 1]
-        size = 0
-        for other in range(n):
-            if is_seen[other] and kinds[other] < 4:
-                distances[other] = distance(cx[landmark], cy[landmark], cx[other], cy[other])
-                size = push(heap, size, distances[other], other)
-        # Farther corners are reached along the edges, from the nearest one on.
-        while size:
-            here, cost = heap[1][0], heap[0][0]
-            size = pop(heap, size)
-            if cost > distances[here]:
-                continue
-            low, high = offsets[2 * here], offsets[2 * here + 2]
-            while size + high - low > len(heap[0]):
-                heap = (grow(heap[0]), grow(heap[1]))
-            for other in heads[low:high]:
-                reached = cost + distance(cx[here], cy[here], cx[other], cy[other])
-                if reached < distances[other]:
-                    distances[other] = reached
-                    size = push(heap, size, reached, other)
-        # The next landmark is far from all so far.
-        nearest = np.minimum(nearest, distances)
-        landmark = np.argmax(np.where(nearest < np.inf, nearest, -1.0))
-    # The last one may arrive in the third quadrant.
-    before = np.ascontiguousarray(arrived.T)
-    table[:] = before
-    nowhere = 0.0, 0.0, np.empty(0, np.int32)
-    for corner in range(n):
-        if kinds[corner] >= 4 or wall[corner] < 0:
-            continue
-        found, room = see_quadrant(mesh, corner, wall[corner], 2, nowhere, room)
-        for other in room[2][:found]:
-            further = distance(cx[corner], cy[corner], cx[other], cy[other])
-            for k in range(number):
-                table[corner, k] = min(table[corner, k], before[other, k] + further)
-
-
-@njit(cache=True, nogil=True)
-def path_through(mesh, endpoints, nodes):
-    """Return the path through some corners, see `path_to`."""
-    sx, sy, tx, ty = endpoints
-    n = len(nodes) + 1
-    path = np.empty((n + 1, 2))
-    path[n, 0], path[n, 1] = ty, tx
-    for k in range(len(nodes) - 1, -1, -1):
-        n = put_corner(path, n, mesh[0][nodes[k]], mesh[1][nodes[k]])
-    n = put_corner(path, n, sx, sy)
-    return path[n:].copy()
-
-
-@njit(cache=True, nogil=True)
-def into_cell(low, at):
-    """Round a coordinate to the grain of exact tests, and move it into a cell."""
-    return min(max(np.rint(at * GRAIN) / GRAIN, float(low)), low + 1.0)

@@ -12,12 +12,12 @@ exact and never exceed the distance.
 import math
 
 import numpy as np
-from numba import types
 from numba.extending import overload
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.contraction import pack
+from hybridnav.search.mesh.kernels.state import Target, Targets, ViewRoom
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2
@@ -75,7 +75,7 @@ def _pend(room, n, slot, marks, lx, ly, rx, ry):
     Parameters
     ----------
     room
-        int32 (m, 2) slots and marks, float64 (m, 4) points on the left and right ray.
+        A `ViewRoom`.
     n
         Number of intervals before.
     slot, marks
@@ -83,7 +83,7 @@ def _pend(room, n, slot, marks, lx, ly, rx, ry):
     lx, ly, rx, ry
         Points on the left and right ray, in cells.
     """
-    whole, real = room[0], room[1]
+    whole, real = room.whole, room.real
     whole[n, 0], whole[n, 1] = slot, marks
     real[n, 0], real[n, 1], real[n, 2], real[n, 3] = lx, ly, rx, ry
     return n + 1
@@ -91,8 +91,8 @@ def _pend(room, n, slot, marks, lx, ly, rx, ry):
 
 @njit(cache=True, nogil=True)
 def view_room(n):
-    """Return the room of `see_from_point` for n pending intervals and corners."""
-    return np.empty((n, 2), np.int32), np.empty((n, 4)), np.empty(n, np.int32)
+    """Return room for n pending intervals and corners."""
+    return ViewRoom(np.empty((n, 2), np.int32), np.empty((n, 4)), np.empty(n, np.int32))
 
 
 @njit(cache=True, nogil=True)
@@ -101,17 +101,14 @@ def see_from_point(mesh, x, y, starts, target, room, found):
 
     Parameters
     ----------
-    mesh
-        See `successors`.
+    mesh, room
+        A `Mesh`, a `ViewRoom`.
     x, y
         The point.
     starts
         int32 polygons that contain it.
     target
-        x and y of another point, and int32 polygons that contain it, none of which contains the
-        first point.
-    room
-        int32 (n, 2) and float64 (n, 4) for pending intervals, int32 for the corners.
+        A `Target`, or `Targets`.
     found
         Number of corners already in the room.
 
@@ -120,12 +117,12 @@ def see_from_point(mesh, x, y, starts, target, room, found):
     tuple
         Number of corners afterwards, -1 if the room is too small; whether the other point is seen.
     """
-    cx, cy, kinds, first, begins, finishes, twins, _ = mesh
-    seen = room[2]
+    cx, cy, kinds, twins = mesh.x, mesh.y, mesh.kinds, mesh.twins
+    first, begins, finishes, seen = mesh.first, mesh.begins, mesh.finishes, room.seen
     n = 0
     for polygon in starts:
         low, high = first[polygon], first[polygon + 1]
-        if found + high - low > len(seen) or n + high - low > len(room[0]):
+        if found + high - low > len(seen) or n + high - low > len(room.whole):
             return -1, False
         for slot in range(low, high):
             u, w = begins[slot], finishes[slot]
@@ -158,15 +155,15 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
     int
         Number of corners afterwards, -1 if the room is too small.
     """
-    cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
-    x, y = cx[corner], cy[corner]
-    rx, ry, lx, ly = axes(kinds[corner], lobe)
+    first, begins, twins, polygon_of = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
+    x, y = mesh.x[corner], mesh.y[corner]
+    rx, ry, lx, ly = axes(mesh.kinds[corner], lobe)
     quadrant = (x + rx, y + ry, x + lx, y + ly)
     n = 0
     while slot >= 0:
         polygon = polygon_of[slot]
         low, high = first[polygon], first[polygon + 1]
-        if found + high - low > len(room[2]) or n + high - low > len(room[0]):
+        if found + high - low > len(room.seen) or n + high - low > len(room.whole):
             return -1
         last = slot - 1 if slot > low else high - 1
         sides = (slot, begins[last], twins[last] < 0)
@@ -177,12 +174,12 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
 
 
 @njit(cache=True, nogil=True)
-def walls_at(mesh, component):
+def walls_at(mesh):
     """Return a slot of a wall that begins at each corner, int32 (n,), -1 for none."""
-    begins, twins, polygon_of = mesh[4], mesh[6], mesh[7]
-    wall = np.full(len(mesh[2]), -1, np.int32)
+    begins, twins = mesh.begins, mesh.twins
+    wall = np.full(len(mesh.kinds), -1, np.int32)
     for slot in range(len(begins)):
-        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
+        if twins[slot] < 0 and mesh.component[mesh.polygon_of[slot]] >= 0:
             wall[begins[slot]] = slot
     return wall
 
@@ -192,7 +189,7 @@ def see_quadrant(mesh, corner, slot, lobe, target, room):
     """Return the number of corners seen, see `see_from_corner`, and the room, which may grow."""
     found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
     while found < 0:
-        room = view_room(2 * len(room[2]))
+        room = view_room(2 * len(room.seen))
         found = see_from_corner(mesh, corner, slot, lobe, target, room, 0)
     return found, room
 
@@ -215,7 +212,8 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
     n
         Number of pending intervals.
     """
-    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
+    cx, cy, kinds, finishes = mesh.x, mesh.y, mesh.kinds, mesh.finishes
+    first, twins, polygon_of = mesh.first, mesh.twins, mesh.polygon_of
     rx, ry, lx, ly = quadrant
     # The corners beside the point; the far one is the near one of the next polygon.
     slot, far, is_last = sides
@@ -235,7 +233,7 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
             and (w == far or not _is_behind(mesh, x, y, far, w))
             and (w != far or is_last)
         ):
-            room[2][found] = w
+            room.seen[found] = w
             found += 1
         twin = twins[slot]
         is_seen = (is_u and turn_of(x, y, lx, ly, ux, uy) < 0) or (right_u < 0 < right_w)
@@ -254,41 +252,43 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
 @njit(cache=True, nogil=True)
 def _is_behind(mesh, x, y, corner, other):
     """Return whether a corner lies, seen from a point, behind another that paths may bend round."""
-    cx, cy = mesh[0], mesh[1]
+    cx, cy = mesh.x, mesh.y
     ux, uy, wx, wy = cx[corner], cy[corner], cx[other], cy[other]
-    if mesh[2][corner] >= _BENDING or turn_of(x, y, ux, uy, wx, wy) != 0:
+    if mesh.kinds[corner] >= _BENDING or turn_of(x, y, ux, uy, wx, wy) != 0:
         return False
     return (ux - x) * (wx - x) + (uy - y) * (wy - y) > 0.0
 
 
+def _is_seen(target, polygon, x, y, rays):
+    lx, ly, rx, ry = rays
+    for goal in target.polygons:
+        if goal == polygon and turn_of(x, y, rx, ry, target.x, target.y) >= 0:
+            return turn_of(x, y, lx, ly, target.x, target.y) <= 0
+    return False
+
+
+def _are_seen(target, polygon, x, y, rays):
+    begin, points = target.begin, target.points
+    lx, ly, rx, ry = rays
+    for k in target.members[begin[polygon] : begin[polygon + 1]]:
+        tx, ty = points[k, 1], points[k, 0]
+        if turn_of(x, y, rx, ry, tx, ty) >= 0 and turn_of(x, y, lx, ly, tx, ty) <= 0:
+            target.is_seen[k] = True
+    return False
+
+
+_LOOKS = {Target: _is_seen, Targets: _are_seen}
+
+
 def has_target(target, polygon, x, y, rays):
-    """Return whether a target in a polygon is seen from a point between two rays."""
+    """Return whether a `Target` in a polygon is seen from a point between two rays; of `Targets`,
+    mark those that are."""
+    return _LOOKS[type(target)](target, polygon, x, y, rays)
 
 
 @overload(has_target)
-def has_target_of_kind(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
-    """Return what stands for `has_target`: one target, or many, of which those seen are marked."""
-
-    def one(target, polygon, x, y, rays):
-        tx, ty, goals = target
-        lx, ly, rx, ry = rays
-        for goal in goals:
-            if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
-                return turn_of(x, y, lx, ly, tx, ty) <= 0
-        return False
-
-    def many(target, polygon, x, y, rays):
-        begin, listed, points, is_seen = target
-        lx, ly, rx, ry = rays
-        for k in listed[begin[polygon] : begin[polygon + 1]]:
-            tx, ty = points[k, 1], points[k, 0]
-            if turn_of(x, y, rx, ry, tx, ty) >= 0 and turn_of(x, y, lx, ly, tx, ty) <= 0:
-                is_seen[k] = True
-        return False
-
-    if isinstance(target[0], types.Float):
-        return one
-    return many
+def _has_target_of_class(target, polygon, x, y, rays):  # noqa: ARG001 - numba's rule
+    return _LOOKS[target.instance_class]
 
 
 @njit(cache=True, nogil=True)
@@ -302,8 +302,9 @@ def _spread(mesh, x, y, target, room, n, found):
     n
         Number of pending intervals.
     """
-    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
-    whole, real, seen = room
+    cx, cy, kinds, finishes = mesh.x, mesh.y, mesh.kinds, mesh.finishes
+    first, twins, polygon_of = mesh.first, mesh.twins, mesh.polygon_of
+    whole, real, seen = room.whole, room.real, room.seen
     is_target_seen = False
     while n:
         n -= 1
@@ -405,10 +406,10 @@ def classes_that_follow():
 def arcs_of(mesh, first, heads):
     """Build the arcs of the graph of corners, as `contract` takes them.
 
-    `mesh`: see `successors`; `first`, `heads`: results of `edges_of`. Returns int64 (n + 1,),
+    `mesh`: a `Mesh`; `first`, `heads`: results of `edges_of`. Returns int64 (n + 1,),
     offsets of the arcs of each corner; int64 (m, 2), these arcs.
     """
-    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    cx, cy, kinds = mesh.x, mesh.y, mesh.kinds
     arcs = np.empty((len(heads), 2), np.int64)
     for corner in range(len(kinds)):
         x, y = cx[corner], cy[corner]
