@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,19 @@ FARTHEST_M = 1e9
 Earth, in any frame, and keeps the centre of the smallest cell exact to a hundredth of its side."""
 _MANY = 2.0**40
 """More cells than any map has."""
+
+
+class FramePose(NamedTuple):
+    """A frame in numbers."""
+
+    resolution: float
+    """Side of a cell in metres."""
+    x: float
+    """Of the origin, in metres."""
+    y: float
+    cosine: float
+    """Of the yaw."""
+    sine: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +99,9 @@ class Frame:
         object.__setattr__(self, "_turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
 
     @property
-    def for_kernels(self) -> tuple[float, float, float, float, float]:
-        """Side of a cell, `(x, y)` of the origin in metres, cosine and sine of the yaw."""
-        return (self.resolution_m, *self.origin_m, *self._turn)
+    def for_kernels(self) -> FramePose:
+        """The frame as kernels take it."""
+        return FramePose(self.resolution_m, *self.origin_m, *self._turn)
 
     @property
     def cell_area_m2(self) -> float:

@@ -16,12 +16,12 @@ def centres(cells, frame):
 
     `cells` are (row, col), int64 (n, 2), and `frame` is `Frame.for_kernels`.
     """
-    resolution, origin_x, origin_y, cosine, sine = frame
+    resolution, cosine, sine = frame.resolution, frame.cosine, frame.sine
     points = np.empty((cells.shape[0], 2), np.float64)
     for i in range(cells.shape[0]):
         x, y = (cells[i, 1] + 0.5) * resolution, (cells[i, 0] + 0.5) * resolution
-        points[i, 0] = origin_x + cosine * x - sine * y
-        points[i, 1] = origin_y + sine * x + cosine * y
+        points[i, 0] = frame.x + cosine * x - sine * y
+        points[i, 1] = frame.y + sine * x + cosine * y
     return points
 
 
@@ -29,12 +29,12 @@ def centres(cells, frame):
 @njit(cache=True, nogil=True)
 def points_at(positions, frame):
     """Return the points of positions in grid units, float64 (n, 2), as `Frame.points_of_grid`."""
-    resolution, origin_x, origin_y, cosine, sine = frame
+    resolution, cosine, sine = frame.resolution, frame.cosine, frame.sine
     points = np.empty((positions.shape[0], 2), np.float64)
     for i in range(positions.shape[0]):
         x, y = positions[i, 1] * resolution, positions[i, 0] * resolution
-        points[i, 0] = origin_x + cosine * x - sine * y
-        points[i, 1] = origin_y + sine * x + cosine * y
+        points[i, 0] = frame.x + cosine * x - sine * y
+        points[i, 1] = frame.y + sine * x + cosine * y
     return points
 
 
@@ -81,10 +81,9 @@ def position_of(x, y, frame):
 
     `x` and `y` are in metres, map frame, and `frame` is `Frame.for_kernels`.
     """
-    resolution, origin_x, origin_y, cosine, sine = frame
-    along, across = x - origin_x, y - origin_y
-    row = (cosine * across - sine * along) / resolution
-    return row, (cosine * along + sine * across) / resolution
+    along, across = x - frame.x, y - frame.y
+    row = (frame.cosine * across - frame.sine * along) / frame.resolution
+    return row, (frame.cosine * along + frame.sine * across) / frame.resolution
 
 
 _SLIVER_CELLS = 1e-9

@@ -147,7 +147,9 @@ def mark_blocks(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = N
     n_vertices, n_edges = _base_kernels.mark_base(
         kinds,
         power,
-        (TEMPLATES[0], steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]),
+        _base_kernels.BaseTemplates(
+            TEMPLATES.vertex_end, steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]
+        ),
         record.vertex_end,
         record.vertex_parent,
         record.edge_end,
@@ -166,7 +168,7 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
     marked = mark_blocks(kinds, limit, in_blocks=in_blocks)
     record, power, new_edge, n_vertices, n_edges = marked
     vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
-    darts = Darts(*_base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges))
+    darts = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
     return Start(record, darts, vertices, 0, kinds.shape[1])
 
 

@@ -13,7 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.refine.kernels import motions as kernels
-from hybridnav.refine.kernels.sweep import look_ahead
+from hybridnav.refine.kernels.sweep import Body, look_ahead
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -109,8 +109,8 @@ class MotionCheck:
         if solid is not None and not self._is_disc:
             occupied = self._grid.measured == CellClass.OCCUPIED
             occupied.flat[solid] = True
-            around = look_ahead(occupied), _distance_cells(occupied)
-            other._body = (*around, *self._body[2:])  # noqa: SLF001
+            around = {"ahead": look_ahead(occupied), "clearance": _distance_cells(occupied)}
+            other._body = self._body._replace(**around)  # noqa: SLF001
         return other
 
     def state_valid(self, x: float, y: float, yaw: float = 0.0) -> bool:
@@ -314,15 +314,15 @@ def _place_of(frame: Frame) -> FloatArray:
     return np.array([*frame.origin_m, *rates])
 
 
-def _no_body() -> tuple[Any, ...]:
+def _no_body() -> Body:
     """Return a body of the kernels for a disc, which has only its base."""
     nowhere = np.zeros((0, 0), dtype=np.bool_)
     distance = nowhere.astype(np.float32)
     offsets = np.zeros(1, dtype=np.int64)
-    return look_ahead(nowhere), distance, np.empty((0, 2)), offsets, np.zeros(2)
+    return Body(look_ahead(nowhere), distance, np.empty((0, 2)), offsets, np.zeros(2))
 
 
-def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ...]:
+def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> Body:
     """Return a body of the kernels for a footprint, with the cells that it must not meet."""
     from hybridnav.refine.footprint import Footprint  # noqa: PLC0415 - loads shapely
 
@@ -345,7 +345,7 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ..
     parts = footprint.convex_parts()
     offsets = np.cumsum([0, *map(len, parts)])
     occupied = grid.measured == CellClass.OCCUPIED
-    return (
+    return Body(
         look_ahead(occupied),
         _distance_cells(occupied),
         np.concatenate(parts) / grid.resolution_m,

@@ -196,7 +196,9 @@ def _cut_in(ground: Ground, angle_rad: float, within: BoolArray, cut: BoolArray)
     """Add the gaps between walls on lines in a direction, and square to it."""
     slack = max(1, round(_SLACK_M / ground.resolution_m))
     along = cos(angle_rad) / ground.resolution_m
-    lengths = tuple(max(1, round(length_m * along)) for length_m in _LENGTHS_M)
+    lengths = _segmentation_kernels.GapLengths(
+        *(max(1, round(length_m * along)) for length_m in _LENGTHS_M)
+    )
     for turned in (False, True):
         wall, free, inside, out = (
             np.ascontiguousarray(mask.T if turned else mask)

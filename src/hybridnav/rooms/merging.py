@@ -152,9 +152,7 @@ class JudgedSegments:
 def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     """Measure segments and the pairs that touch."""
     reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
-    free, peaks, moments, rims, begins, sizes, areas, diameters, corners = (
-        _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
-    )
+    shapes = _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
     pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
     order, opened, run_begins, run_ends = _runs(pairs, n)
     _, border, border_begins, border_ends = _runs(
@@ -170,19 +168,12 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     if len(opened):
         widest[at] = np.maximum.reduceat(clear[order], run_begins)
         clearances[at] = np.add.reduceat(clear[order], run_begins)
-    hulls = np.empty((2 * len(corners) + 16, 2))
-    hulls[: len(corners)] = corners
+    hulls = np.empty((2 * len(shapes.hulls) + 16, 2))
+    hulls[: len(shapes.hulls)] = shapes.hulls
     first_half, next_half = _halves(endpoints, n)
     return SegmentState(
-        free=free,
-        moments=moments,
-        rims=rims,
-        peaks=peaks,
+        **shapes._replace(hulls=hulls)._asdict(),
         opened=np.bincount(endpoints.ravel(), np.repeat(open_sides, 2), n),
-        hull_areas=areas,
-        diameters=diameters,
-        hull_begins=begins,
-        hull_sizes=sizes,
         degrees=np.bincount(endpoints.ravel(), minlength=n),
         first_half=first_half,
         versions=np.zeros(n, np.int64),
@@ -199,8 +190,7 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
         run_ends=end,
         sides=sides[order],
         wall=ndimage.binary_dilation(ground.wall, np.ones((3, 3), dtype=np.bool_)),
-        hulls=hulls,
-        hulls_used=np.array([len(corners)]),
+        hulls_used=np.array([len(shapes.hulls)]),
         mark=np.full(n, -1),
     )
 

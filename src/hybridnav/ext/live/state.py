@@ -11,7 +11,7 @@ from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
-from hybridnav.ext.live.kernels.near import box_groups
+from hybridnav.ext.live.kernels.near import PlaceColumns, box_groups
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.contraction import Window
@@ -61,7 +61,7 @@ class PlaceTable:
         self._rows = np.empty(0, PLACE) if rows is None else rows
         self._used = self._count = len(self._numbers)
         self._is_own = False
-        self._columns: tuple[AnyArray, ...] | None = None
+        self._columns: PlaceColumns | None = None
 
     def next_version(self) -> PlaceTable:
         """Return a table that shares all with this one."""
@@ -112,12 +112,12 @@ class PlaceTable:
         gone = list(places)
         self.write(gone, np.zeros(len(gone), PLACE))
 
-    def columns(self) -> tuple[AnyArray, ...]:
+    def columns(self) -> PlaceColumns:
         """Return the numbers, and all of `PLACE`, to change."""
         self._own()
         if self._columns is None:
             names = PLACE.names or ()
-            self._columns = self._numbers, *(self._rows[name] for name in names)
+            self._columns = PlaceColumns(self._numbers, *(self._rows[name] for name in names))
         return self._columns
 
     def numbers(self, first: int = 0) -> list[int]:
@@ -369,7 +369,9 @@ class CellDraft:
             window.planes,
             window.low,
             self.places.columns(),
-            (made, moved, lost, first, self.next_place, self.before.next_place),
+            _merge_kernels.AlteredPlaces(
+                made, moved, lost, first, self.next_place, self.before.next_place
+            ),
             joined,
             self.limit,
         )

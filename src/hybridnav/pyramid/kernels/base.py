@@ -3,9 +3,12 @@
 They find also the levels at which its cells join as they do elsewhere, or survive.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav.pyramid.kernels.darts import Darts
 from hybridnav.pyramid.kernels.decimation import FIRST_MAY_SURVIVE, SECOND_MAY_SURVIVE
 
 _SURVIVES = 255
@@ -56,7 +59,18 @@ def raise_powers(power, squares, halves, p):
                         power[i, j] = p
 
 
-@guarded
+class BaseTemplates(NamedTuple):
+    """`Templates` on one map."""
+
+    vertex_end: np.ndarray
+    parent: np.ndarray
+    """int64, `steps_to_parents`."""
+    inside_east: np.ndarray
+    inside_north: np.ndarray
+    across_east: np.ndarray
+    across_north: np.ndarray
+
+
 @njit(cache=True, nogil=True)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record for the blocks alone; return the counts of their vertices and edges.
@@ -68,7 +82,7 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
     power
         The powers of blocks; see `block_powers`.
     templates
-        The arrays of `Templates`.
+        `BaseTemplates`.
     vertex_end, vertex_parent
         By flat cell, the record of vertices; filled in.
     edge_end
@@ -76,7 +90,8 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
     new_edge
         int32 by base edge, receives the new numbers of the edges that stay.
     """
-    ends, offset, inside_east, inside_north, across_east, across_north = templates
+    inside_east, inside_north = templates.inside_east, templates.inside_north
+    across_east, across_north = templates.across_east, templates.across_north
     rows, cols = classes.shape
     n_vertices = 0
     n_edges = 0
@@ -88,13 +103,13 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
                 vertex_parent[cell] = -1
                 continue
             p = power[row >> 1, col >> 1]
-            end = ends[p, row & 15, col & 15]
+            end = templates.vertex_end[p, row & 15, col & 15]
             vertex_end[cell] = end
             if end == _SURVIVES:
                 vertex_parent[cell] = -1
                 n_vertices += 1
             else:
-                vertex_parent[cell] = cell + offset[p, row & 15, col & 15]
+                vertex_parent[cell] = cell + templates.parent[p, row & 15, col & 15]
             end = inside_east[p, row & 7, col & 7]
             if end == 0 and col + 1 < cols and classes[row, col + 1] != 0:
                 end = across_east[min(p, power[row >> 1, (col + 1) >> 1]), row & 7]
@@ -205,7 +220,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
             sigma[last] = first
             protected[first] |= open_corner
     protect_faces(sigma, protected)
-    return sigma, origin, sweep, protected, base_edge
+    return Darts(sigma, origin, sweep, protected, base_edge)
 
 
 @njit(cache=True, nogil=True)

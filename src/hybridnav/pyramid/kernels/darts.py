@@ -84,7 +84,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     cols
         Columns of the grid.
     """
-    sigma, origin, sweep, protected, base_edge = darts
+    sigma, origin, sweep, base_edge = darts.sigma, darts.origin, darts.sweep, darts.base_edge
     one = np.uint32(1)
     for e in range(base_edge.size):
         state[e] = ALIVE
@@ -105,7 +105,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
                 while state[following >> one] == CONTRACTED:
                     following = np.uint32(sigma[following ^ one])
                 sigma[d] = following
-                if not protected[d ^ 1]:
+                if not darts.protected[d ^ 1]:
                     touched[count] = d ^ 1
                     count += 1
             inverse[following] = d
@@ -210,7 +210,8 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
     all_whole
         Whether no vertex is in pieces at this level.
     """
-    sigma, origin, sweep, protected, base_edge = darts
+    sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
+    protected, base_edge = darts.protected, darts.base_edge
     n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
     for i in range(touched.size + n_darts):
         start = touched[i] if i < touched.size else np.int32(i - touched.size)
@@ -258,7 +259,8 @@ def compact_darts(darts, state, new_edge, level, edge_end):
     The level of each gone edge is written to `edge_end`, by base edge: 2 * level for a contracted
     edge, 2 * level + 1 for a removed one.
     """
-    sigma, origin, sweep, protected, base_edge = darts
+    sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
+    protected, base_edge = darts.protected, darts.base_edge
     one = np.uint32(1)
     n_edges = 0
     for e in range(base_edge.size):

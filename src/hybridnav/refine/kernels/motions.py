@@ -2,8 +2,8 @@
 
 Points are metres and headings radians in the map frame. `place` describes the pose of the grid: its
 origin (x, y), then the length of a metre along x and y in rows and in columns, its yaw, and cells
-in a metre. `marks` is uint8 (rows, cols), one of `BLOCKED`, `OPEN` and `STAND`. `body` is that of
-`_sweep_kernels`.
+in a metre. `marks` is uint8 (rows, cols), one of `BLOCKED`, `OPEN` and `STAND`. `body` is a
+`Body`.
 """
 
 import math

@@ -134,10 +134,10 @@ def _meets(body, base, low, high, places, columns):
 
     `places` are its corners at both headings, not far apart.
     """
-    ahead, _, corners, offsets, radii = body
+    ahead, corners, offsets = body.ahead, body.corners, body.offsets
     before, after = places
     rows, cols = ahead.shape
-    margin = radii[1] * (high - low) ** 2 / 8
+    margin = body.radii[1] * (high - low) ** 2 / 8
     headings = np.empty(16 * corners.shape[0])
     for k in range(offsets.size - 1):
         first, last = offsets[k], offsets[k + 1]
@@ -160,11 +160,11 @@ def _meets(body, base, low, high, places, columns):
 def body_spins(body, row, col, heading, turn):
     """Return whether a body with its base in the map meets no occupied cell while it turns
     there."""
-    ahead, clearance, corners, offsets, radii = body
+    ahead, corners, offsets = body.ahead, body.corners, body.offsets
     if offsets.size == 1:
         return True
-    reach = radii[1]
-    if near(clearance, row, col)[0] >= reach:
+    reach = body.radii[1]
+    if near(body.clearance, row, col)[0] >= reach:
         return True
     if not body_fits(body, row, col, heading) or not body_fits(body, row, col, heading + turn):
         return False

@@ -4,11 +4,6 @@ Positions are those of `taut`; angles are counter-clockwise from the axis of the
 the rows. A motion moves the base along a straight line while the heading turns evenly (`radius` 0),
 or along an arc about a fixed centre, to the left where its signed `radius` in cells is positive.
 
-A body is `(ahead, clearance, corners, offsets, radii)`: columns to the next occupied cell of each
-row, cells from each centre to the nearest occupied one, corners (n, 2) in cells along the heading
-and to its left, offsets of its convex parts among them (none for a disc), and the inscribed and the
-circumscribed radius in cells.
-
 Between two of its states a body lies in the hull of the two, plus a margin: a chord is nowhere
 farther from its arc than radius * angle^2 / 8. So a motion is free if the hull with its margin is
 free, and not free if its middle state collides. Otherwise it is halved, until margins are smaller
@@ -16,6 +11,7 @@ than the rounding of positions. Every state in between is covered.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +29,21 @@ WIDEST = 1.0
 _HALF_DIAGONAL = 0.7075
 """Half the diagonal of a cell, with some slack for distances stored as float32."""
 _FARTHEST = 255
+
+
+class Body(NamedTuple):
+    """A robot among occupied cells."""
+
+    ahead: np.ndarray
+    """Columns to the next occupied cell of each row."""
+    clearance: np.ndarray
+    """float32 (rows, cols), cells from each centre to the nearest occupied one."""
+    corners: np.ndarray
+    """float64 (n, 2), in cells along the heading and to its left."""
+    offsets: np.ndarray
+    """int64, of its convex parts among them; none for a disc."""
+    radii: np.ndarray
+    """float64 (2,), the inscribed and the circumscribed radius in cells."""
 
 
 @njit(cache=True, nogil=True)
@@ -302,10 +313,10 @@ def near(clearance, row, col):
 @njit(cache=True, nogil=True)
 def body_fits(body, row, col, heading):
     """Return whether a body meets no occupied cell with its base at a position of the map."""
-    ahead, clearance, corners, offsets, radii = body
+    ahead, corners, offsets, radii = body.ahead, body.corners, body.offsets, body.radii
     if offsets.size == 1:
         return True
-    at_least, at_most = near(clearance, row, col)
+    at_least, at_most = near(body.clearance, row, col)
     if at_least >= radii[1]:
         return True
     if at_most < radii[0]:
@@ -327,10 +338,10 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     row, col, heading, d_row, d_col, turn, radius
         See `moved`.
     """
-    ahead, clearance, corners, offsets, radii = body
+    ahead, corners, offsets = body.ahead, body.corners, body.offsets
     if offsets.size == 1:
         return True
-    reach = radii[1]
+    reach = body.radii[1]
     length = abs(radius * turn) if radius != 0.0 else hypot(d_row, d_col)
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
     columns = room(ahead.shape[0], reach, length)
@@ -344,7 +355,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
         mid_row, mid_col, mid_heading = moved(
             row, col, heading, d_row, d_col, turn, radius, (part + 0.5) * share
         )
-        at_least, at_most = near(clearance, mid_row, mid_col)
+        at_least, at_most = near(body.clearance, mid_row, mid_col)
         # The base stays within half the length of the part from its middle, and the body within the
         # circumscribed radius of the base: so much clearance needs no corners.
         free = at_least >= reach + 0.5 * length * share
@@ -369,7 +380,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
                 return True
             continue
         # One state that collides settles it; the inscribed disc may show that without corners.
-        if at_most < radii[0]:
+        if at_most < body.radii[0]:
             return False
         # In between, only the corners can decide on the middle.
         if at_least < reach:

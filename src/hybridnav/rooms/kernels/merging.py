@@ -118,6 +118,21 @@ def union_hull(state, u, v):
     return corners, size, area
 
 
+class Shapes(NamedTuple):
+    """Shapes of segments; see `SegmentState`."""
+
+    free: np.ndarray
+    moments: np.ndarray
+    rims: np.ndarray
+    peaks: np.ndarray
+    hull_begins: np.ndarray
+    hull_sizes: np.ndarray
+    hull_areas: np.ndarray
+    diameters: np.ndarray
+    hulls: np.ndarray
+    """float64 (m, 2), corners of the hulls, one after the other."""
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def measure_segments(label_of, reaching, clearance, n):
@@ -197,7 +212,8 @@ def measure_segments(label_of, reaching, clearance, n):
         hull_begins[u] = used
         used += sizes[u]
         diameters[u] = diameter_of(corners, sizes[u])
-    return free, peaks, moments, rims, hull_begins, sizes, areas, diameters, hulls[:used]
+    measured = free, moments, rims, peaks
+    return Shapes(*measured, hull_begins, sizes, areas, diameters, hulls[:used])
 
 
 @guarded

@@ -3,6 +3,7 @@ a boundary between two segments with the forest that judges it.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -100,6 +101,20 @@ def sharpness(rows, cols, angles):
     return found
 
 
+class GapLengths(NamedTuple):
+    """Lengths of gaps between walls, in cells."""
+
+    longest: int
+    door: int
+    """A gap that needs no least wall on either side."""
+    window: int
+    """What is looked at beside a gap."""
+    side: int
+    """The least wall in it on either side."""
+    both: int
+    """The least wall on both sides together."""
+
+
 @njit(cache=True, nogil=True)
 def cut_along(wall, free, slope, within, lengths, share, cut):
     """Set the cells of the gaps between walls that continue each other on a line.
@@ -115,14 +130,13 @@ def cut_along(wall, free, slope, within, lengths, share, cut):
     within
         bool (rows, cols), cells of which at least half of a gap consists.
     lengths
-        In cells: the longest gap; a door, which needs no least wall on either side; the window
-        looked at beside a gap; the least wall in it on either side, and on both together.
+        `GapLengths`.
     share
         Least share of free cells in the gap.
     cut
         bool (rows, cols), filled in.
     """
-    longest, door, window, side, both = lengths
+    window = lengths.window
     rows, cols = wall.shape
     shift = np.empty(cols, np.int64)
     for col in range(cols):
@@ -141,8 +155,9 @@ def cut_along(wall, free, slope, within, lengths, share, cut):
             gap = col - last - 1
             before = walls[last + 1] - walls[max(0, last + 1 - window)]
             behind = walls[min(cols, col + window)] - walls[col]
-            held = gap <= door or min(before, behind) >= side
-            if last >= 0 and 0 < gap <= longest and held and before + behind >= both:
+            held = gap <= lengths.door or min(before, behind) >= lengths.side
+            is_gap = last >= 0 and 0 < gap <= lengths.longest
+            if is_gap and held and before + behind >= lengths.both:
                 n_free = n_within = 0
                 for at in range(last + 1, col):
                     n_free += free[line + shift[at], at]

@@ -12,6 +12,8 @@ A *class* groups arcs by the way they leave a corner, and a table states which t
 shortest path may join there: a bend to the wrong side is never on one.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
@@ -71,13 +73,34 @@ def have_reverses(first, heads):
     return True
 
 
+class _Pool(NamedTuple):
+    """The arcs of a graph, with room for more."""
+
+    begin: np.ndarray
+    """int64 (n,), where the part of each corner begins."""
+    size: np.ndarray
+    """int64 (n,), its arcs."""
+    room: np.ndarray
+    """int64 (n,), and what it has room for."""
+    arcs: np.ndarray
+    """int64 (m, 3)."""
+    used: int
+    """Rows of `arcs` that are used."""
+
+
+class _Left(NamedTuple):
+    """The graph of the corners that are left; see `_Pool` and `contract`."""
+
+    begin: np.ndarray
+    size: np.ndarray
+    pool: np.ndarray
+    kinds: np.ndarray
+    follow: np.ndarray
+
+
 @njit(cache=True, nogil=True)
 def _pool_of(first, arcs):
-    """Return a pool of the arcs of a graph, with room for more.
-
-    The result holds begin, size and room of each corner's part, the pool, and the used number of
-    its rows.
-    """
+    """Return a pool of the arcs of a graph, with room for more."""
     n = first.size - 1
     begin, size, room = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
     pool = np.empty((2 * arcs.shape[0] + 4 * n, 3), np.int64)
@@ -90,7 +113,7 @@ def _pool_of(first, arcs):
             pool[used + k, 2] = -1 << 32 | 1
         room[node] = size[node] + 2
         used += room[node]
-    return begin, size, room, pool, used
+    return _Pool(begin, size, room, pool, used)
 
 
 @njit(cache=True, nogil=True)
@@ -100,8 +123,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
     Parameters
     ----------
     graph
-        Begin and size of parts of the pool, the pool, kinds of corners, classes that may follow:
-        see `contract`.
+        `_Left`.
     node
         The corner that paths must avoid.
     source
@@ -118,7 +140,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
         corners; a heap; the most corners to settle. The heap has room for that number times the
         greatest number of arcs from a corner.
     """
-    begin, size, pool, kinds, follow = graph
+    begin, size, pool = graph.begin, graph.size, graph.pool
     records, heap, most_settled = work
     records[node, 0], records[node, 1] = -1, stamp << 8
     records[source, 0], records[source, 1] = 0, stamp << 8 | 255
@@ -133,7 +155,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
         settled += 1
         n_wanted -= records[at, 2] == stamp
         last = records[at, 1] & 255
-        may_follow = np.int64(-1) if last == 255 else follow[kinds[at], last]
+        may_follow = np.int64(-1) if last == 255 else graph.follow[graph.kinds[at], last]
         for arc in range(begin[at], begin[at] + size[at]):
             packed = pool[arc, 1]
             further = cost + pool[arc, 0]
@@ -154,14 +176,14 @@ def _shortcuts(graph, node, stamp, work, joined):
     for all pairs of arcs from the corner; set where a shortcut joins the two. Result: number of
     shortcuts, number of legs in them, stamp of the last search.
     """
-    begin, size, pool, kinds, follow = graph
+    begin, size, pool = graph.begin, graph.size, graph.pool
     records = work[0]
     n_pairs = n_legs = 0
     end = begin[node] + size[node]
     joined[:] = False
     for one in range(begin[node], end - 1):
         cost, packed = pool[one, 0], pool[one, 1]
-        may_follow = follow[kinds[node], packed >> 6 & 63]
+        may_follow = graph.follow[graph.kinds[node], packed >> 6 & 63]
         stamp += 1
         n_wanted, limit = 0, np.int64(0)
         for two in range(one + 1, end):
@@ -303,7 +325,9 @@ def contract(kinds, first, arcs, follow, effort):
     """
     n = first.size - 1
     most_settled, most_looked = effort
-    begin, size, room, pool, used = _pool_of(first, arcs)
+    made = _pool_of(first, arcs)
+    begin, size, room = made.begin, made.size, made.room
+    pool, used = made.arcs, made.used
     level, taken = np.zeros(n, np.int64), np.empty(n, np.int32)
 
     # Keys that are not known lie below all others: every corner is rated before the first is
@@ -345,7 +369,7 @@ def contract(kinds, first, arcs, follow, effort):
         # The result has 16 bits for a position among the arcs of a corner: hence the last limit.
         if is_given_up or looked > most_looked or size[node] > _MOST_ARCS:
             size[:] = 0
-            return *_packed_arcs(begin, size, pool), taken
+            break
 
         # Shortcuts gave corners more arcs than the graph did: the work arrays follow.
         if most_settled * most >= heap.shape[0]:
@@ -354,7 +378,7 @@ def contract(kinds, first, arcs, follow, effort):
         if n_arcs * n_arcs > joined.size:
             joined = np.empty(2 * n_arcs * n_arcs, np.bool_)
         table = joined[: n_arcs * n_arcs].reshape(n_arcs, n_arcs)
-        graph, work = (begin, size, pool, kinds, follow), (records, heap, most_settled)
+        graph, work = _Left(begin, size, pool, kinds, follow), (records, heap, most_settled)
         n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, table)
 
         # Prefer corners whose removal adds few arcs and legs for those that it takes away. The
@@ -389,7 +413,8 @@ def contract(kinds, first, arcs, follow, effort):
                 pool, used = _room_for((begin, size, room), pool, used, tail, n_wanted)
                 _put_in((begin, size, pool), node, one, table[one], (records, mark))
                 most = max(most, size[tail])
-    return *_packed_arcs(begin, size, pool), taken
+    first, arcs, middles = _packed_arcs(begin, size, pool)
+    return first, arcs, middles, taken
 
 
 @guarded

@@ -77,12 +77,9 @@ class Lattice:
     """Cells on a side of a block."""
 
     @property
-    def arrays(self) -> tuple[AnyArray | int, ...]:
-        """All arrays, and the side of a block, as kernels take them."""
-        return (
-            self.free, self.factors, self.nodes_of, self.parts, self.cells, self.edges_of, self.to,
-            self.costs, self.landmarks, self.side,
-        )  # fmt: skip
+    def arrays(self) -> kernels.Network:
+        """The lattice as kernels take it."""
+        return kernels.Network(*(getattr(self, name) for name in kernels.Network._fields))
 
     @property
     def n_nodes(self) -> int:
@@ -258,25 +255,11 @@ _ROOM = 1024
 """Entries of the open list at first."""
 
 
-class _Work:
-    """Work arrays of one query."""
-
-    def __init__(self, n_nodes: int) -> None:
-        self._arrays: tuple[AnyArray, ...] = (
-            np.empty(n_nodes),
-            np.empty(n_nodes, np.int32),
-            np.zeros(n_nodes, np.int64),
-            np.full(n_nodes, np.inf),
-        )
-        self._heap = np.empty((_ROOM, 2), np.int64)
-        self._generation = 0
-
-    def next(self, *, larger: bool) -> tuple[AnyArray | int, ...]:
-        """Return the arrays with the number of the next query."""
-        if larger:
-            self._heap = np.empty((2 * len(self._heap), 2), np.int64)
-        self._generation += 1
-        return *self._arrays, self._heap, self._generation
+def _work_for(n_nodes: int) -> kernels.Work:
+    """Return the work arrays of queries."""
+    before, mark = np.empty(n_nodes, np.int32), np.zeros(n_nodes, np.int64)
+    rest, heap = np.full(n_nodes, np.inf), np.empty((_ROOM, 2), np.int64)
+    return kernels.Work(np.empty(n_nodes), before, mark, rest, heap, 0)
 
 
 class LatticeLine(NamedTuple):
@@ -319,8 +302,8 @@ class LatticeSearch:
     """
 
     def __init__(self, lattice: Lattice) -> None:
-        self.lattice = lattice
-        self._works = Pool(partial(_Work, len(lattice.cells)))
+        self.lattice, self._arrays = lattice, lattice.arrays
+        self._works = Pool(partial(_work_for, len(lattice.cells)))
 
     def line(
         self, start: Position, goal: Position, cells: tuple[Cell, Cell] | None = None
@@ -347,11 +330,12 @@ class LatticeSearch:
         for row, col in ends_in.tolist():
             if not (0 <= row < rows and 0 <= col < cols and self.lattice.free[row, col]):
                 raise InvalidValueError(f"cell ({row}, {col}) is none that may be entered")
-        with self._works.lent() as work:
-            expanded, larger = kernels.FULL, False
-            while expanded == kernels.FULL:
-                found, expanded = kernels.find_line(
-                    self.lattice.arrays, ends, ends_in, work.next(larger=larger)
-                )
-                larger = True
+        work = self._works.take()
+        while True:
+            work = work._replace(generation=work.generation + 1)
+            found, expanded = kernels.find_line(self._arrays, ends, ends_in, work)
+            if expanded != kernels.FULL:
+                break
+            work = work._replace(heap=np.empty((2 * len(work.heap), 2), np.int64))
+        self._works.give(work)
         return LatticeLine(found if len(found) else None, expanded)

@@ -19,6 +19,7 @@ from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import (
     COLUMN_BITS,
     KIND_BITS,
+    CornerCells,
     arcs_of,
     components,
     legs_that_follow,
@@ -272,8 +273,8 @@ class JumpSearch:
     def __init__(self, graph: JumpGraph) -> None:
         self.graph = graph
         tables = graph.index, graph.ahead, graph.order, graph.shape[1]
-        arcs = graph.first, graph.arcs
-        self.arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
+        corners, arcs = (graph.places, graph.component), (graph.first, graph.arcs)
+        self.arrays = CornerCells(tables, *corners, legs_that_follow(), *arcs)
         self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:

@@ -26,9 +26,9 @@ class JumpLabels:
 
     def __init__(self, search: JumpSearch) -> None:
         graph = search.graph
-        self._tables, self._places, _, follow, _ = search.arrays
+        self._tables, self._places = search.arrays.tables, search.arrays.places
         kinds = (graph.places & 15).astype(np.uint8)
-        self._hierarchy = kinds, graph.first, graph.arcs, follow
+        self._hierarchy = kinds, graph.first, graph.arcs, search.arrays.follow
         self._origin, self.n_corners = graph.origin, graph.n_corners
 
     def placed(self, ends: Ends) -> LongArray:

@@ -26,7 +26,7 @@ def join_nearest(window, low, table, cells, limit):
         The squared distance to a surviving cell stays below it.
     """
     place, of_class = window
-    numbers, area, survivor, box, _ = table
+    numbers, area, survivor, box = table.numbers, table.area, table.survivor, table.box
     cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
 
@@ -148,7 +148,7 @@ def take_out(place, low, table, removed, first):
     int64 (l,)
         Those of them that lost a part, their surviving cell, or a cell at a side of their box.
     """
-    numbers, area, survivor, box, _ = table
+    numbers, area, survivor, box = table.numbers, table.area, table.survivor, table.box
 
     # Ordered by place, the cells of each are one run, and those without a place come first.
     order = np.argsort(removed[1], kind="mergesort")

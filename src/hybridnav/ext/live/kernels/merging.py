@@ -1,5 +1,7 @@
 """Kernels that merge whole places; see `cells` for windows and tables."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
@@ -37,7 +39,7 @@ def merge_pairs(window, low, table, pairs, limit, first):
     int64 (m, 2)
         The pairs that cannot be decided on in the window.
     """
-    numbers, area, box = table[0], table[1], table[3]
+    numbers, area, box = table.numbers, table.area, table.box
     place = window[0]
     stack, size = with_rows(pairs, len(pairs), 64), len(pairs)
     beyond, n_beyond = np.empty((8, 2), np.int64), 0
@@ -94,7 +96,7 @@ def absorbing(window, low, table, lost, limit):
     int64 (m, 2)
         Pairs, as `merge_pairs` takes them.
     """
-    numbers, area, survivor, box, _ = table
+    numbers, area, survivor, box = table.numbers, table.area, table.survivor, table.box
     place, of_class = window
     pairs, count = np.empty((16, 2), np.int64), 0
     around = np.empty(4, np.int64)
@@ -149,7 +151,7 @@ def absorbing(window, low, table, lost, limit):
 def are_beside(window, low, table, rows):
     """Return whether a place is beside another one of its class, which lies in the window."""
     place, of_class = window
-    numbers, box = table[0], table[3]
+    numbers, box = table.numbers, table.box
     i, j = rows
     one, other = numbers[i], numbers[j]
     n_rows, n_cols = place.shape
@@ -182,7 +184,7 @@ def is_inside(box, low, shape, margin):
 @njit(cache=True, nogil=True)
 def may_merge(place, low, table, rows, limit):
     """Return whether two places may merge, and the row of the one whose cell survives."""
-    _, area, survivor, _, part = table
+    area, survivor, part = table.area, table.survivor, table.part
     i, j = rows
     if part[i] != part[j] and min(part[i], part[j]) >= 0:
         return _NO, i
@@ -206,7 +208,7 @@ def reaches(place, low, table, rows, limit):
 
     A place has a cell at each side of its box, which decides on most of them.
     """
-    numbers, _, survivor, box, _ = table
+    numbers, survivor, box = table.numbers, table.survivor, table.box
     i, j = rows
     row, col = np.int64(survivor[i, 0]), np.int64(survivor[i, 1])
     of_rows = max(abs(row - box[j, 0]), abs(box[j, 2] - 1 - row))
@@ -227,7 +229,7 @@ def reaches(place, low, table, rows, limit):
 @njit(cache=True, nogil=True)
 def merge(place, low, table, rows, survives):
     """Put the cells of a place, which lies in the window, into another one."""
-    numbers, area, survivor, box, part = table
+    numbers, area, survivor, box = table.numbers, table.area, table.survivor, table.box
     stays, goes = rows
     number, gone = numbers[stays], numbers[goes]
     for row in range(box[goes, 0] - low[0], box[goes, 2] - low[0]):
@@ -236,7 +238,7 @@ def merge(place, low, table, rows, survives):
                 place[row, col] = number
     area[stays] += area[goes]
     area[goes] = 0
-    part[stays] = max(part[stays], part[goes])
+    table.part[stays] = max(table.part[stays], table.part[goes])
     survivor[stays, 0], survivor[stays, 1] = survivor[survives, 0], survivor[survives, 1]
     for k in range(2):
         box[stays, k] = min(box[stays, k], box[goes, k])
@@ -341,6 +343,23 @@ def let_join(window, low, table, places, waiting, limit):
     return cells, moved, join_each_other(window, cells, beyond)
 
 
+class AlteredPlaces(NamedTuple):
+    """Places that `merge_after` looks at."""
+
+    made: np.ndarray
+    """int64 (n,), new places that `let_join` made, to be brought up to date."""
+    moved: np.ndarray
+    """int64 (k,), those that have another surviving cell."""
+    lost: np.ndarray
+    """int64 (m,), those that only lost cells."""
+    first: int
+    """The first number that was new in this window."""
+    beyond: int
+    """The number beyond the last one."""
+    oldest: int
+    """The least number that the version before does not have."""
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def merge_after(window, low, table, places, cells, limit):
@@ -351,10 +370,7 @@ def merge_after(window, low, table, places, cells, limit):
     window, low, table
         See above; changed.
     places
-        Three arrays and three integers: int64 (n,), new places that `let_join` made, to be brought
-        up to date; int64 (k,), those that have another surviving cell; int64 (m,), those that only
-        lost cells; the first number that was new in this window, that beyond the last one, and the
-        least one that the version before does not have.
+        `AlteredPlaces`.
     cells
         int64 (o,), the flat cells that joined places.
     limit
@@ -365,15 +381,15 @@ def merge_after(window, low, table, places, cells, limit):
     int64 (p, 2)
         The pairs that cannot be decided on in the window.
     """
-    made, moved, lost, first, beyond, oldest = places
-    look_again(window[0], low, table, made, limit)
-    again = with_range(moved, first, beyond)
+    lost = places.lost
+    look_again(window[0], low, table, places.made, limit)
+    again = with_range(places.moved, places.first, places.beyond)
     pairs = np.empty((again.size, 2), np.int64)
     pairs[:, 0] = pairs[:, 1] = again
     if lost.size > 0:  # the whole table is searched
         pairs = np.concatenate((pairs, absorbing(window, low, table, lost, limit)))
     pairs = np.concatenate((pairs, pairs_at(window, cells)))
-    return merge_pairs(window, low, table, pairs, limit, oldest)
+    return merge_pairs(window, low, table, pairs, limit, places.oldest)
 
 
 @njit(cache=True, nogil=True)

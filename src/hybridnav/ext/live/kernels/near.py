@@ -1,13 +1,25 @@
 """Kernels that look round a cell: its neighbours, what changed beside it, and which place is near.
 
 A window has the places and classes of its cells, int32 and uint8 (rows, cols); `low` is its first
-row and column, two integers. A `table` has the columns of the places (see `PlaceTable.columns`),
-the numbers ascending.
+row and column, two integers. A `table` is a `PlaceColumns`.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+
+
+class PlaceColumns(NamedTuple):
+    """The columns of places; see `PLACE`."""
+
+    numbers: np.ndarray
+    """int64 (n,), ascending."""
+    area: np.ndarray
+    survivor: np.ndarray
+    box: np.ndarray
+    part: np.ndarray
 
 
 @njit(cache=True, nogil=True)
@@ -72,12 +84,12 @@ def look_again(place, low, table, numbers, limit):
     int64 (k,)
         The places that have another surviving cell.
     """
-    all_numbers, area, survivor, _, _ = table
+    area, survivor = table.area, table.survivor
     moved, n_moved = np.empty(numbers.size, np.int64), 0
     cells, n_cells = np.empty(16, np.int64), 0
     around = np.empty(4, np.int64)
     for number in numbers:
-        i = np.searchsorted(all_numbers, number)
+        i = np.searchsorted(table.numbers, number)
         measure(place, low, (number, i), table, around)
         if area[i] == 0:
             continue
@@ -105,7 +117,7 @@ def measure(place, low, of_place, table, around):
     `around` receives its box in the window, where it has cells; the box in the table holds it.
     """
     number, i = of_place
-    area, box = table[1], table[3]
+    area, box = table.area, table.box
     n_found = 0
     low_row, low_col, high_row, high_col = place.shape[0], place.shape[1], 0, 0
     for row in range(box[i, 0] - low[0], box[i, 2] - low[0]):

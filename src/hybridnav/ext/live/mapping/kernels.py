@@ -5,6 +5,7 @@ line of the lattice; beams of up to 2^14 cells are compared without rounding in 
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,32 @@ def _on_lattice(cells):
     return np.int64(math.floor(cells * (1 << _SHIFT))) | 1
 
 
+class BeamLimits(NamedTuple):
+    """Ranges of a laser, in metres."""
+
+    low: float
+    """The least range."""
+    high: float
+    """The greatest range."""
+    clear: float
+    """How far a beam without a return clears."""
+    blurred: float
+    """How far before its return a beam ceases to clear."""
+    depth: float
+    """How far behind its return a beam occupies a cell."""
+
+
+class _Walk(NamedTuple):
+    """The first cell of a beam, the state of the walk along it, and what each step adds to that."""
+
+    row: int
+    col: int
+    by_row: int
+    by_col: int
+    more_row: int
+    more_col: int
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def beam_ends(ranges_m, pose, angles, limits, resolution_m):
@@ -35,8 +62,7 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
     angles
         Direction of the first beam and the step to the next one, in radians.
     limits
-        The least and the greatest range, how far a beam without a return clears, how far before its
-        return a beam ceases to clear, and how far behind it a beam occupies a cell, in metres.
+        `BeamLimits`.
     resolution_m
         Side of a cell.
 
@@ -48,7 +74,7 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
         return. int64 (4,): first and last row, first and last column of the cells that they meet.
     """
     x, y, heading = pose
-    low, high, clear, blurred, depth = limits
+    high, clear = limits.high, limits.clear
     n = len(ranges_m)
     hits, ends = np.empty((n, 2), np.int64), np.empty((n + 1, 2), np.int64)
     kinds = np.zeros(n, np.uint8)
@@ -58,11 +84,11 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
     box = np.array([row, row, col, col])
     for k in range(n):
         reach = ranges_m[k]
-        if not reach > low:  # NaN too
+        if not reach > limits.low:  # NaN too
             continue
         kinds[k] = _HIT if reach < high else _CLEAR
-        until = reach - blurred if reach < high else clear
-        reach = reach + depth if reach < high else clear
+        until = reach - limits.blurred if reach < high else clear
+        reach = reach + limits.depth if reach < high else clear
         angle = heading + (angles[0] + k * angles[1])
         cosine, sine = cos(angle), sin(angle)
         if until > 0.0:
@@ -90,7 +116,7 @@ def _start_of_walk(start_row, start_col, end_row, end_col):
     to_col = (
         ((col + 1) << _SHIFT) - start_col if end_col > start_col else start_col - (col << _SHIFT)
     )
-    return row, col, to_row * cols, to_col * rows, cols << _SHIFT, rows << _SHIFT
+    return _Walk(row, col, to_row * cols, to_col * rows, cols << _SHIFT, rows << _SHIFT)
 
 
 @njit(cache=True, nogil=True)
@@ -135,9 +161,8 @@ def add_passes(evidence, seen_at, corner, beams, scan, changes):
     for k in range(n):
         if kinds[k] == _NONE or (ends[k, 0] == ends[n, 0] and ends[k, 1] == ends[n, 1]):
             continue
-        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
-            ends[n, 0], ends[n, 1], ends[k, 0], ends[k, 1]
-        )
+        walk = _start_of_walk(ends[n, 0], ends[n, 1], ends[k, 0], ends[k, 1])
+        row, col, by_row, by_col = walk.row, walk.col, walk.by_row, walk.by_col
         row_step = 1 if ends[k, 0] > ends[n, 0] else -1
         col_step = 1 if ends[k, 1] > ends[n, 1] else -1
         last_row, last_col = ends[k, 0] >> _SHIFT, ends[k, 1] >> _SHIFT
@@ -149,10 +174,10 @@ def add_passes(evidence, seen_at, corner, beams, scan, changes):
             steps_row, steps_col = by_row <= by_col, by_col <= by_row
             if steps_row:
                 row += row_step
-                by_row += more_row
+                by_row += walk.more_row
             if steps_col:
                 col += col_step
-                by_col += more_col
+                by_col += walk.more_col
         i, j = row - first_row, col - first_col
         is_hit = kinds[k] == _HIT and row == hits[k, 0] and col == hits[k, 1]
         if seen_at[i, j] != scan and not is_hit:
@@ -185,9 +210,8 @@ def ray_lengths(classes, obstacle, start, targets):
     start_row, start_col = _on_lattice(start[0]), _on_lattice(start[1])
     for k in range(len(targets)):
         end_row, end_col = _on_lattice(targets[k, 0]), _on_lattice(targets[k, 1])
-        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
-            start_row, start_col, end_row, end_col
-        )
+        walk = _start_of_walk(start_row, start_col, end_row, end_col)
+        row, col, by_row, by_col = walk.row, walk.col, walk.by_row, walk.by_col
         up, right = end_row > start_row, end_col > start_col
         last_row, last_col = end_row >> _SHIFT, end_col >> _SHIFT
         share = 0.0
@@ -202,12 +226,12 @@ def ray_lengths(classes, obstacle, start, targets):
             steps_row, steps_col = by_row <= by_col, by_col <= by_row
             if steps_row:
                 row += 1 if up else -1
-                by_row += more_row
+                by_row += walk.more_row
                 line = (row if up else row + 1) << _SHIFT
                 share = (line - start_row) / (end_row - start_row)
             if steps_col:
                 col += 1 if right else -1
-                by_col += more_col
+                by_col += walk.more_col
                 line = (col if right else col + 1) << _SHIFT
                 share = (line - start_col) / (end_col - start_col)
     return lengths

@@ -9,7 +9,13 @@ import numpy as np
 
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.mapping.kernels import add_hits, add_passes, beam_ends, probabilities
+from hybridnav.ext.live.mapping.kernels import (
+    BeamLimits,
+    add_hits,
+    add_passes,
+    beam_ends,
+    probabilities,
+)
 from hybridnav.ext.live.mapping.scans import LaserScan, checked_array, checked_number
 from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, log_odds_of
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
@@ -193,7 +199,7 @@ class Mapper:
             scan.ranges_m,
             self._on_lattice(scan.pose),
             (scan.start_rad, scan.step_rad),
-            (
+            BeamLimits(
                 model.min_range_m,
                 high_m,
                 min(model.clear_range_m, high_m),

@@ -3,6 +3,8 @@
 Positions are (row, col) in grid units. See `build` for nodes, edges and parts.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
@@ -25,6 +27,38 @@ FULL = -1
 """Number of expanded nodes that says that the open list had no room."""
 
 
+class Network(NamedTuple):
+    """A lattice; see `Lattice` for its fields."""
+
+    free: np.ndarray
+    factors: np.ndarray
+    nodes_of: np.ndarray
+    parts: np.ndarray
+    cells: np.ndarray
+    edges_of: np.ndarray
+    to: np.ndarray
+    costs: np.ndarray
+    landmarks: np.ndarray
+    side: int
+
+
+class Work(NamedTuple):
+    """Work arrays of one query."""
+
+    cost: np.ndarray
+    """float64 (nodes,)."""
+    before: np.ndarray
+    """int32 (nodes,), the nodes before."""
+    mark: np.ndarray
+    """int64 (nodes,)."""
+    rest: np.ndarray
+    """float64 (nodes,), infinite."""
+    heap: np.ndarray
+    """int64 (entries, 2), the open list."""
+    generation: int
+    """A number above those of earlier queries with these arrays, > 0."""
+
+
 @njit(cache=True, nogil=True)
 def _nodes_near(lattice, at, cell, nodes, costs):
     """Find the nodes in and round the block of a position that it sees, and what it costs to reach
@@ -32,12 +66,12 @@ def _nodes_near(lattice, at, cell, nodes, costs):
 
     Return how many there are, and whether the only one is not seen.
 
-    `lattice`: see `find_line`; `at`: float64 (2,), position; `cell`: int64 (2,), (row, col) of the
+    `lattice`: a `Network`; `at`: float64 (2,), position; `cell`: int64 (2,), (row, col) of the
     free cell that holds it: on a side, which one; `nodes`, `costs`: int64 and float64, with room
     for the nodes of nine blocks.
     """
-    free, factors, nodes_of, parts, cells = lattice[:5]
-    side = lattice[9]
+    free, factors, parts, cells = lattice.free, lattice.factors, lattice.parts, lattice.cells
+    nodes_of, side = lattice.nodes_of, lattice.side
     rows, cols = free.shape
     down, across = (rows + side - 1) // side, (cols + side - 1) // side
     row, col = cell
@@ -107,15 +141,14 @@ def _search(lattice, start, starts, goals, most, work):
     `goals`: nodes from which the start is reached, and those from which the search begins, with
     their costs; `most`: cost of a path that is known, infinite for none.
     """
-    cells, edges_of, to, edge_costs, landmarks = lattice[4:9]
-    cols = lattice[0].shape[1]
-    cost, before, mark, rest, heap, generation = work
-    opened, closed = 2 * generation, 2 * generation + 1
+    cells, to, landmarks, cols = lattice.cells, lattice.to, lattice.landmarks, lattice.free.shape[1]
+    cost, before, mark, heap = work.cost, work.before, work.mark, work.heap
+    opened, closed = 2 * work.generation, 2 * work.generation + 1
     size, expanded, last, is_full = 0, 0, -1, False
     towards = _costs_towards(landmarks, starts)
     # What is left to pay from the nodes round the start.
     for k in range(len(starts[0])):
-        rest[starts[0][k]] = starts[1][k]
+        work.rest[starts[0][k]] = starts[1][k]
     # Begin at the nodes round the goal.
     for k in range(len(goals[0])):
         node, first = goals[0][k], goals[1][k]
@@ -137,16 +170,16 @@ def _search(lattice, start, starts, goals, most, work):
         expanded += 1
         # Is a path over this node the cheapest so far?
         here = cost[node]
-        if here + rest[node] < most:
-            most, last = here + rest[node], node
-        first, count = edges_of[node]
+        if here + work.rest[node] < most:
+            most, last = here + work.rest[node], node
+        first, count = lattice.edges_of[node]
         if size + count > heap.shape[0]:
             is_full = True
             break
         # Relax its edges; what cannot be part of a cheaper path is left out.
         for edge in range(first, first + count):
             other = to[edge]
-            whole = here + abs(edge_costs[edge])
+            whole = here + abs(lattice.costs[edge])
             if mark[other] < opened or whole < cost[other]:
                 row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
                 least = whole + _cost_left(
@@ -159,7 +192,7 @@ def _search(lattice, start, starts, goals, most, work):
                     size += 1
     # Leave the work arrays as they were.
     for k in range(len(starts[0])):
-        rest[starts[0][k]] = np.inf
+        work.rest[starts[0][k]] = np.inf
     return last, expanded, is_full
 
 
@@ -175,7 +208,7 @@ def _put(line, size, row, col):
 @njit(cache=True, nogil=True)
 def _put_inside(lattice, line, size, a, b):
     """Put the centres of the cells on the path inside the parts of two cells to a line."""
-    free, factors, parts, side = lattice[0], lattice[1], lattice[3], lattice[9]
+    free, factors, parts, side = lattice.free, lattice.factors, lattice.parts, lattice.side
     cols = free.shape[1]
     room = np.empty(2 * side * side, np.int64)
     # The path is listed from its second cell.
@@ -188,8 +221,7 @@ def _put_inside(lattice, line, size, a, b):
 @njit(cache=True, nogil=True)
 def _line_from(lattice, ends, ends_in, last, is_inside, before):
     """Return the line through the nodes of a path."""
-    cols, side = lattice[0].shape[1], lattice[9]
-    cells, edges_of, to, edge_costs = lattice[4:8]
+    cols, side, cells = lattice.free.shape[1], lattice.side, lattice.cells
     n, node = 0, last
     while node >= 0:
         n, node = n + 1, before[node]
@@ -206,9 +238,9 @@ def _line_from(lattice, ends, ends_in, last, is_inside, before):
         following = before[node]
         if following < 0:
             break
-        first, count = edges_of[node]
+        first, count = lattice.edges_of[node]
         for edge in range(first, first + count):
-            if to[edge] == following and edge_costs[edge] < 0:
+            if lattice.to[edge] == following and lattice.costs[edge] < 0:
                 a, b = np.int64(cells[node]), np.int64(cells[following])
                 size = _put_inside(lattice, line, size, a, b)
         node = following
@@ -226,14 +258,10 @@ def find_line(lattice, ends, ends_in, work):
     The line has no positions if there is no path. `FULL` in place of the number of nodes asks for
     more room in the open list.
 
-    `lattice`: `free`, `factors`, `nodes_of`, `parts`, `cells`, `edges_of`, `to`, `costs`,
-    `landmarks` and `side`, see `Lattice`; `ends`: float64 (2, 2), start and goal; `ends_in`: int64
-    (2, 2), (row, col) of the free cells that hold them; `work`: arrays of one query: float64
-    (nodes,) costs, int32 (nodes,) nodes before, int64 (nodes,) marks, float64 (nodes,) that are
-    infinite, int64 (entries, 2) the open list; and a number above those of earlier queries with
-    these arrays, > 0.
+    `lattice`: a `Network`; `ends`: float64 (2, 2), start and goal; `ends_in`: int64 (2, 2), (row,
+    col) of the free cells that hold them; `work`: a `Work`.
     """
-    free, factors = lattice[:2]
+    free, factors = lattice.free, lattice.factors
     nodes, costs = np.empty((2, 9 * _MOST_NODES), np.int64), np.empty((2, 9 * _MOST_NODES))
     n, n_inside = _nodes_near(lattice, ends[0], ends_in[0], nodes[0], costs[0])
     m, m_inside = _nodes_near(lattice, ends[1], ends_in[1], nodes[1], costs[1])
@@ -245,7 +273,7 @@ def find_line(lattice, ends, ends_in, work):
     if is_full:
         return np.empty((0, 2)), FULL
     if last >= 0:
-        line = _line_from(lattice, ends, ends_in, last, (n_inside, m_inside), work[1])
+        line = _line_from(lattice, ends, ends_in, last, (n_inside, m_inside), work.before)
         return line, expanded
     if straight < np.inf:
         return ends.copy(), expanded

@@ -4,6 +4,8 @@ A leg has moves along one diagonal and along one side next to it, in any order. 
 2 * k where all its moves go in direction k, 2 * k + 1 where they go in k and in k + 1.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
@@ -274,6 +276,19 @@ FROM_START, FROM_GOAL = -2, -3
 from the start, or with the diagonal first from the goal."""
 
 
+class CornerCells(NamedTuple):
+    """A graph of corner cells; see `JumpGraph`."""
+
+    tables: tuple[np.ndarray, np.ndarray, np.ndarray, int]
+    """See `join`."""
+    places: np.ndarray
+    component: np.ndarray
+    follow: np.ndarray
+    """The legs that may follow, see `legs_that_follow`."""
+    first: np.ndarray
+    arcs: np.ndarray
+
+
 @njit(cache=True, nogil=True)
 def _begin(graph, endpoints, direction, work, is_queued):
     """Queue the corner cells that an end is joined to, with their costs from this end.
@@ -281,7 +296,7 @@ def _begin(graph, endpoints, direction, work, is_queued):
     Return the number of queued corner cells, the number that got their first cost, and their
     component, -1 where the end is joined to none.
     """
-    tables, places, component, _, _ = graph
+    tables, places = graph.tables, graph.places
     index, _, order, width = tables
     records, heaps, touched, found = work
     cell, aim = endpoints[direction], endpoints[1 - direction]
@@ -303,7 +318,7 @@ def _begin(graph, endpoints, direction, work, is_queued):
         records[node, direction], records[node, 2 + direction] = cost, NO_ARC
         if is_queued:
             push(heaps[direction], i, cost + octile_cost(to_row - aim_row, to_col - aim_col), node)
-    part = component[found[0]] if n_found > 0 else -1
+    part = graph.component[found[0]] if n_found > 0 else -1
     return (n_found if is_queued else 0), n_touched, part
 
 
@@ -315,16 +330,15 @@ def shortest(graph, endpoints, is_contracted, work):
     A corner cell that both directions reach completes a path, and entries that are not better are
     pruned.
 
-    `graph`: tables (see `join`), int64 (n,) places, int32 (n,) components, the legs that may follow
-    (see `legs_that_follow`), and arcs: where those of each corner cell begin, int64 (m, 2) cost and
-    head (see `arcs_of` and `contract`); `endpoints`: flat cells of start and goal; `is_contracted`:
+    `graph`: `CornerCells`; `endpoints`: flat cells of start and goal; `is_contracted`:
     whether the arcs are those of a hierarchy; `work`: records, int64 (n, 4), the first two columns
     `FAR`: costs from the start and from the goal, and the tail and arc by which each was reached;
     two heaps with room for n and m entries; room for n corner cells, int64; the same, int32.
     Result: cost, `FAR` where there is no path; the corner cell where both directions meet,
     `FROM_START` or `FROM_GOAL`; corner cells expanded; number of records to clear.
     """
-    tables, places, _, follow, (first, arcs) = graph
+    tables, places, follow = graph.tables, graph.places, graph.follow
+    first, arcs = graph.first, graph.arcs
     records, heaps, touched, found = work
     width = tables[3]
 

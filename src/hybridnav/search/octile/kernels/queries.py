@@ -60,7 +60,7 @@ def cells_of(graph, endpoints, meeting, nodes, origin, cells, n_cells):
         The cells, in a new array if there was no room; their number; the moves of the path along
         sides and along diagonals.
     """
-    (_, _, _, width), places = graph[:2]
+    width, places = graph.tables[3], graph.places
     row, col = endpoints[0] // width, endpoints[0] % width
     cells = _with_room(cells, n_cells, 1 + _moves(places, width, endpoints, nodes))
     cells[n_cells, 0], cells[n_cells, 1] = row + origin[0], col + origin[1]
@@ -117,7 +117,7 @@ def paths(graph, middles, origin, endpoints, work):
     the cells (row, col); int64 (k, 3), moves along sides, moves along diagonals, -1 for both where
     there is no path, and corner cells expanded.
     """
-    width, first = graph[0][3], graph[4][0]
+    width, first = graph.tables[3], graph.first
     records, _, touched, _ = work
     n = endpoints.shape[0]
     begin = np.zeros(n + 1, np.int64)

@@ -1,0 +1,117 @@
+"""No tuple longer than four crosses the border of a kernel without names, and none is chosen by its
+length.
+
+A long tuple is made somewhere, and taken apart somewhere: both are looked for in the text, because
+numba knows the types of a kernel only where it has been called.
+"""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.product.house import SRC
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOST = 4
+ARRAYS = {"moments", "place"}
+"""Arguments with numbers of one kind, which are arrays: `axes_of`, and the motions of a robot."""
+
+
+def _kernels(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, str]]:
+    """The functions that numba compiles, by `njit`, or asks which one to compile, by `overload`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            by = {ast.unparse(one).split("(")[0] for one in node.decorator_list}
+            yield from ((node, name) for name in by & {"njit", "overload"})
+
+
+def _is_long(node: ast.AST | None) -> bool:
+    """Whether an expression is a tuple of more than four, or of nobody knows how many."""
+    return isinstance(node, ast.Tuple) and (
+        len(node.elts) > MOST or any(isinstance(one, ast.Starred) for one in node.elts)
+    )
+
+
+def _is_number(node: ast.expr | None) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int)
+
+
+def _takes_apart(node: ast.AST, arguments: set[str]) -> bool:
+    """Whether a step unpacks more than four of an argument, or takes a part or one behind them."""
+    if isinstance(node, ast.Assign) and isinstance(node.value, ast.Name):
+        return node.value.id in arguments and any(map(_is_long, node.targets))
+    if not isinstance(node, ast.Subscript) or not isinstance(node.ctx, ast.Load):
+        return False
+    if getattr(node.value, "id", "") not in arguments:
+        return False
+    index = node.slice
+    if isinstance(index, ast.Slice):
+        return index.step is None and all(
+            bound is None or _is_number(bound) for bound in (index.lower, index.upper)
+        )
+    return isinstance(index, ast.Constant) and _is_number(index) and int(str(index.value)) >= MOST
+
+
+def _hands_on(node: ast.AST, held: set[str]) -> bool:
+    """Whether a step returns or passes a long tuple, or one of some names of such."""
+    if isinstance(node, ast.Return):
+        return _is_long(node.value) or getattr(node.value, "id", "") in held
+    if not isinstance(node, ast.Call):
+        return False
+    given = [*node.args, *(one.value for one in node.keywords)]
+    return any(_is_long(one) or getattr(one, "id", "") in held for one in given)
+
+
+def nameless(text: str) -> list[str]:
+    """Where kernels of a file make, take apart or look at the length of tuples without names."""
+    found = []
+    for kernel, how in _kernels(ast.parse(text)):
+        steps = list(ast.walk(kernel))
+        arguments = {one.arg for one in kernel.args.args} - ARRAYS
+        held = {
+            target.id
+            for node in steps if isinstance(node, ast.Assign) and _is_long(node.value)
+            for target in node.targets if isinstance(target, ast.Name)
+        }  # fmt: skip
+        for node in steps:
+            asks = how == "overload" and isinstance(node, ast.Call)
+            is_by_length = asks and ast.unparse(node).startswith(("len(", "isinstance("))
+            if is_by_length or _takes_apart(node, arguments) or _hands_on(node, held):
+                found.append(f"{kernel.name}: {ast.unparse(node)[:70]}")
+    return found
+
+
+def test_no_long_tuple_without_names_crosses_the_border_of_a_kernel() -> None:
+    found = [
+        f"{path.relative_to(SRC)}: {where}"
+        for path in sorted(SRC.rglob("*.py"))
+        for where in nameless(path.read_text())
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "a, b, c, d, e = given",
+        "return given[4]",
+        "return given[1:]",
+        "return 1, 2, 3, 4, 5",
+        "return *given, 5",
+        "other((1, 2, 3, 4, 5))",
+        "five = (1, 2, 3, 4, 5)\n    other(five)",
+    ],
+)
+def test_long_tuples_are_found(body: str) -> None:
+    assert len(nameless(f"@guarded\n@njit(cache=True)\ndef kernel(given):\n    {body}\n")) == 1
+    assert not nameless(f"def no_kernel(given):\n    {body}\n")
+
+
+def test_a_choice_by_the_length_of_a_tuple_is_found() -> None:
+    by_length = "@overload(stub)\ndef choice(given):\n    return one if len(given) == 6 else two\n"
+    assert len(nameless(by_length)) == 1
