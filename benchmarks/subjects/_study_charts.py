@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from benchmarks.subjects._study_data import common_pairs, groups, studies_of
+from benchmarks.subjects._study_data import LEVELS_FILE, common_pairs, groups, studies_of
+from benchmarks.subjects._study_descent import CHART, plot_levels_of
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.viz import method_styles, plot_losses, plot_speed, save_figure
 
@@ -43,6 +46,9 @@ def charts_of(folder: Path, root: Path) -> dict[str, Draw]:
                 drawn[file] = _drawer_of_speed(losses, times_ms, styles)
             elif losses:
                 drawn[file] = _drawer_of_losses(losses, styles)
+    levels = folder / LEVELS_FILE
+    if levels.exists():
+        drawn[CHART] = partial(plot_levels_of, json.loads(levels.read_text("utf-8")))
     return drawn
 
 

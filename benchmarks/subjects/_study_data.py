@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from hybridnav.harness.columns import (
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.tables import rows_of_methods
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW, YARDSTICKS
+from hybridnav.planning import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from hybridnav.harness.records import Record
     from hybridnav.harness.timing import Circumstances
 
+LEVELS_FILE = "descent.json"
+"""Loss and work of descents that end at each level, in the study's folder."""
 LEAST_SOLVED = 0.99
 """Share of the pairs that a method solves which is compared over the pairs in common."""
 
@@ -62,7 +66,7 @@ def collect(folder: Path, root: Path, kinds: Mapping[str, str]) -> Data:
         Of strings, numbers, lists and dicts, as JSON has them: None for a missing figure, "never"
         for an infinite one.
     """
-    noted = read_note(folder)
+    noted, levels = read_note(folder), folder / LEVELS_FILE
     studies = studies_of(folder, root)
     ompl = noted["ompl"]
     return {
@@ -72,6 +76,8 @@ def collect(folder: Path, root: Path, kinds: Mapping[str, str]) -> Data:
         "machine": _machine(studies.values()) | ({"ompl": ompl} if ompl else {}),
         "maps": _maps(studies.values(), kinds),
         "parts": {name: part_figures(study) for name, study in studies.items()},
+        "paper": load_preset("paper").planner.levels,
+        **({"descent": json.loads(levels.read_text("utf-8"))} if levels.exists() else {}),
     }
 
 

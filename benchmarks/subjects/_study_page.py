@@ -62,22 +62,28 @@ CHARTS: dict[str, tuple[tuple[str, str], ...]] = {
 """Files and descriptions of the charts of each part."""
 
 
+_ON_PAGE = ("loss any-angle", "loss weighted", "time", "others", "not asked")
+"""Tables that the page has: the figures of the others are in its data."""
+
+
 def page(data: Data) -> str:
     """Return the page `docs/study.md`."""
-    tables = tables_of(data)
+    tables = [table for table in tables_of(data) if table.name in _ON_PAGE]
     text = f"""# The study: consistency, loss, efficiency
 
 Thrun's three questions, asked of every method on {_maps_in_words(data)}.
 `make study` asks them anew and writes this page and its charts. This is {_how_much(data)}.
-Every number below comes from `docs/data/study.json`, which a script fills from the records.
-[The harness](harness.md) describes the checks and the columns.
+Every number comes from [its data](data/study.json), which a script fills from the records, and
+which have more: consistency by kinds of checks, work, each map. [The harness](harness.md) describes
+the checks and the columns.
 
-## The answers on one page
+## The answers
 
 {in_short(data)}
 {_charts(data)}## Circumstances
 
-{_listed(circumstances(data))}
+{_listed(circumstances(data))}* maps: {", ".join(row["map"] for row in data["maps"])}
+
 {rules(data)}
 
 {DEFINITION}
@@ -85,29 +91,43 @@ Every number below comes from `docs/data/study.json`, which a script fills from 
 """
     for name in data["parts"]:
         text += f"## {TITLES[name]}\n\n{about(data, name)}\n\n"
-        own = [table for table in tables if table.part == name]
-        text += "".join(map(_section, own))
-        text += "" if name in _FIRST else _pictures(name)
+        text += "".join(_section(table) for table in tables if table.part == name)
     text += "".join(_section(table, "##") for table in tables if not table.part)
     return f"{text}## Beside published figures\n\n{to_markdown(PUBLISHED)}"
 
 
-_FIRST = {
+_LEADS = {
     "lengths": "Losses, and the time that they save:",
     "costs": "The same where a path costs more near obstacles:",
+    "ompl": "What sampling-based planners lose in a corridor:",
 }
-"""Parts whose charts stand on the page of answers, and what leads to them."""
+"""What leads to the charts of each part."""
+
+_DESCENT = """What the pyramid gains: `paper` comes down to fields of so many cells in the mean,
+from the places to single cells. A curve is a map:
+
+![Loss against work, as the last level goes from the places to the base](images/study-descent.svg)
+
+* Consistency: the path is one of cells, whatever level chose it; the checks below hold.
+* Loss: at the places {places_loss} % in the mean of the maps, at fields of the preset's size
+  {fields_loss} %, at the base {base_loss} %. Each finer level mends what the one above chose wrong.
+* Efficiency: {places_work}, {fields_work} and {base_work} % of what A\\* expands. A level is
+  searched only among the sons of what was kept; at the base these are many.
+
+`HYBRIDNAV_DATA=D .venv/bin/python -m benchmarks study --descent` draws it; no axis is a time.
+
+"""
 
 
 def _charts(data: Data) -> str:
     """Return the charts of the answers."""
-    return "".join(
-        f"{lead}\n\n{_pictures(name)}" for name, lead in _FIRST.items() if name in data["parts"]
+    charts = (
+        f"{lead}\n\n" + "".join(f"![{what}](images/{file})\n\n" for file, what in CHARTS[name])
+        for name, lead in _LEADS.items()
+        if name in data["parts"]
     )
-
-
-def _pictures(name: str) -> str:
-    return "".join(f"![{what}](images/{file})\n\n" for file, what in CHARTS[name])
+    descent = _DESCENT.format_map(quoted(data)) if "descent" in data else ""
+    return "".join(charts) + descent
 
 
 def _section(table: StudyTable, level: str = "###") -> str:
@@ -225,6 +245,8 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     facts.append(("versions", ", ".join(versions)))
     if "planners of others" in machine:
         facts.append(("planners of others", machine["planners of others"]))
+    if data.get("paper") != "descent":
+        facts.append(("paper", "measured with `levels: places`, before it came down the levels"))
     minutes = sum(data["seconds"].values()) / 60
     facts.append(("time of the study", f"{minutes:.0f} minutes"))
     return facts
@@ -248,6 +270,8 @@ def in_short(data: Data) -> str:
     figures = quoted(data)
     lines = [f"* Contradictions: {figures['contradictions']} in {figures['checks']} answers.\n"]
     for template in _FINDINGS:
+        if "paper_work" in template and data.get("paper") != "descent":
+            continue
         try:
             lines.append(template.format_map(figures))
         except KeyError:
@@ -268,6 +292,11 @@ _FINDINGS = tuple(
             "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile "
             "optimum in the mean and {paper_any} % longer than the any-angle optimum. The octile "
             "optimum itself is {grid_any} % longer."
+        ),
+        (
+            "`paper` comes down the levels of the pyramid: it expands {paper_work} % of what A\\* "
+            "expands, fields and cells together, and is {paper_speed} than A\\* by the median of "
+            "the ratios of times, {paper_means} by mean times."
         ),
         (
             "Against A\\*, by the median of the ratios of times: `octile` is {octile_speed}, "

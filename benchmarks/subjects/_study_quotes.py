@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.subjects._study_descent import DEFAULT, PLACES, means_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.tables import text_of
 
@@ -55,7 +56,10 @@ def quoted(data: Data) -> dict[str, str]:
         value = row.get(column)
         if isinstance(value, int | float):
             found[name] = _pace(value) if column.startswith("speed-up") else text_of(value)
-    return found | _of_ompl(parts.get("ompl"))
+    paper, whole = (_row(parts.get("lengths"), name) for name in ("paper", "grid-astar"))
+    if paper.get("expansions") and whole.get("expansions"):
+        found["paper_work"] = text_of(100 * paper["expansions"] / whole["expansions"])
+    return found | _of_descent(data.get("descent")) | _of_ompl(parts.get("ompl"))
 
 
 _FIGURES = {
@@ -91,6 +95,16 @@ def _pace(ratio: float) -> str:
 def _row(part: Data | None, method: str) -> Data:
     rows = [] if part is None else [*part["methods"], *part["others"]]
     return next((row for row in rows if row["method"] == method), {})
+
+
+def _of_descent(levels: Data | None) -> dict[str, str]:
+    """Return work and loss of descents that end at places, at fields of the preset, at cells."""
+    if levels is None:
+        return {}
+    at = {"places": PLACES, "fields": DEFAULT, "base": "1"}
+    means = {name: means_of(levels, size) for name, size in at.items()}
+    texts = {f"{name}_work": text_of(work) for name, (work, _) in means.items()}
+    return texts | {f"{name}_loss": text_of(loss) for name, (_, loss) in means.items()}
 
 
 def _of_ompl(part: Data | None) -> dict[str, str]:
@@ -191,6 +205,12 @@ QUOTES = (
         "paper/paper.md",
         "`octile` is {octile_speed}, `shortest` {shortest_speed} and `paper` {paper_speed}; by "
         "mean times they are {octile_means}, {shortest_means} and {paper_means}",
+    ),
+    Quote(
+        "paper/paper.md",
+        "at the places it loses {places_loss} % for {places_work} % of the cells that A\\* "
+        "expands, at fields of the preset's size {fields_loss} % for {fields_work} %, at single "
+        "cells {base_loss} % for {base_work} %",
     ),
     Quote(
         "paper/paper.md",

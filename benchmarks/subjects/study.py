@@ -25,13 +25,15 @@ from typing import TYPE_CHECKING
 
 from benchmarks.common import DATA, ROOT, Refused, option
 from benchmarks.subjects._study_charts import charts_of, write_charts
-from benchmarks.subjects._study_data import collect
+from benchmarks.subjects._study_data import LEVELS_FILE, collect
+from benchmarks.subjects._study_descent import CHART, levels_of, plot_levels_of
 from benchmarks.subjects._study_maps import lost_of, maps_of
 from benchmarks.subjects._study_page import page
 from benchmarks.subjects._study_quotes import QUOTES, quoted, update
 from benchmarks.subjects._study_run import PLANS, parts_of, run
 from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError
+from hybridnav.viz import save_figure
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -90,6 +92,7 @@ OPTIONS = [
     option("--map", action="append", default=[], metavar="GLOB"),
     option("--part", choices=("lengths", "costs", "ompl")),
     option("--pages-only", action="store_true", help="from docs/data/study.json"),
+    option("--descent", action="store_true", help="the chart of the levels alone, anew"),
 ]
 
 
@@ -103,6 +106,9 @@ def main(given: Namespace) -> int:
     if given.data is None:
         raise Refused("the study needs the folder of maps: --data FOLDER or HYBRIDNAV_DATA")
     began = time.monotonic()
+    if given.descent:
+        _levels_anew(given.data.resolve())
+        return 0
     own = {"pairs": given.pairs, "ompl_pairs": given.pairs, "repeat": given.repeat}
     plan = replace(PLANS[given.study], **{key: n for key, n in own.items() if n is not None})
     data = given.data.resolve()
@@ -114,6 +120,9 @@ def main(given: Namespace) -> int:
         sys.stderr.writelines(f"not in {data}, left out: {name}\n" for name in lost)
         parts = [part for part in parts_of(plan) if given.part in {None, part.name}]
         run(maps, given.out, plan, parts, workers=given.workers, scheduler=given.scheduler)
+        if not (given.out / LEVELS_FILE).exists() and not given.part:
+            text = json.dumps(levels_of(maps, data), indent=1) + "\n"
+            replace_file(given.out / LEVELS_FILE, text.encode())
         kinds = {one.path.relative_to(data).with_suffix("").as_posix(): one.kind for one in maps}
         docs = ROOT / "docs" if is_whole else given.out / "docs"
         write_all(given.out, data, kinds, docs)
@@ -125,6 +134,18 @@ def main(given: Namespace) -> int:
     minutes = (time.monotonic() - began) / 60
     sys.stderr.write(f"{minutes:.1f} minutes: {given.out} and {docs / 'study.md'}\n")
     return 0
+
+
+def _levels_anew(data: Path) -> None:
+    """Measure descents that end at each level, into the figures, the page and its chart."""
+    if lost := lost_of(data):
+        raise Refused(f"not in {data}: {', '.join(lost)}; python -m benchmarks fetch gets them")
+    file = ROOT / "docs" / FIGURES
+    figures = json.loads(file.read_text(encoding="utf-8"))
+    figures["descent"] = levels_of(maps_of(data), data)
+    replace_file(file, figures_text(figures).encode())
+    save_figure(plot_levels_of(figures["descent"]), ROOT / "docs" / "images" / CHART)
+    write_pages(ROOT / "docs")
 
 
 def _quote() -> None:

@@ -5,12 +5,14 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hybridnav as hn
 from benchmarks.__main__ import main
 from benchmarks.subjects import study
 from benchmarks.subjects._study_data import collect
+from benchmarks.subjects._study_descent import SIZES, levels_of, plot_levels_of
 from benchmarks.subjects._study_maps import StudyMap
 from benchmarks.subjects._study_page import page
 from benchmarks.subjects._study_run import (
@@ -28,6 +30,7 @@ from benchmarks.subjects._study_run import (
 from benchmarks.subjects._study_tables import tables_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES
+from hybridnav.harness.tables import text_of
 from hybridnav.planning import load_preset
 from tests.benchmarks.recomputed import REFERENCE, Recomputed
 from tests.harness.small_runs import run_here
@@ -203,6 +206,24 @@ def test_the_page_is_that_of_its_figures(folder, data):
     stale = copy.deepcopy(data)
     stale["parts"]["lengths"]["methods"][1]["query ms, median"] *= 1.5
     assert page(stale) != text
+
+
+def test_the_page_says_what_the_levels_of_a_descent_do(data):
+    (office, _) = own_maps()
+    levels = levels_of([office], MAPS)
+    figures = levels["office/office"]["figures"]
+    assert list(figures) == [*SIZES, "octile"]
+    assert figures["octile"]["loss mean %"] == 0
+    assert figures["places"]["loss mean %"] > figures["128"]["loss mean %"] > 0
+    assert figures["128"]["work %"] < figures["1"]["work %"] < 100
+    ax = plot_levels_of(levels)
+    curve = max((np.asarray(line.get_ydata()) for line in ax.lines), key=np.size)
+    assert curve.tolist() == [figures[name]["loss mean %"] for name in SIZES]
+    text = page(data | {"descent": levels})
+    assert f"at the places {text_of(figures['places']['loss mean %'])} % in the mean" in text
+    assert "study-descent.svg" not in page(data)
+    assert "measured with `levels: places`" in page({**data, "paper": "places"})
+    assert "measured with `levels: places`" not in text
 
 
 def test_a_contradiction_stands_on_the_page(data):
