@@ -73,7 +73,8 @@ class Frame:
     resolution_m: float = 1.0
     origin_m: tuple[float, float] = (0.0, 0.0)
     yaw_rad: float = 0.0
-    _turn: tuple[float, float] = field(init=False, repr=False, compare=False)
+    for_kernels: FramePose = field(init=False, repr=False, compare=False)
+    """The frame as kernels take it."""
     """Cosine and sine of the yaw."""
 
     def __post_init__(self) -> None:
@@ -96,12 +97,9 @@ class Frame:
                 f"origin must lie within {FARTHEST_M:g} m, and yaw within as many radians, "
                 f"got {self.origin_m} and {self.yaw_rad:g}"
             )
-        object.__setattr__(self, "_turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
-
-    @property
-    def for_kernels(self) -> FramePose:
-        """The frame as kernels take it."""
-        return FramePose(self.resolution_m, *self.origin_m, *self._turn)
+        turn = cos(self.yaw_rad), sin(self.yaw_rad)
+        pose = FramePose(self.resolution_m, *self.origin_m, *turn)
+        object.__setattr__(self, "for_kernels", pose)
 
     @property
     def cell_area_m2(self) -> float:
@@ -178,7 +176,7 @@ class Frame:
         """
         rowcol = np.asarray(positions, dtype=np.float64) * self.resolution_m
         along_x, along_y = rowcol[..., 1], rowcol[..., 0]
-        cosine, sine = self._turn
+        cosine, sine = self.for_kernels[3:]
         points = np.empty_like(rowcol)
         points[..., 0] = self.origin_m[0] + cosine * along_x - sine * along_y
         points[..., 1] = self.origin_m[1] + sine * along_x + cosine * along_y
@@ -233,7 +231,7 @@ class Frame:
         x, y
             Finite, in metres, map frame.
         """
-        (cosine, sine), (x0, y0) = self._turn, self.origin_m
+        _, x0, y0, cosine, sine = self.for_kernels
         # Numbers at the end of their range must become "outside" without an overflow.
         along = min(max(x, -_LARGEST_M), _LARGEST_M) - x0
         across = min(max(y, -_LARGEST_M), _LARGEST_M) - y0
@@ -253,7 +251,7 @@ class Frame:
         FloatArray
             `(row, col)` along the last axis.
         """
-        (cosine, sine), (x0, y0) = self._turn, self.origin_m
+        _, x0, y0, cosine, sine = self.for_kernels
         along = np.clip(points[..., 0], -_LARGEST_M, _LARGEST_M) - x0
         across = np.clip(points[..., 1], -_LARGEST_M, _LARGEST_M) - y0
         row = (cosine * across - sine * along) / self.resolution_m

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.models.container import FiledPart, Part
     from hybridnav.planning import PlannerSettings
-    from hybridnav.search.found import Prepared
     from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.search.octile import JumpSearch
 
@@ -55,7 +54,7 @@ def made_for(settings: PlannerSettings) -> dict[str, Any]:
     return {"made_for": {"allow_unexplored": settings.allow_unexplored}}
 
 
-def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
+def search_parts(prepared: Any, key: dict[str, Any]) -> list[Part]:
     """Return the parts for the preparations of a planner.
 
     `prepared`: `HybridPlanner.prepared`; `key`: of `made_for`.
@@ -67,7 +66,7 @@ def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
 
 def search_of(
     filed: Sequence[FiledPart], method: str, key: dict[str, Any], known: dict[str, int]
-) -> Prepared | None:
+) -> object | None:
     """Read the preparations for a planner of some settings; return None if the model has none.
 
     `filed`: all parts of the model; `method`: the setting `planner.method`; `key`: of `made_for`;

@@ -109,13 +109,26 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
     return xy
 
 
-def read_end(name: str, given: ArrayLike, needs_heading: bool) -> FloatArray:  # noqa: FBT001 - hot
-    """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
-    pose = _numbers(given)
-    if pose.shape == (2,) and not needs_heading:
-        x, y = pose.tolist()
-        if math.isfinite(x) and math.isfinite(y):
-            return pose
+def read_ends(start: ArrayLike, goal: ArrayLike, *, needs_heading: bool) -> Points:
+    """Return start and goal: positions, float64 (2,), or poses, (3,), where given or needed."""
+    try:
+        ends = np.asarray(start, dtype=np.float64), np.asarray(goal, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        ends = _numbers(start), _numbers(goal)
+    if not needs_heading and ends[0].shape == ends[1].shape == (2,):
+        (x, y), (to_x, to_y) = ends[0].tolist(), ends[1].tolist()
+        if math.isfinite(x + y + to_x + to_y):
+            return ends
+    return (
+        _pose("start", start, ends[0], needs_heading=needs_heading),
+        _pose("goal", goal, ends[1], needs_heading=needs_heading),
+    )
+
+
+def _pose(name: str, given: ArrayLike, pose: FloatArray, *, needs_heading: bool) -> FloatArray:
+    """Check a position or a pose."""
+    if pose.shape == (2,) and not needs_heading and np.isfinite(pose).all():
+        return pose
     if pose.shape != (3,) or not np.isfinite(pose).all():
         pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
         raise InvalidValueError(

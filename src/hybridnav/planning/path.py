@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, filled, frozen, on_demand
+from hybridnav._base.copies import copies_alike, filled, on_demand
 from hybridnav._base.poses import Motion
 from hybridnav.errors import InvalidValueError
 from hybridnav.messages import path_message
@@ -232,19 +232,28 @@ class Path:
 
 def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     """Return the path that a method found; cells and their centres are found when they are read."""
-    points: Any = found.points
-    cells, length_m = found.cells_on_demand, found.cost_m
-    # Compiled: a copy of a result needs none.
-    from hybridnav.maps.geometry import polyline_length  # noqa: PLC0415
-
+    points = found.points
+    cells: Any = found.passed
+    length_m = found.cost_m if callable(found.cost) else found.cost
     if points is None:
-        points = partial(_centres, found.cells, frame, length_m)
+        found_points = partial(_centres, found.cells if callable(cells) else cells, frame, length_m)
     else:
-        # A copy, because read-only arrays would compile the kernel again.
-        check_length(length_m, polyline_length(np.array(points, np.float64)))
-        points = frozen(points if is_of_cells or length_m > 0 else points[:1])
-    cells = cells if callable(cells) else frozen(cells)
-    return filled(Path, cells=cells, points=points, length_m=length_m)
+        is_one = not (is_of_cells or length_m > 0)
+        found_points = partial(_checked, points[:1] if is_one else points, length_m)
+    if callable(cells):
+        cells = partial(getattr, found, "cells")
+    else:
+        cells.flags.writeable = False
+    return filled(Path, cells=cells, points=found_points, length_m=length_m)
+
+
+def _checked(points: FloatArray, length_m: float) -> FloatArray:
+    """Return the points of a path, after a check of the length that it states."""
+    from hybridnav.maps.geometry import polyline_length  # noqa: PLC0415 - compiled
+
+    # A copy, because read-only arrays would compile the kernel again.
+    check_length(length_m, polyline_length(np.array(points, np.float64)))
+    return points
 
 
 def _centres(cells: LongArray, frame: Frame, length_m: float) -> FloatArray:

@@ -13,7 +13,7 @@ from hybridnav._base.renamed import renamed
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.areas import box_of_area
-from hybridnav.planning import Preset, load_preset
+from hybridnav.planning import PlanStatus, Preset, load_preset
 from hybridnav.planning.batch import plan_many
 from hybridnav.planning.costs import PlannerCosts
 from hybridnav.planning.endpoints import read_points
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.planning.profile import Profile
     from hybridnav.planning.result import PlanDraft
-    from hybridnav.search.found import ClosedCells, Method, Prepared
+    from hybridnav.search.found import ClosedCells, Method
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.map import Version
 
@@ -95,7 +95,7 @@ class HybridPlanner(Questions):
         topology: TopologicalMap,
         *,
         preset: PathLike | Preset = "shortest",
-        prepared: Prepared | None = None,
+        prepared: object | None = None,
         costs: CostLayer | None = None,
     ) -> None:
         self.preset = load_preset(preset)
@@ -180,7 +180,7 @@ class HybridPlanner(Questions):
         return blocked if own is None else own.closed(self._now, waypoints, blocked)
 
     @property
-    def prepared(self) -> Prepared | None:
+    def prepared(self) -> object | None:
         """The structure built for queries: a mesh or a jump-point graph. None before that, with
         presets that build none, and for the lattice, which changes with the costs."""
         return self._now.method.prepared
@@ -252,7 +252,8 @@ class HybridPlanner(Questions):
             another method is given `keep`. When `leave_zone` is given with OMPL or `within_m`.
         """
         with self._query():
-            now, closed, own = self._now, self._closing([start, goal], blocked), self._privacy
+            now, own = self._now, self._privacy
+            closed = blocked if own is None else self._closing([start, goal], blocked)
             request, leaves_m = now.read(start, goal, smooth, closed, at, keep), None
             if leave_zone:
                 request, leaves_m, cells = now.leaving(request, within_m)
@@ -262,7 +263,7 @@ class HybridPlanner(Questions):
                 closed, result = request.closed, replace(result, leaves_m=leaves_m)
             if within_m is not None:
                 result = now.near(request, result, within_m)
-        if not result.solved and (result.path is None or result.ends_well):
+        if result.path is None or result.status is PlanStatus.NEAR_GOAL:
             ends = result.start, result.goal
             result = replace(result, why_source=Unanswered(now, ends, closed))
         return result if own is None else own.stated(result, (start, goal), blocked)

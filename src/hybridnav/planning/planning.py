@@ -23,7 +23,7 @@ from hybridnav.planning.endpoints import (
     PlanRequest,
     check_at,
     places_of_endpoints,
-    read_end,
+    read_ends,
     refusal,
 )
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
@@ -107,7 +107,7 @@ class Planning:
             start, goal = self.points_of([start, goal], at, blocked)
         closed = None if blocked is None else self.closed(blocked)
         turns = self.ompl is not None and self.needs_headings
-        poses = read_end("start", start, turns), read_end("goal", goal, turns)
+        poses = read_ends(start, goal, needs_heading=turns)
         kept = None if keep is None else self._kept(keep, poses[1])
         finish = self._finish if smooth is None else self._checked(smooth)
         return PlanRequest(poses, finish, closed, waypoint, kept, began)
@@ -220,7 +220,7 @@ class Planning:
         if isinstance(places, PlanStatus):
             return places
         cells, positions = places
-        shut = self.closed_for_all(closed)
+        shut = closed if self.costs.closed is None else self.closed_for_all(closed)
         if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
             return refused
         return Query(cells, points, closed, kept, positions)
@@ -325,7 +325,7 @@ class Planning:
     def result(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
         """Refine a path that was found, and return its result."""
         metric = self.method.metric
-        if not found.has_path:
+        if found.passed is None:
             bound, stats = found.lower_bound_m, found.stats
             status, how = PlanStatus.NO_PATH, None if self.ompl is None else self.ompl.no_path
             return self._answer(
@@ -341,9 +341,9 @@ class Planning:
             result = self._in_sight(request, query, found)
         else:
             path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
-            least = self._bound(query, found, path.length_m)
+            least = found.optimum or min(found.lower_bound_m, path.length_m)
             result = self._solved(request, found, path, least, metric=metric)
-        if result.path is None or not result.solved or not self.has_rooms:
+        if not self.has_rooms or result.path is None or not result.solved:
             return result
         source = Walk(self.built, request.goal, request.poses[0].tolist())
         return replace(result, instruction_source=source)
@@ -465,11 +465,12 @@ class Planning:
         **outcome: Any,
     ) -> PlanResult:
         """Return the result of a path, whose bound is at most its cost."""
-        cost_m = outcome.get("weighted_cost", path.length_m)
+        cost_m, ends = outcome.get("weighted_cost", path.length_m), request.poses
+        turns = len(ends[0]) + len(ends[1]) > 4  # noqa: PLR2004 - numbers of two points
         return self._answer(
             PlanStatus.SOLVED,
             request,
-            path=path.turned_at_ends(*request.poses),
+            path=path.turned_at_ends(*ends) if turns else path,
             route_source=found.route or self._route_of(path),
             bound_source=bound if callable(bound) else min(bound, cost_m),
             stats=found.stats,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -24,12 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.costs import CostLayer
     from hybridnav.route.route import Route, RouteOfPlaces
     from hybridnav.search.distance_table import LabelSource
-    from hybridnav.search.mesh import MeshSearch
-    from hybridnav.search.octile import JumpSearch
     from hybridnav.topology import TopologicalMap
-
-    Prepared = MeshSearch | JumpSearch
-    """Structures of a map that methods build, and models keep."""
 
 Cell = tuple[int, int]
 Position = tuple[float, float]
@@ -165,11 +160,6 @@ class Found:
         """Length or cost in the metric of the method, metres; infinite without a path."""
         return self.cost() if callable(self.cost) else self.cost
 
-    @property
-    def cells_on_demand(self) -> Any:
-        """The cells, or how to find them."""
-        return partial(getattr, self, "cells") if callable(self.passed) else self.passed
-
     @cached_property
     def cells(self) -> LongArray:
         """int64 (n, 2), legal moves from start to goal; only of an answer with a path."""
@@ -234,7 +224,7 @@ class Method(Protocol):
         return None
 
     @property
-    def prepared(self) -> Prepared | None:
+    def prepared(self) -> object | None:
         """The structure for queries that is worth keeping; None until it is built, and without."""
         return None
 

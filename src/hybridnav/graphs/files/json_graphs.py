@@ -209,14 +209,6 @@ def _without(facts: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
     return {key: value for key, value in facts.items() if key not in keys}
 
 
-def _holds_null(value: Any) -> bool:
-    if isinstance(value, dict):
-        return any(map(_holds_null, value.values()))
-    if isinstance(value, list):
-        return any(map(_holds_null, value))
-    return value is None
-
-
 # JSON whose long lists are read value by value, so that a large file never is one large tree.
 
 MOST_BYTES = 2**28

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlannerSettings
     from hybridnav.search.distance_table import LabelSource
-    from hybridnav.search.found import ClosedCells, Metric, Prepared, Query
+    from hybridnav.search.found import ClosedCells, Metric, Query
     from hybridnav.topology import TopologicalMap
 
 
@@ -32,7 +32,7 @@ class KnownMap(NamedTuple):
     """Its places; None where a changed grid has none yet."""
     costs: CostLayer | None = None
     """Costs of the cells; None for lengths."""
-    prepared: Prepared | None = None
+    prepared: object | None = None
     """Structures that another method of the same map and settings has built."""
 
     def refiner(self, settings: PlannerSettings) -> GridRefiner:

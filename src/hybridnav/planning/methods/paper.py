@@ -46,6 +46,7 @@ class MaxDistance(Method):
         assert known.topology is not None  # noqa: S101 - no method of places is made without
         self.metric: Metric = "octile" if known.costs is None else "weighted"
         self._topology, self._settings = known.topology, settings
+        self._resolution_m = known.grid.resolution_m
         self._whole_map = WholeMap(known, settings)
         self._refiner, self._own = self._whole_map.refiners
         self._is_plain = self._own is None and known.costs is None
@@ -127,7 +128,7 @@ class MaxDistance(Method):
         if cells is None:
             # Fields of one class that meet by sides are joined by arcs: no route, no path.
             return None if self._topology.grid.corner_cutting else Found(None, stats=stats)
-        per_cell = self._topology.grid.resolution_m
+        per_cell = self._resolution_m
         return filled(
             Found,
             passed=cells,
@@ -160,7 +161,7 @@ class MaxDistance(Method):
         best = search(*query.cells, blocked=closed)
         cost = self._refiner.cost_in_cells
         costs = [cost(each) for each in (cells, best.cells) if each is not None]
-        return min(costs) * self._topology.grid.resolution_m
+        return min(costs) * self._resolution_m
 
     def _along(self, search: MaxDistanceSearch, query: Query, began: float) -> Found | None:
         """Return the path in the fields of the places, None to search the whole map."""

@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from hybridnav.search.distance_table import LabelSource
     from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
-Position = tuple[float, float]
-
 
 _MOST_REMOVED, _FEW = 0.5, 1000
 """Share and number of removed polygons that a mesh keeps: with more of them it is built anew."""
@@ -144,51 +142,49 @@ class OverMesh(Method):
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
         answer is a cell path shortened by line of sight, with the proved bound.
         """
-        began = clock()
-        seconds = {}
+        began, seconds = clock(), {}
         if self._search is None and self._budget_s is None:
             self._on_mesh()
             seconds["mesh"] = clock() - began
-        start, goal = query.points
-        ends = (*start.tolist(), *goal.tolist())
-        now = clock()
-        path, expanded = self._on_graph(query, query.positions or self._positions(query))
+            began = clock()
+        path = self._path_round(query)
         if path.positions is not None:
+            start, goal = query.points
+            ends = (*start.tolist(), *goal.tolist())
             points, length_m = line_between(path.positions, ends, self._placing)
-            seconds["shortest"] = clock() - now
+            seconds["shortest"] = clock() - began
             cells = partial(self._passed, query, path, seconds)
-            stats = filled(PlanStats, expanded_intervals=expanded, seconds=seconds)
+            stats = filled(PlanStats, expanded_intervals=path.expanded, seconds=seconds)
             return _along((points, length_m), path, cells, stats)
-        seconds["shortest"] = clock() - now
-        stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
+        seconds["shortest"] = clock() - began
+        stats = PlanStats(expanded_intervals=path.expanded, seconds=seconds)
         if math.isinf(path.lower_bound_cells):
             return Found(None, stats=stats)
         return self._in_sight(query, path.lower_bound_cells, stats)
 
-    def _positions(self, query: Query) -> tuple[Position, Position]:
-        """Return the points of a query as (row, col) in grid units."""
-        start, goal = (self._frame.position_of(*point.tolist()) for point in query.points)
-        return start, goal
-
-    def _on_graph(self, query: Query, positions: tuple[Position, Position]) -> tuple[MeshPath, int]:
-        """Return a shortest path round what is closed, and the nodes expanded."""
-        search = self._search
+    def _path_round(self, query: Query) -> MeshPath:
+        """Return a shortest path round what is closed."""
+        positions, search, left_s = query.positions, self._search, self._budget_s
+        if positions is None:
+            first, last = (self._frame.position_of(*point.tolist()) for point in query.points)
+            positions = first, last
         if search is None:
-            bound = dist(*positions)
-            return MeshPath(None, math.inf, bound, 0), 0
-        began, epsilon, left_s = clock(), self._epsilon, self._budget_s
-        path = search.path(query.cells, positions, epsilon=epsilon, budget_s=left_s)
-        if query.closed is None or math.isinf(path.lower_bound_cells):
-            return path, path.expanded
-        detours = self._round(search, query.closed)
+            return MeshPath(None, math.inf, dist(*positions), 0)
+        began = 0.0 if left_s is None else clock()
+        path = search.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
+        closed = query.closed
+        if closed is None or path.lower_bound_cells == math.inf:
+            return path
+        detours = self._round(search, closed)
         if path.positions is not None and not detours.is_met_by(path):
-            return path, path.expanded
+            return path
         if left_s is not None:
             left_s = max(left_s - (clock() - began), 0.0)
-        around = detours.search.path(query.cells, positions, epsilon=epsilon, budget_s=left_s)
+        around = detours.search.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
         # Closed cells make no path shorter.
         bound = max(min(path.lower_bound_cells, around.length_cells), around.lower_bound_cells)
-        return around._replace(lower_bound_cells=bound), path.expanded + around.expanded
+        expanded = path.expanded + around.expanded
+        return around._replace(lower_bound_cells=bound, expanded=expanded)
 
     def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
         """Return the shortest path of cells, shortened by line of sight, with a proved bound."""

@@ -5,7 +5,8 @@ from .build import (
     CornerHierarchy as CornerHierarchy,
     build_mesh as build_mesh,
 )
-from .cut import DetourSearch as DetourSearch, renew_mesh as renew_mesh
+from .cut import renew_mesh as renew_mesh
+from .detour import DetourSearch as DetourSearch
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
 
 __all__: list[str]

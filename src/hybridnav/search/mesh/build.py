@@ -256,18 +256,10 @@ class CornerGraph:
 
 
 def find_edges(mesh: Mesh) -> tuple[LongArray, IntArray] | None:
-    """Find the edges between the corners of a mesh.
+    """Find the edges between the corners of a mesh, `ConvexMesh.arrays`; see `CornerGraph`.
 
-    Parameters
-    ----------
-    mesh
-        `arrays` of a `ConvexMesh`.
-
-    Returns
-    -------
-    tuple or None
-        See `CornerGraph`. None if there are too many edges, as on wide open maps, or if one has no
-        reverse: searches rely on both.
+    None if there are too many, as on wide open maps, or if one has no reverse: searches rely on
+    both.
 
     Notes
     -----
@@ -283,14 +275,7 @@ def find_edges(mesh: Mesh) -> tuple[LongArray, IntArray] | None:
 
 
 def add_landmarks(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerGraph:
-    """Add landmarks to the edges between the corners of a mesh.
-
-    Parameters
-    ----------
-    mesh
-        `arrays` of a `ConvexMesh`.
-    edges
-        Edges of `find_edges`.
+    """Add landmarks to the edges between the corners of a mesh, results of `find_edges`.
 
     Notes
     -----
@@ -353,19 +338,9 @@ class CornerHierarchy:
 
 
 def contract_corners(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerHierarchy | None:
-    """Contract the graph of the corners of a mesh.
+    """Contract the graph of the corners of a mesh, results of `find_edges`.
 
-    Parameters
-    ----------
-    mesh
-        `arrays` of a `ConvexMesh`.
-    edges
-        Edges of the kernel `edges_of`.
-
-    Returns
-    -------
-    CornerHierarchy or None
-        None if contraction takes too long because corners see too many others.
+    None if contraction takes too long because corners see too many others.
 
     Notes
     -----

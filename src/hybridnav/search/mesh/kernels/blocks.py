@@ -109,16 +109,8 @@ def blocks_of(first, twins, polygon_of):
 def open_blocks(blocks, start, goal, is_open, marked, n):
     """Open the blocks between two polygons of one component; return the index behind the last one.
 
-    Parameters
-    ----------
-    blocks
-        The `Blocks` of the mesh.
-    start, goal
-        Polygons.
-    is_open
-        bool (b,), changed.
-    marked, n
-        int32, receives newly opened blocks from index n on.
+    `blocks`: `Blocks`; `is_open`: bool (b,), changed; `marked`, `n`: int32, receives newly opened
+    blocks from index n on.
     """
     depth = blocks.depth
     while start != goal:

@@ -53,17 +53,9 @@ def landmarks_of(mesh, graph, source, table):
     Those in the graph are longer where a shortest path leaves the landmark, or arrives, in the
     quadrant opposite to the blocked cell.
 
-    Parameters
-    ----------
-    mesh
-        A `Mesh`.
-    graph
-        The graph of `edges_of`.
-    source
-        The first landmark: the others are in the same part of the graph. Each is the corner
-        farthest from those before.
-    table
-        float64 (n, landmarks), filled in.
+    `mesh`: a `Mesh`; `graph`: that of `edges_of`; `source`: the first landmark: the others are in
+    the same part of the graph, each the corner farthest from those before; `table`: float64 (n,
+    landmarks), filled in.
     """
     cx, cy, kinds, first = mesh.x, mesh.y, mesh.kinds, mesh.first
     (offsets, heads), (n, number) = graph, table.shape

@@ -40,21 +40,11 @@ directions."""
 def look(mesh, cells, endpoints, work):
     """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    cells
-        See `polygons_of_endpoints`.
-    work
-        A `CornerWork` or `HierarchyWork`. Its bounds receive the length and lower bound of the
-        answer: infinite if the endpoints are not connected, their distance if they see each other.
-
-    Returns
-    -------
-    tuple
-        `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the
-        goal sees and then those that the start sees; the indices at which both lists end.
+    `mesh`, `endpoints`: see `successors`; `cells`: see `polygons_of_endpoints`; `work`: a
+    `CornerWork` or `HierarchyWork`, whose bounds receive the length and lower bound of the answer:
+    infinite if the endpoints are not connected, their distance if they see each other. Returns
+    `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the goal
+    sees and then those that the start sees; the indices at which both lists end.
     """
     sx, sy, tx, ty = endpoints
     starts, goals = work.starts, work.goals

@@ -322,19 +322,9 @@ APART, MET, SPLIT = -1, 1, 0
 def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
     """Find the polygons that contain the endpoints of a query.
 
-    Parameters
-    ----------
-    mesh, endpoints
-        See `successors`.
-    cells
-        Row and column of the start's cell, then of the goal's; free ones.
-    starts, goals
-        int32, room for as many polygons as the mesh has.
-
-    Returns
-    -------
-    tuple
-        `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
+    `mesh`, `endpoints`: see `successors`; `cells`: row and column of the start's cell, then of the
+    goal's; free ones; `starts`, `goals`: int32, room for as many polygons as the mesh has. Returns
+    `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
     """
     sx, sy, tx, ty = endpoints
     from_row, from_col, to_row, to_col = cells
