@@ -16,7 +16,7 @@ from hybridnav._base.moves import FAR
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
 from hybridnav.search.mesh.build import MANY_CORNERS, add_landmarks, contract_corners, find_edges
-from hybridnav.search.mesh.kernels.polyanya import DONE, N_COUNTS, WORK_FULL
+from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, N_COUNTS, WORK_FULL
 from hybridnav.search.mesh.kernels.queries import answer
 from hybridnav.search.mesh.kernels.state import (
     GROWING,
@@ -225,14 +225,14 @@ class MeshSearch:
         limit = step = NO_LIMIT if until == math.inf else SLICE
         while True:
             effort = 1.0 + epsilon, limit
-            found = answer(self.arrays, graph, cells, positions, work, effort)
-            status, path, length, bound, expanded = found
+            status, path, length, bound = answer(self.arrays, graph, cells, positions, work, effort)
             if status == DONE:
                 break
             if status == WORK_FULL:
                 work = doubled(work)
             else:
                 limit = -1 if perf_counter() >= until else limit + step
+        expanded = int(work.counts[EXPANDED])
         works.give(work)
         if not self.is_prepared:
             self.expanded += expanded

@@ -9,13 +9,12 @@ from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.hierarchy_search import query_hierarchy
 from hybridnav.search.mesh.kernels.polyanya import (
     DONE,
-    EXPANDED,
     LOWER,
     UPPER,
     WORK_FULL,
     query_intervals,
 )
-from hybridnav.search.mesh.kernels.state import Answer, Blocks, Corners, Hierarchy
+from hybridnav.search.mesh.kernels.state import Blocks, Corners, Hierarchy
 
 _QUERIES = {Blocks: query_intervals, Corners: query_corners, Hierarchy: query_hierarchy}
 """The kernel of one query on each kind of graph."""
@@ -51,15 +50,14 @@ def answer(mesh, graph, cells, positions, work, effort):
     cells of start and goal; `positions`: start and goal, (row, col), which are rounded and moved
     into the closed squares of these cells; `effort`: the answer is good enough when it is at most
     this factor times the lower bound; the expansions at which to pause, below zero to end. Returns
-    an `Answer`.
+    status and path as `query_intervals`, the length and the lower bound.
     """
     (row, col), (to_row, to_col) = cells
     (y, x), (to_y, to_x) = positions
     where = row, col, to_row, to_col
     points = into_cell(col, x), into_cell(row, y), into_cell(to_col, to_x), into_cell(to_row, to_y)
     status, path = query(mesh, graph, where, points, work, effort)
-    counts, bounds = work.counts, work.bounds
-    return Answer(status, path, bounds[UPPER], bounds[LOWER], counts[EXPANDED])
+    return status, path, work.bounds[UPPER], work.bounds[LOWER]
 
 
 # Kernel of many queries on a mesh, one after the other.

@@ -1,5 +1,5 @@
 """State of the mesh's kernels: `Mesh`; what is searched, `Blocks`, `Corners` or `Hierarchy`; their
-work arrays and answers; rooms and targets of views; `Closure`.
+work arrays; rooms and targets of views; `Closure`.
 
 Points are x = column, y = row in grid units: corners are whole numbers. Kernels that exist for each
 kind of graph, or of target, are chosen by the class of the tuple.
@@ -183,18 +183,6 @@ class Bend(NamedTuple):
     y: float
     hand: float
     """The hand to which a path bends there: above zero for the left, 0 for either."""
-
-
-class Answer(NamedTuple):
-    """What a run of a query found."""
-
-    status: int
-    """`DONE`, `PAUSED` or `WORK_FULL`."""
-    path: np.ndarray
-    """float64 (n, 2), (row, col), when it is done; without rows for none."""
-    length: float
-    bound: float
-    expanded: int
 
 
 class Closure(NamedTuple):
