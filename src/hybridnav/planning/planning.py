@@ -514,7 +514,7 @@ class Planning:
             **costs,
         }
 
-    @property
+    @cached_property
     def has_rooms(self) -> bool:
         """Whether the map has rooms, so that words tell of its paths."""
         return self.topology is not None and self.topology.has_rooms
