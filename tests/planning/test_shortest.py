@@ -219,8 +219,8 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
 @pytest.mark.parametrize(
     ("preset", "built"),
     [
-        ("shortest", "planner.methods.shortest.build_mesh"),
-        ("octile", "planner.methods.octile.build_jump_graph"),
+        ("shortest", "planning.methods.shortest.build_mesh"),
+        ("octile", "planning.methods.octile.build_jump_graph"),
     ],
 )
 def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(
