@@ -27,7 +27,7 @@ CompressOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class BuildOptions(FloorOptions):
     """The options of `hybridnav build`."""
 

@@ -32,7 +32,7 @@ OpenOption = Annotated[
 WhyOption = Annotated[str | None, option("--why TEXT", "The reason for --close, one line.")]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ClosedOptions(FloorOptions):
     """The options of `hybridnav closed`."""
 

@@ -1,7 +1,8 @@
 """`MapOptions` and `FloorOptions`: how commands read one map, or a map or building.
 
 Typer reads such a dataclass as it reads a function: the fields are the options of a command. Texts
-of types it would look up where a subclass stands, so that types are no texts here.
+of types it would look up where a subclass stands, so that types are no texts here. None compares or
+prints them: what does would be made for nothing at each start.
 """
 
 from dataclasses import dataclass, fields
@@ -19,7 +20,7 @@ from hybridnav.cli.reading import is_model_file, read_settings
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class MapOptions:
     """How a command reads its map, and the preset that it takes for it."""
 
@@ -98,7 +99,7 @@ class MapOptions:
 MapOptions.PANELS = {"Options": (), "Map": tuple(each.name for each in fields(MapOptions)[1:])}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FloorOptions(MapOptions):
     """How a command reads its map, which may be a building."""
 

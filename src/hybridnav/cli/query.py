@@ -136,7 +136,7 @@ LanguageOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PlanOptions(FloorOptions):
     """The options of `hybridnav plan`."""
 

@@ -81,7 +81,7 @@ FindOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class RoomsOptions(MapOptions):
     """The options of `hybridnav rooms`."""
 

@@ -49,7 +49,7 @@ ProofArgument = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ShowOptions(MapOptions):
     """The options of `hybridnav show`."""
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.ext.agent.building import BuildingAnswers
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ServeOptions(FloorOptions):
     """The options of `hybridnav serve`."""
 

@@ -154,7 +154,7 @@ IgnoreOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CheckOptions(FloorOptions):
     """The options of `hybridnav check`."""
 

@@ -45,7 +45,7 @@ SpacingOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ExportOptions(FloorOptions):
     """The options of `hybridnav export`."""
 

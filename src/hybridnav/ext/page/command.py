@@ -57,7 +57,7 @@ EditsOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ViewOptions(FloorOptions):
     """The options of `hybridnav view`."""
 
