@@ -23,6 +23,7 @@ from hybridnav.search.descent import (
     pack,
     sizes_of,
 )
+from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.lowest import lowest_of
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.strategies import examples, free_cells, scenes
@@ -292,3 +293,46 @@ def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) 
             assert (above == on_route).all()
     assert (above == on_route).all()
     assert watched.levels[0].route.tolist() == found.places.tolist()
+
+
+@pytest.mark.parametrize(
+    ("closed", "horizon", "stages"),
+    [
+        (slice(94, 106), 128, []),
+        (slice(85, 115), 8, ["kept"]),
+        (slice(60, 140), 128, ["kept", "whole"]),
+        (slice(0, 200), 128, ["kept", "whole"]),
+    ],
+)
+def test_closed_cells_widen_the_search_step_by_step(
+    closed: slice, horizon: int, stages: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """First by windows that go round, then in fields kept above, at last on the whole map."""
+    walls = np.zeros((200, 200), dtype=np.float32)
+    walls[:, 100] = 1
+    walls[60:140, 100] = walls[190:, 100] = 0  # a gate, and a way round it far away
+    grid = hn.OccupancyGrid(walls, robot_radius_m=0)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=40.0)
+    keys = [f"planner.{key}" for key in ("field_cells=16", f"horizon_cells={horizon}")]
+    preset = hn.load_preset("paper", overrides=keys)
+    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=preset)
+    seen, search = [], GridSearch.search
+
+    def watched(self: GridSearch, *ends: Any, **limits: Any) -> Any:
+        seen.append("whole" if limits.get("in_corridor") is None else "kept")
+        return search(self, *ends, **limits)
+
+    monkeypatch.setattr(GridSearch, "search", watched)
+    shut = np.zeros(grid.shape, dtype=np.bool_)
+    shut[closed, 100] = True
+    ends = (100, 5), (100, 195)
+    points = grid.frame.points_of(np.array(ends))
+    result = planner.plan(*points, blocked={"cells": np.argwhere(shut & grid.enterable())})
+    assert seen == stages
+    left = grid.enterable() & ~shut
+    optimum = distances(move_graph(left), grid.shape, ends[0])[ends[1]]
+    assert result.solved is math.isfinite(optimum)
+    if result.path is None:
+        return
+    assert_legal(result.path.cells, left)
+    assert recounted(result.path.cells) <= optimum * (1 if "whole" in stages else 1.1) + 1e-9

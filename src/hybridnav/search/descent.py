@@ -17,21 +17,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.kernels.moves import legal_moves
+from hybridnav._base.kernels.moves import STRAIGHT, legal_moves
 from hybridnav._base.threads import Pool
 from hybridnav.maps.costs.factors import UNIT_BITS
 from hybridnav.route.route import Corridor
-from hybridnav.search.grid_search import move_tables
+from hybridnav.search.grid_search import UNLIMITED, move_tables
 from hybridnav.search.kernels import descent as _kernels
 from hybridnav.search.kernels import fields as _field_kernels
 from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
-from hybridnav.search.kernels.grid_search import BUCKETS
+from hybridnav.search.kernels.grid_search import BUCKETS, forbid
 from hybridnav.search.lowest import Layer, lowest_of, patched, patched_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
+    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.pyramid import DualGraphPyramid
     from hybridnav.pyramid.record import Patch
     from hybridnav.search.lowest import Lowest
@@ -48,6 +48,8 @@ MANY_PLACES = 1000
 """Places above which small ones are joined in blocks."""
 MOST_BLOCKS, MOST_AT_TOP = 300, 4000
 """Most fields of the first level, if they are blocks, and if they are places."""
+WAY_ROUND = 2.0
+"""Horizons within which a window goes round closed cells."""
 BLOCK_SIDE = 6
 """Side of the blocks of a level, in sides of those of the next one."""
 
@@ -332,7 +334,11 @@ class Descent:
             lowest.cells,
             planes.layers[-1].of,
             successors,
+            UNLIMITED,
         )
+        self.n_cells = int(np.count_nonzero(enterable))
+        """Cells that paths may use."""
+        self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._ground.moves))
         self._works = Pool(partial(_Work, self.fields, enterable.size))
 
     @cached_property
@@ -368,22 +374,44 @@ class Descent:
             held = [*self.fields, *work.marks, *self._ground]
             return sum(array.nbytes for array in held if isinstance(array, np.ndarray))
 
-    def find(self, start: Cell, goal: Cell) -> Descended:
+    def find(self, start: Cell, goal: Cell, *, closed: LongArray | None = None) -> Descended:
         """Find a path between the centres of two cells; it need not be a shortest one.
 
-        `start`, `goal`: cells of places that may be passed, (row, col).
+        `start`, `goal`: cells of places that may be passed, (row, col); `closed`: int64 (n,), flat
+        cells that windows go round, if the way round is short; then no path proves nothing.
         """
-        return self._descend(start, goal, self._horizon, _nothing)[0]
+        if closed is None:
+            return self._descend(start, goal, self._horizon, _nothing)[0]
+        cols, limit = self._ground.cols, int(WAY_ROUND * self._horizon) * STRAIGHT
+        with self._moves_to_edit.lent() as moves:
+            touched, masks = forbid(moves, cols, closed, self._corner_cutting)
+            ground = self._ground._replace(moves=moves, limit=limit)
+            found, _ = self._descend(start, goal, self._horizon, _nothing, ground)
+            moves[touched] = masks
+        return found
 
-    def corridor(self, start: Cell, goal: Cell) -> tuple[Descended, Corridor | None]:
+    def corridor(
+        self, start: Cell, goal: Cell, *, up: int = 0
+    ) -> tuple[Descended, Corridor | None]:
         """Find the last fields alone, with the rings round them, as a corridor; None without a
-        route."""
-        found, listed = self._descend(start, goal, 0.0, _listed)
-        if listed is None:
+        route.
+
+        `up`: so many levels above the last one; the corridor is what a descent kept there.
+        """
+        found, inside = self._descend(start, goal, 0.0, partial(self._kept_above, up))
+        if inside is None:
             return found, None
-        inside = np.zeros(len(self.fields.survivor), dtype=np.bool_)
-        inside[listed - self.fields.starts[-2]] = True
-        return found, Corridor(self.field_of, inside, found.corridor_cells)
+        n_cells = int(self.fields.areas[inside].sum())
+        return found, Corridor(self.field_of, inside, n_cells)
+
+    def _kept_above(self, up: int, marks: Marks, number: int) -> BoolArray:
+        """Return the last fields that lie in those kept so many levels above."""
+        starts, parent = self.fields.starts, self.fields.parent
+        at = np.arange(starts[-2], starts[-1])
+        for _ in range(min(up, len(starts) - 2)):
+            at = np.where(at >= 0, parent[at], -1)
+        inside: BoolArray = (marks.kept[at] == number) & (at >= 0)
+        return inside
 
     def watch(self, start: Cell, goal: Cell) -> WatchedDescent | None:
         """Find a path as `find` does, and return what was kept at each level; None without a path.
@@ -418,17 +446,22 @@ class Descent:
         return levels[::-1]
 
     def _descend(
-        self, start: Cell, goal: Cell, horizon: float, look: Callable[[Marks, int], T]
+        self,
+        start: Cell,
+        goal: Cell,
+        horizon: float,
+        look: Callable[[Marks, int], T],
+        ground: MapCells | None = None,
     ) -> tuple[Descended, T | None]:
         """Return the outcome of a descent, and what `look` returns of what it wrote, by its number;
         None without a route."""
-        cols = self._ground.cols
+        cols, ground = self._ground.cols, ground or self._ground
         ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
         work = self._works.take()
         while True:
             marks, number = work.marks, work.number + 1
             route, cells = _kernels.descend(
-                self.fields, marks, self._ground, number, ends, self._rings, horizon, self._named
+                self.fields, marks, ground, number, ends, self._rings, horizon, self._named
             )
             status, last, *effort, diagonals = marks.told.tolist()
             if status != _kernels.FULL:
@@ -448,9 +481,3 @@ class Descent:
 
 def _nothing(_marks: Marks, _number: int) -> None:
     """Look at nothing of what a descent wrote."""
-
-
-def _listed(marks: Marks, _number: int) -> IntArray:
-    """Return the last fields."""
-    listed: IntArray = marks.listed[: marks.told[0]].copy()
-    return listed

@@ -33,7 +33,8 @@ Cell = tuple[int, int]
 
 KERNEL = _kernels.astar
 """The kernel whose compiled form shows that a search was run before."""
-_UNLIMITED = 1 << 62
+UNLIMITED = 1 << 62
+"""A limit above all costs."""
 _ROOM = 1024
 _MOST_UNITS = 1 << 24
 """More than any cell has."""
@@ -142,7 +143,7 @@ class GridSearch:
         first = start[0] * self._cols + start[1]
         last = goal[0] * self._cols + goal[1]
         corridor = (None if field_of is None else field_of.ravel(), in_corridor)
-        bound = _UNLIMITED if limit is None else limit
+        bound = UNLIMITED if limit is None else limit
         if blocked is None or len(blocked) == 0:
             return self._path(self._moves, (first, last), bound, corridor)
         if first in blocked or last in blocked:

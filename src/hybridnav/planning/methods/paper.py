@@ -30,6 +30,13 @@ if TYPE_CHECKING:
     from hybridnav.route.route import Corridor
     from hybridnav.search.found import MapChange, Metric, Query
 
+MOST_ROUND = 1.1
+"""Times as long as the path without closed cells that one round them may be, if no search of the
+whole map finds the best one."""
+SMALL_PART = 0.25
+"""Most of the map that a search in the fields kept at a level above is worth: in a corridor, a cell
+takes twice as long as on the whole map."""
+
 
 @copies_alike
 class MaxDistance(Method):
@@ -108,6 +115,8 @@ class MaxDistance(Method):
             found = self._in_one(search, query, began)
         else:
             found = self._down(search, query, began)
+        if isinstance(search, Descent) and (found is None or self._is_cut(found, query)):
+            found = self._widened(search, query, found) or found
         if found is None:
             return self._over_whole_map(query, {"coarse": clock() - began})
         if query.closed is None or not found.has_path:
@@ -153,6 +162,53 @@ class MaxDistance(Method):
         if found is None or not found.has_path or self._own is not None:
             return found
         return replace(found, optimum=partial(self._optimum_m, query, found.cells))
+
+    def _is_cut(self, found: Found, query: Query) -> bool:
+        """Return whether an answer meets closed cells."""
+        closed = query.closed
+        return (
+            closed is not None and found.has_path and closed.meets(found.cells, self._topology.grid)
+        )
+
+    def _widened(self, descent: Descent, query: Query, cut: Found | None) -> Found | None:
+        """Return a path round closed cells that a descent finds, by windows that go round them or
+        in the fields kept at a level above; None if these are cut, or the way round is long: then a
+        search of the whole map finds the best.
+
+        `cut`: the answer that meets closed cells, None where costs close cells.
+        """
+        closed = None if query.closed is None else query.closed.flat
+        is_plain = self._is_plain and self._settings.horizon_cells > 0
+        stats, began = PlanStats() if cut is None else cut.stats, clock()
+        if is_plain:
+            down = descent.find(*query.cells, closed=closed)
+            cells, expanded, n_cells = down.cells, down.expanded, down.corridor_cells
+        else:
+            cells, expanded, n_cells = None, 0, 0
+        for up in (1,) if is_plain or cut is None else (0, 1):
+            corridor = None if cells is not None else descent.corridor(*query.cells, up=up)[1]
+            if corridor is None:
+                break
+            if corridor.n_cells > SMALL_PART * descent.n_cells:
+                return None
+            path = self._refiner.search.search(
+                *query.cells,
+                field_of=corridor.field_of,
+                in_corridor=corridor.places,
+                blocked=closed,
+            )
+            cells, n_cells = path.cells, corridor.n_cells
+            expanded += path.expanded
+        if cells is None:
+            return None
+        seconds = {**stats.seconds, "around": clock() - began}
+        effort = stats.expanded + expanded
+        stats = replace(stats, expanded=effort, corridor_cells=n_cells, seconds=seconds)
+        bound = octile_distance_in_cells(*query.cells)
+        found = on_cells(self._refiner, cells, bound_cells=bound, stats=stats)
+        if cut is not None and found.cost_m > MOST_ROUND * cut.cost_m:
+            return None
+        return replace(found, optimum=partial(self._optimum_m, query, cells))
 
     def _optimum_m(self, query: Query, cells: LongArray) -> float:
         """Return the least cost of a path of cells, metres, by A* on the whole map."""

@@ -14,7 +14,6 @@ NO_WAY = -1
 """Status of a descent that found no route at a level, or no path in its fields."""
 FULL = BUCKET_FULL
 """Status of a descent whose open list has too little room."""
-_UNLIMITED = 1 << 62
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
 FARTHEST = 8
 """Horizons that a straight window looks ahead."""
@@ -89,6 +88,8 @@ class MapCells(NamedTuple):
     """int64 (n,), the field of the last level that is made of each vertex, -1 for none."""
     successors: np.ndarray
     """uint32 (9 * 256,), see `grid_search.move_tables`."""
+    limit: int
+    """Integer cost that a window's path must stay below; where cells are closed, small."""
 
 
 @njit(cache=True, nogil=True)
@@ -319,7 +320,7 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
     -------
     tuple
         The cells, int64 (k, 2), the number of the last window, the cells expanded, and the diagonal
-        moves. Without a path, no cells, and a status in place of the window.
+        moves. Without a path, no cells, and a status in place of the diagonal moves.
     """
     start, goal = ends
     cols, waits = ground.cols, (marks.records, marks.waiting)
@@ -333,6 +334,8 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
         while to > 0 and marks.cost[marks.listed[to]] < reached + ahead:
             to -= 1
         while True:
+            while to > 0 and ground.moves[fields.survivor[marks.listed[to] - base]] == 0:
+                to -= 1  # a closed cell, to which nothing leads
             target = fields.survivor[marks.listed[to] - base] if to > 0 else goal
             most = max(abs(target // cols - cell // cols), abs(target % cols - cell % cols))
             path = _with_room(path, n_path, most)
@@ -348,13 +351,13 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
                 target, to = goal, 0
             window += 1
             cost, effort = astar(
-                ground.moves, cols, (cell, target), _UNLIMITED,
+                ground.moves, cols, (cell, target), ground.limit,
                 ground.successors, ground.successors, None, None, waits[0], window, waits[1],
             )  # fmt: skip
             expanded += effort
             if cost < 0:
                 status = FULL if cost == BUCKET_FULL else NO_WAY
-                return np.empty((0, 2), np.int64), status, expanded, 0
+                return np.empty((0, 2), np.int64), window, expanded, status
             part = trace(marks.records, cols, cell, target)
             size = part.size - 1
             path = _with_room(path, n_path, size)
@@ -452,5 +455,5 @@ def descend(fields, marks, ground, number, ends, rings, horizon, named):
             fields, marks, ground, told[1], ends, n_route, horizon
         )
         if path.shape[0] == 0:
-            told[0] = told[1]
+            told[0], told[5] = told[5], 0
     return route, path
