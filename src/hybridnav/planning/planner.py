@@ -22,8 +22,7 @@ from hybridnav.planning.methods import make_method
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.planning import Planning
 from hybridnav.planning.preset import check_radius
-from hybridnav.planning.questions import Questions
-from hybridnav.planning.result import Unanswered
+from hybridnav.planning.questions import Questions, Unanswered
 from hybridnav.planning.settings import OmplPlannerSettings
 from hybridnav.topology.map import no_places
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -12,7 +13,6 @@ from hybridnav._base.renamed import renamed
 from hybridnav.errors import InvalidValueError
 from hybridnav.planning import PlanStatus
 from hybridnav.planning.endpoints import read_points
-from hybridnav.planning.result import Unanswered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,6 +37,24 @@ _WORTH = 1000
 """Least number of pairs round closures for which a hierarchy without these cells is built."""
 _PAIRS = 4096
 """Pairs that are planned at a time where there are no labels."""
+
+
+@dataclass(frozen=True)
+class Unanswered:
+    """What the reasons of a query without a path are found from."""
+
+    now: Planning
+    """How it was planned."""
+    ends: tuple[Any, Any]
+    """Start and goal, `(x, y)` or `(x, y, yaw)`, metres, map frame."""
+    closed: Closable | ClosedCells | None
+    """What was closed."""
+
+    def __call__(self) -> Explanation:
+        """Find the reasons."""
+        from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
+
+        return reasons_of(self.now, self.ends, self.closed)
 
 
 class Questions:

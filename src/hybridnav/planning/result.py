@@ -27,12 +27,10 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.closures.blocked import Closable
     from hybridnav.guide.words import Instruction
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.path import Path
-    from hybridnav.planning.planning import Planning
     from hybridnav.planning.speed import MotionLimits
     from hybridnav.reasons import Explanation
     from hybridnav.search.found import ClosedCells
@@ -91,17 +89,6 @@ class Walk(NamedTuple):
     """As it was given: a point in metres, or a name."""
     start: Sequence[float]
     """`(x, y)`, or `(x, y, yaw)` of a robot with a heading."""
-
-
-class Unanswered(NamedTuple):
-    """What the reasons of a query without a path are found from."""
-
-    now: Planning
-    """How it was planned."""
-    ends: tuple[Any, Any]
-    """Start and goal, `(x, y)` or `(x, y, yaw)`, metres, map frame."""
-    closed: Closable | ClosedCells | None
-    """What was closed."""
 
 
 Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
@@ -169,8 +156,8 @@ class PlanResult:
     rounded, `(x, y)` in metres, map frame; None of other paths."""
     instruction_source: Walk | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
-    why_source: Unanswered | Explanation | None = field(default=None, repr=False)
-    """The explanation, or the data to find it from."""
+    why_source: Callable[[], Explanation] | Explanation | None = field(default=None, repr=False)
+    """The explanation, or how to find it."""
     leaves_m: float | None = None
     """Metres from the start out of closed cells, which `leave_zone` opened; None of others."""
     proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
@@ -234,11 +221,7 @@ class PlanResult:
         """Why there is no path, found when it is read first, in about a second on a million cells;
         None with a path, and in batches."""
         source = self.why_source
-        if not isinstance(source, Unanswered):
-            return source
-        from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
-
-        return reasons_of(*source)
+        return source() if callable(source) else source
 
     @property
     def reason(self) -> str:

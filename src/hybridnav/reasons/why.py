@@ -389,7 +389,8 @@ def explain(
     >>> print(hn.explain(planner, (0.5, 0.5), (-2.0, 2.5)).words("de")[0])
     Das Ziel liegt außerhalb der Karte.
     """
-    return reasons_of(*planner.asked(start, goal, blocked), radius_m=radius_m)
+    query = planner.asked(start, goal, blocked)
+    return reasons_of(query.now, query.ends, query.closed, radius_m=radius_m)
 
 
 def reasons_of(
