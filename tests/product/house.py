@@ -254,7 +254,7 @@ def figures(target: Path) -> dict[str, float]:
         "long kernels without headings": len(bare_kernels()),
         "names at the root": len(re.findall(r" as \w+", (SRC / "__init__.pyi").read_text())) - 2,
         "parameters of commands, shared ones once": sum(
-            len(re.findall(r"typer\.(?:Option|Argument)\(", path.read_text()))
+            len(re.findall(r"\b(?:Option|Argument|option)\(", path.read_text()))
             for path in SRC.rglob("*.py")
         ),
         "lines of tests": sum(one.lines for one in sources(ROOT / "tests")),

@@ -185,6 +185,7 @@ def _search_below(fields, marks, numbers, ends, goal_at, n_above):
     listed[last], marks.kept[v], marks.cost[v] = v, -number, 0.0  # the route, backwards at the end
     at = n_above - 1
     while v != goal:
+        # Where this part leads: into a field above, or to the goal.
         to = at - PART if at > PART * LAST else 0
         above = np.int64(listed[to])
         aim = (goal, np.int64(-1), float(goal_at[0]), float(goal_at[1]))
@@ -196,12 +197,14 @@ def _search_below(fields, marks, numbers, ends, goal_at, n_above):
         if effort < 0:
             return effort, stamp
         expanded += effort
+        # Turn its links round, so that they lead from v on.
         n_part, following = 0, -1
         while w != v:
             before = np.int64(marks.came[w])
             marks.came[w], following, w = following, w, before
             n_part += 1
         marks.came[v], u = following, v
+        # List four fifths of it, the whole of the last one.
         for _ in range(n_part if to == 0 else max(n_part * 4 // 5, min(n_part, 1))):
             u = np.int64(marks.came[u])
             if marks.kept[u] != -number:
@@ -212,6 +215,7 @@ def _search_below(fields, marks, numbers, ends, goal_at, n_above):
                 marks.kept[listed[last - size]] = 0
         v = u
         at -= max((at - to) * 4 // 5, 1)
+    # Links and costs along the whole route, as one search would leave them.
     came, cost = np.int64(-1), 0.0
     for i in range(last, last - size, -1):
         v = np.int64(listed[i])
@@ -333,6 +337,7 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
         reached, ahead, to = marks.cost[marks.listed[at]], FARTHEST * horizon, at
         while to > 0 and marks.cost[marks.listed[to]] < reached + ahead:
             to -= 1
+        # Straight on to the farthest field for which that is legal.
         while True:
             while to > 0 and ground.moves[fields.survivor[marks.listed[to] - base]] == 0:
                 to -= 1  # a closed cell, to which nothing leads
@@ -347,6 +352,7 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
                 to += 1
         expanded += size
         if size == 0:
+            # Else by A* to the field a horizon ahead.
             if marks.cost[marks.listed[0]] < reached + LAST * horizon:
                 target, to = goal, 0
             window += 1
