@@ -115,3 +115,32 @@ def test_long_tuples_are_found(body: str) -> None:
 def test_a_choice_by_the_length_of_a_tuple_is_found() -> None:
     by_length = "@overload(stub)\ndef choice(given):\n    return one if len(given) == 6 else two\n"
     assert len(nameless(by_length)) == 1
+
+
+def test_kernels_return_no_named_tuples_to_python() -> None:
+    """Numba makes the object of a named tuple by a call, and if a signal's handler has raised while
+    the kernel ran, the process ends there."""
+    trees = {path: ast.parse(path.read_text()) for path in sorted(SRC.rglob("*.py"))}
+    kernels = [(path, node) for path, tree in trees.items() for node, _ in _kernels(tree)]
+    named = {
+        kernel.name
+        for _, kernel in kernels
+        for node in ast.walk(kernel)
+        if isinstance(node, ast.Return) and _is_made(node.value)
+    }
+    inside = {id(step) for _, kernel in kernels for step in ast.walk(kernel)}
+    called = [
+        f"{path.relative_to(SRC)}: {ast.unparse(node.func)}"
+        for path, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and id(node) not in inside
+        and ast.unparse(node.func).rpartition(".")[2] in named
+    ]
+    assert named == {"view_room"}  # kernels call it
+    assert called == []
+
+
+def _is_made(value: ast.expr | None) -> bool:
+    """Whether an expression calls a class."""
+    return isinstance(value, ast.Call) and ast.unparse(value.func).rpartition(".")[2][0].isupper()

@@ -225,15 +225,21 @@ def test_small_places_are_planned_from_blocks_above_them() -> None:
     assert found.expanded_fields <= 64  # of 3,600 places
 
 
-@given(scenes(), st.integers(0, 2**32 - 1), st.sampled_from(["", "unexplored", "costs", "both"]))
-@settings(max_examples=examples(150))
+@given(
+    scenes(),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(["", "unexplored", "costs", "both"]),
+    st.sampled_from(["descent", "places"]),
+)
+@settings(max_examples=examples(200))
 def test_paper_is_right_with_closures_costs_and_unexplored_cells(
-    scene: Any, seed: int, kind: str
+    scene: Any, seed: int, kind: str, levels: str
 ) -> None:
     unexplored, by_costs = kind in {"unexplored", "both"}, kind in {"costs", "both"}
     rng = np.random.default_rng(seed)
     grid = scene.grid
-    overrides = [f"planner.allow_unexplored={str(unexplored).lower()}", "planner.field_cells=4"]
+    allowed = f"planner.allow_unexplored={str(unexplored).lower()}"
+    overrides = [allowed, "planner.field_cells=4", f"planner.levels={levels}"]
     factors = rng.uniform(1, 3, grid.shape)
     closed = rng.random(grid.shape) < 0.1
     costs = hn.CostLayer(factors, closed=closed) if by_costs else None

@@ -168,8 +168,8 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
     marked = mark_blocks(kinds, limit, in_blocks=in_blocks)
     record, power, new_edge, n_vertices, n_edges = marked
     vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
-    darts = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
-    return Start(record, darts, vertices, 0, kinds.shape[1])
+    first, last = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
+    return Start(record, Darts(*first, *last), vertices, 0, kinds.shape[1])
 
 
 def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:

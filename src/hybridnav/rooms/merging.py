@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from itertools import count
+from itertools import chain, count
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -152,7 +152,8 @@ class JudgedSegments:
 def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     """Measure segments and the pairs that touch."""
     reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
-    shapes = _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
+    measured = _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
+    shapes = _merging_kernels.Shapes(*chain(*measured))
     pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
     order, opened, run_begins, run_ends = _runs(pairs, n)
     _, border, border_begins, border_ends = _runs(

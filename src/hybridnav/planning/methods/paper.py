@@ -119,9 +119,11 @@ class MaxDistance(Method):
             found = self._widened(search, query, found) or found
         if found is None:
             return self._over_whole_map(query, {"coarse": clock() - began})
-        if query.closed is None or not found.has_path:
-            return found
-        return round_closed(found, query, self._refiner)
+        if query.closed is not None and found.has_path:
+            found = round_closed(found, query, self._refiner)
+        if found.optimum is None and found.has_path and found.lower_bound_m < found.cost_m:
+            found = replace(found, optimum=partial(self._optimum_m, query, found.cells))
+        return found
 
     def _in_one(self, descent: Descent, query: Query, began: float) -> Found | None:
         """Return the path that a descent finds down to the cells, None to search the whole map."""
@@ -158,10 +160,7 @@ class MaxDistance(Method):
         """Return the path in the last fields of a descent, None to search the whole map."""
         down, corridor = descent.corridor(*query.cells)
         route = self._route_of(down.places)
-        found = self._refined(query, began, corridor, route, down.expanded_fields)
-        if found is None or not found.has_path or self._own is not None:
-            return found
-        return replace(found, optimum=partial(self._optimum_m, query, found.cells))
+        return self._refined(query, began, corridor, route, down.expanded_fields)
 
     def _is_cut(self, found: Found, query: Query) -> bool:
         """Return whether an answer meets closed cells."""
@@ -206,9 +205,7 @@ class MaxDistance(Method):
         stats = replace(stats, expanded=effort, corridor_cells=n_cells, seconds=seconds)
         bound = octile_distance_in_cells(*query.cells)
         found = on_cells(self._refiner, cells, bound_cells=bound, stats=stats)
-        if cut is not None and found.cost_m > MOST_ROUND * cut.cost_m:
-            return None
-        return replace(found, optimum=partial(self._optimum_m, query, cells))
+        return None if cut is not None and found.cost_m > MOST_ROUND * cut.cost_m else found
 
     def _optimum_m(self, query: Query, cells: LongArray) -> float:
         """Return the least cost of a path of cells, metres, by A* on the whole map."""

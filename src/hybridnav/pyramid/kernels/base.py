@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.pyramid.kernels.darts import Darts
 from hybridnav.pyramid.kernels.decimation import FIRST_MAY_SURVIVE, SECOND_MAY_SURVIVE
 
 _SURVIVES = 255
@@ -71,6 +70,7 @@ class BaseTemplates(NamedTuple):
     across_north: np.ndarray
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record for the blocks alone; return the counts of their vertices and edges.
@@ -220,7 +220,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
             sigma[last] = first
             protected[first] |= open_corner
     protect_faces(sigma, protected)
-    return Darts(sigma, origin, sweep, protected, base_edge)
+    return (sigma, origin, sweep), (protected, base_edge)
 
 
 @njit(cache=True, nogil=True)

@@ -212,8 +212,7 @@ def measure_segments(label_of, reaching, clearance, n):
         hull_begins[u] = used
         used += sizes[u]
         diameters[u] = diameter_of(corners, sizes[u])
-    measured = free, moments, rims, peaks
-    return Shapes(*measured, hull_begins, sizes, areas, diameters, hulls[:used])
+    return (free, moments, rims, peaks), (hull_begins, sizes), (areas, diameters, hulls[:used])
 
 
 @guarded

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hybridnav._base.jit import njit
+from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import find
 
 _ROOT = 0.41421356237309515  # a diagonal is longer than a side by it
@@ -28,6 +28,7 @@ def field_sums(field_of, cols, units, n_fields):
     return sums
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def join_in_blocks(cells, is_open, arcs, side):
     """Return the fields that arcs connect inside square blocks of cells: int64 (n_places,), the
@@ -80,6 +81,7 @@ def _fields_joined(arcs, of, may_pass):
     return ends[:m], first
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def neighbours_of(arcs, of, may_pass):
     """Return where the neighbours of each field begin, int64 (n + 1,), and these, int32 (m,), each

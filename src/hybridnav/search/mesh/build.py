@@ -5,6 +5,7 @@ graph of its corners at which paths bend, with landmarks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -148,7 +149,8 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     kept = are_free(corners, vertices, cells)
     polygons = merge_triangles(corners, *select_triangles(vertices, neighbours, kept))
     polygon_at = polygons_of_cells(*polygons[:2], corners, cells.shape)
-    arrays = (corners, kind_of, *polygons, polygon_at, *blocks_of(polygons[0], *polygons[2:]))
+    blocks = chain(*blocks_of(polygons[0], *polygons[2:]))
+    arrays = (corners, kind_of, *polygons, polygon_at, *blocks)
     for array in arrays:
         array.flags.writeable = False
     return ConvexMesh(*arrays)

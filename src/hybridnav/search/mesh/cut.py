@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_tria
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
+from hybridnav.search.mesh.kernels.state import Blocks
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
@@ -67,7 +69,7 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     vertices = _vertices_of(mesh, slots, free, changed)
     anew = _polygons_in(mesh, hole, vertices, free)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
-    blocks = blocks_of(polygons[0], *polygons[2:])
+    blocks = Blocks(*chain(*blocks_of(polygons[0], *polygons[2:])))
     is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
     is_gone[cut] = True
     blocks.component[is_gone] = -1

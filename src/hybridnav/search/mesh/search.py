@@ -26,8 +26,8 @@ from hybridnav.search.mesh.kernels.state import (
     Hierarchy,
     HierarchyWork,
     IntervalWork,
+    ViewRoom,
 )
-from hybridnav.search.mesh.kernels.views import view_room
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
@@ -81,7 +81,7 @@ def _work_for(mesh: ConvexMesh, graph: Graph) -> Work:
         is_open, marked = np.zeros(len(graph.head), np.bool_), np.empty(len(graph.head), np.int32)
         nodes, best = (np.empty((_ROOM, 4), np.int32), np.empty((_ROOM, 5))), np.full(n, np.inf)
         return IntervalWork(*every, is_open, marked, *nodes, heap, best, touched)
-    room = view_room(_ROOM)
+    room = ViewRoom(np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32))
     if isinstance(graph, Hierarchy):
         heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
         return HierarchyWork(*every, room, np.full((n, 4), FAR), touched, *heaps)

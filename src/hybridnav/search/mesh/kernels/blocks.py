@@ -7,7 +7,6 @@ part of the map behind a single polygon is entered only towards an end.
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav.search.mesh.kernels.state import Blocks
 
 
 @guarded
@@ -102,7 +101,7 @@ def blocks_of(first, twins, polygon_of):
     for polygon in order:
         if up[polygon] >= 0:
             depth[polygon] = depth[head_of[up[polygon]]] + 1
-    return Blocks(block_of, head_of[:n_blocks].copy(), up, component, depth)
+    return (block_of, head_of[:n_blocks].copy(), up), (component, depth)
 
 
 @njit(cache=True, nogil=True)

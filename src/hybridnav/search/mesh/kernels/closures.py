@@ -11,7 +11,6 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
-from hybridnav.search.mesh.kernels.state import Closure
 
 _MARGIN = 1e-6
 """Rounding of the point where a segment meets a row of cells, in cells."""
@@ -26,12 +25,12 @@ def closure_of(flat, n_cols):
     """
     cols = flat % n_cols
     if len(flat) == 0:
-        return Closure(np.array([1, 0, n_cols, -1]), np.zeros(1, np.int64), cols)
+        return np.array([1, 0, n_cols, -1]), np.zeros(1, np.int64), cols
     box = np.array([flat[0] // n_cols, flat[-1] // n_cols, cols.min(), cols.max()])
     starts = np.zeros(box[1] - box[0] + 2, np.int64)
     for cell in flat:
         starts[cell // n_cols - box[0] + 1] += 1
-    return Closure(box, np.cumsum(starts), cols)
+    return box, np.cumsum(starts), cols
 
 
 @njit(cache=True, nogil=True)
