@@ -90,6 +90,7 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
     new_edge
         int32 by base edge, receives the new numbers of the edges that stay.
     """
+    ends, parent = templates.vertex_end, templates.parent
     inside_east, inside_north = templates.inside_east, templates.inside_north
     across_east, across_north = templates.across_east, templates.across_north
     rows, cols = classes.shape
@@ -103,13 +104,13 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
                 vertex_parent[cell] = -1
                 continue
             p = power[row >> 1, col >> 1]
-            end = templates.vertex_end[p, row & 15, col & 15]
+            end = ends[p, row & 15, col & 15]
             vertex_end[cell] = end
             if end == _SURVIVES:
                 vertex_parent[cell] = -1
                 n_vertices += 1
             else:
-                vertex_parent[cell] = cell + templates.parent[p, row & 15, col & 15]
+                vertex_parent[cell] = cell + parent[p, row & 15, col & 15]
             end = inside_east[p, row & 7, col & 7]
             if end == 0 and col + 1 < cols and classes[row, col + 1] != 0:
                 end = across_east[min(p, power[row >> 1, (col + 1) >> 1]), row & 7]

@@ -84,7 +84,8 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     cols
         Columns of the grid.
     """
-    sigma, origin, sweep, base_edge = darts.sigma, darts.origin, darts.sweep, darts.base_edge
+    sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
+    protected, base_edge = darts.protected, darts.base_edge
     one = np.uint32(1)
     for e in range(base_edge.size):
         state[e] = ALIVE
@@ -105,7 +106,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
                 while state[following >> one] == CONTRACTED:
                     following = np.uint32(sigma[following ^ one])
                 sigma[d] = following
-                if not darts.protected[d ^ 1]:
+                if not protected[d ^ 1]:
                     touched[count] = d ^ 1
                     count += 1
             inverse[following] = d

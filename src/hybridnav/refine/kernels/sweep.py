@@ -338,10 +338,11 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     row, col, heading, d_row, d_col, turn, radius
         See `moved`.
     """
-    ahead, corners, offsets = body.ahead, body.corners, body.offsets
+    ahead, clearance, corners = body.ahead, body.clearance, body.corners
+    offsets, radii = body.offsets, body.radii
     if offsets.size == 1:
         return True
-    reach = body.radii[1]
+    reach = radii[1]
     length = abs(radius * turn) if radius != 0.0 else hypot(d_row, d_col)
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
     columns = room(ahead.shape[0], reach, length)
@@ -355,7 +356,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
         mid_row, mid_col, mid_heading = moved(
             row, col, heading, d_row, d_col, turn, radius, (part + 0.5) * share
         )
-        at_least, at_most = near(body.clearance, mid_row, mid_col)
+        at_least, at_most = near(clearance, mid_row, mid_col)
         # The base stays within half the length of the part from its middle, and the body within the
         # circumscribed radius of the base: so much clearance needs no corners.
         free = at_least >= reach + 0.5 * length * share
@@ -380,7 +381,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
                 return True
             continue
         # One state that collides settles it; the inscribed disc may show that without corners.
-        if at_most < body.radii[0]:
+        if at_most < radii[0]:
             return False
         # In between, only the corners can decide on the middle.
         if at_least < reach:

@@ -141,6 +141,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
         greatest number of arcs from a corner.
     """
     begin, size, pool = graph.begin, graph.size, graph.pool
+    kinds, follow = graph.kinds, graph.follow
     records, heap, most_settled = work
     records[node, 0], records[node, 1] = -1, stamp << 8
     records[source, 0], records[source, 1] = 0, stamp << 8 | 255
@@ -155,7 +156,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
         settled += 1
         n_wanted -= records[at, 2] == stamp
         last = records[at, 1] & 255
-        may_follow = np.int64(-1) if last == 255 else graph.follow[graph.kinds[at], last]
+        may_follow = np.int64(-1) if last == 255 else follow[kinds[at], last]
         for arc in range(begin[at], begin[at] + size[at]):
             packed = pool[arc, 1]
             further = cost + pool[arc, 0]
@@ -177,13 +178,14 @@ def _shortcuts(graph, node, stamp, work, joined):
     shortcuts, number of legs in them, stamp of the last search.
     """
     begin, size, pool = graph.begin, graph.size, graph.pool
+    kinds, follow = graph.kinds, graph.follow
     records = work[0]
     n_pairs = n_legs = 0
     end = begin[node] + size[node]
     joined[:] = False
     for one in range(begin[node], end - 1):
         cost, packed = pool[one, 0], pool[one, 1]
-        may_follow = graph.follow[graph.kinds[node], packed >> 6 & 63]
+        may_follow = follow[kinds[node], packed >> 6 & 63]
         stamp += 1
         n_wanted, limit = 0, np.int64(0)
         for two in range(one + 1, end):

@@ -142,13 +142,15 @@ def _search(lattice, start, starts, goals, most, work):
     their costs; `most`: cost of a path that is known, infinite for none.
     """
     cells, to, landmarks, cols = lattice.cells, lattice.to, lattice.landmarks, lattice.free.shape[1]
-    cost, before, mark, heap = work.cost, work.before, work.mark, work.heap
+    edges_of, edge_costs = lattice.edges_of, lattice.costs
+    cost, before, mark = work.cost, work.before, work.mark
+    rest, heap = work.rest, work.heap
     opened, closed = 2 * work.generation, 2 * work.generation + 1
     size, expanded, last, is_full = 0, 0, -1, False
     towards = _costs_towards(landmarks, starts)
     # What is left to pay from the nodes round the start.
     for k in range(len(starts[0])):
-        work.rest[starts[0][k]] = starts[1][k]
+        rest[starts[0][k]] = starts[1][k]
     # Begin at the nodes round the goal.
     for k in range(len(goals[0])):
         node, first = goals[0][k], goals[1][k]
@@ -170,16 +172,16 @@ def _search(lattice, start, starts, goals, most, work):
         expanded += 1
         # Is a path over this node the cheapest so far?
         here = cost[node]
-        if here + work.rest[node] < most:
-            most, last = here + work.rest[node], node
-        first, count = lattice.edges_of[node]
+        if here + rest[node] < most:
+            most, last = here + rest[node], node
+        first, count = edges_of[node]
         if size + count > heap.shape[0]:
             is_full = True
             break
         # Relax its edges; what cannot be part of a cheaper path is left out.
         for edge in range(first, first + count):
             other = to[edge]
-            whole = here + abs(lattice.costs[edge])
+            whole = here + abs(edge_costs[edge])
             if mark[other] < opened or whole < cost[other]:
                 row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
                 least = whole + _cost_left(
@@ -192,7 +194,7 @@ def _search(lattice, start, starts, goals, most, work):
                     size += 1
     # Leave the work arrays as they were.
     for k in range(len(starts[0])):
-        work.rest[starts[0][k]] = np.inf
+        rest[starts[0][k]] = np.inf
     return last, expanded, is_full
 
 

@@ -111,18 +111,18 @@ def open_blocks(blocks, start, goal, is_open, marked, n):
     `blocks`: `Blocks`; `is_open`: bool (b,), changed; `marked`, `n`: int32, receives newly opened
     blocks from index n on.
     """
-    depth = blocks.depth
+    head, up, depth = blocks.head, blocks.up, blocks.depth
     while start != goal:
         if depth[start] < depth[goal]:
             start, goal = goal, start
-        block = blocks.up[start]
+        block = up[start]
         if not is_open[block]:
             is_open[block] = True
             marked[n] = block
             n += 1
-        if depth[goal] == depth[start] and blocks.up[goal] == block:
+        if depth[goal] == depth[start] and up[goal] == block:
             break
-        start = blocks.head[block]
+        start = head[block]
     return n
 
 

@@ -140,7 +140,9 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
     see `advance`.
     """
     cx, cy, kinds = mesh.x, mesh.y, mesh.kinds
-    first, costs, heap = graph.first, work.costs, work.heap
+    # Arrays that loops use have names of their own: numba counts references to each field read.
+    first, heads, table, heap = graph.first, graph.heads, graph.landmark_distances, work.heap
+    costs, estimates, came = work.costs, work.estimates, work.came
     counts, bounds = work.counts, work.bounds
     sx, sy, _, _ = endpoints
     keys, values = heap.keys, heap.values
@@ -148,14 +150,14 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
     while counts[SIZE]:
         # The corner with the least estimate, unless it was reached by a cheaper path since.
         here, key = values[0], keys[0]
-        if key > costs[here] + work.estimates[here]:
+        if key > costs[here] + estimates[here]:
             counts[SIZE] = pop(heap, counts[SIZE])
             continue
         # Paths of equal length are all found: one of them is chosen.
         if key * factor > bounds[UPPER] + _TIE:
             break
         # Its edges in the quadrant into which a path may go on.
-        x, y, kind, before = cx[here], cy[here], kinds[here], work.came[here]
+        x, y, kind, before = cx[here], cy[here], kinds[here], came[here]
         px, py = (sx, sy) if before < 0 else (cx[before], cy[before])
         dx, dy = x - px, y - py
         place = 2 * here + lobe_of(kind, dx, dy)
@@ -171,8 +173,8 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
         counts[EXPANDED] += 1
         # The blocked cell lies on the left of the path here, or on the right.
         hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
-        heads, bend = graph.heads[low:high], Bend(px, py, x, y, hand)
-        _relax(mesh, graph.landmark_distances, endpoints, work, here, bend, costs[here], heads)
+        bend = Bend(px, py, x, y, hand)
+        _relax(mesh, table, endpoints, work, here, bend, costs[here], heads[low:high])
     least = min(keys[0], bounds[UPPER]) if counts[SIZE] else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
     return status
@@ -198,7 +200,9 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
         int32, the corners to reach.
     """
     cx, cy, costs, came = mesh.x, mesh.y, work.costs, work.came
-    x, y, goal_bounds = bend.x, bend.y, work.goal_bounds
+    estimates, to_goal, touched = work.estimates, work.to_goal, work.touched
+    goal_bounds, heap = work.goal_bounds, work.heap
+    px, py, x, y = bend.px, bend.py, bend.x, bend.y
     _, _, tx, ty = endpoints
     counts, bounds = work.counts, work.bounds
     size, n_touched, upper = counts[SIZE], counts[TOUCHED], bounds[UPPER]
@@ -207,7 +211,7 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
         # Only if that is cheaper, or as cheap and first in the order of directions.
         cost = cost_before + distance(x, y, wx, wy)
         known = costs[corner]
-        if cost > known + _TIE or turn_of(bend.px, bend.py, x, y, wx, wy) * bend.hand < 0.0:
+        if cost > known + _TIE or turn_of(px, py, x, y, wx, wy) * bend.hand < 0.0:
             continue
         is_new, is_tied = known == np.inf, cost >= known - _TIE
         if is_tied and not _is_first(_point(mesh, endpoints, came[corner]), (x, y), (wx, wy)):
@@ -220,9 +224,9 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
                 if reached < np.inf:
                     left = max(left, goal_bounds[0, k] - reached, reached - goal_bounds[1, k])
         else:
-            left = work.estimates[corner]
+            left = estimates[corner]
         # A corner over which no path is as short as the best one stays as it is.
-        through = cost + work.to_goal[corner]
+        through = cost + to_goal[corner]
         if min(through, cost + left) > upper + _TIE:
             continue
         came[corner] = before
@@ -237,12 +241,12 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
             counts[LAST] = corner if is_next else last
         # A corner that is reached first is noted, so that its cost is reset afterwards.
         if is_new:
-            work.estimates[corner] = left
-            work.touched[n_touched] = corner
+            estimates[corner] = left
+            touched[n_touched] = corner
             n_touched += 1
         costs[corner] = cost
         if cost + left <= upper + _TIE:
-            size = push(work.heap, size, cost + left, corner)
+            size = push(heap, size, cost + left, corner)
     counts[SIZE], counts[TOUCHED], bounds[UPPER] = size, n_touched, upper
 
 

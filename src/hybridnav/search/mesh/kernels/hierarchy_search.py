@@ -82,8 +82,8 @@ def query_hierarchy(mesh, hierarchy, cells, endpoints, work, effort):
 @njit(cache=True, nogil=True)
 def _seed(mesh, endpoints, seen, direction, work):
     """Reach the corners that an end sees, on its side, and return the number queued."""
-    cx, cy, records, counts = mesh.x, mesh.y, work.records, work.counts
-    heap = work.from_goal if direction else work.from_start
+    cx, cy, records, touched = mesh.x, mesh.y, work.records, work.touched
+    counts, heap = work.counts, work.from_goal if direction else work.from_start
     sx, sy, tx, ty = endpoints
     x, y, to_x, to_y = (tx, ty, sx, sy) if direction else (sx, sy, tx, ty)
     size = 0
@@ -91,7 +91,7 @@ def _seed(mesh, endpoints, seen, direction, work):
         if records[corner, direction] < FAR:
             continue
         if records[corner, 1 - direction] == FAR:
-            work.touched[counts[TOUCHED]] = corner
+            touched[counts[TOUCHED]] = corner
             counts[TOUCHED] += 1
         cost = cost_of(x, y, cx[corner], cy[corner])
         records[corner, direction], records[corner, 2 + direction] = cost, NO_ARC
@@ -104,9 +104,11 @@ def _seed(mesh, endpoints, seen, direction, work):
 @njit(cache=True, nogil=True)
 def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     """Search until the answer is good enough or enough corners are expanded; see `advance`."""
+    # Arrays that loops use have names of their own: numba counts references to each field read.
     cx, cy, kinds, records = mesh.x, mesh.y, mesh.kinds, work.records
     first, arcs, follow = hierarchy.first, hierarchy.arcs, hierarchy.follow
-    counts, bounds = work.counts, work.bounds
+    counts, bounds, touched = work.counts, work.bounds, work.touched
+    heaps = work.from_start, work.from_goal
     sx, sy, tx, ty = endpoints
     to_start, to_goal, n_touched = counts[SIZE], counts[MARKED], counts[TOUCHED]
 
@@ -117,16 +119,15 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     status = DONE
     while True:
         # A better path passes a waiting corner, at an estimate that is no higher than its cost.
-        low_start = work.from_start[0, 0] if to_start > 0 else FAR
-        low_goal = work.from_goal[0, 0] if to_goal > 0 else FAR
+        low_start = heaps[0][0, 0] if to_start > 0 else FAR
+        low_goal = heaps[1][0, 0] if to_goal > 0 else FAR
         least = min(low_start, low_goal)
         if least == FAR or least * factor >= best:
             break
 
         # Only look at the entry: a run that ends here leaves it in the heap for the next run.
         direction = 0 if low_start <= low_goal else 1
-        heap = work.from_goal if direction else work.from_start
-        size = to_goal if direction else to_start
+        heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
         low, high = np.int64(first[node]), np.int64(first[node + 1])
         if size + high - low > len(heap):
@@ -168,7 +169,7 @@ def _advance(mesh, hierarchy, endpoints, work, factor, limit):
 
                 # Noted once, by whichever direction comes first: the clean-up resets both.
                 if known == FAR and records[other, 1 - direction] == FAR:
-                    work.touched[n_touched] = other
+                    touched[n_touched] = other
                     n_touched += 1
                 records[other, direction], records[other, 2 + direction] = further, node << 32 | arc
                 push(heap, size, estimate, other)

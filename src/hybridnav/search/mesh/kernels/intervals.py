@@ -345,13 +345,14 @@ def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
 def polygon_in(mesh, row, col):
     """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
     cx, cy, first, component = mesh.x, mesh.y, mesh.first, mesh.component
+    begins, finishes = mesh.begins, mesh.finishes
     polygon = mesh.polygon_at[row, col]
     if polygon >= 0 and component[polygon] >= 0:
         return polygon
     for other in range(len(first) - 2, -1, -1):
         holds = component[other] >= 0
         for slot in range(first[other], first[other + 1]):
-            u, w = mesh.begins[slot], mesh.finishes[slot]
+            u, w = begins[slot], finishes[slot]
             holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
         if holds:
             return other
@@ -377,7 +378,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
         int32, room for the polygons, as many as the mesh has; their number is returned.
     """
     cx, cy, first, twins = mesh.x, mesh.y, mesh.first, mesh.twins
-    begins, finishes = mesh.begins, mesh.finishes
+    begins, finishes, polygon_of = mesh.begins, mesh.finishes, mesh.polygon_of
     found[0] = inner
     n = 1
     at = 0
@@ -393,7 +394,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
             # The segment from the centre to the point meets no wall: its polygons are connected.
             if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
                 continue
-            other = mesh.polygon_of[twins[slot]]
+            other = polygon_of[twins[slot]]
             is_known = False
             for k in range(n):
                 is_known = is_known or found[k] == other

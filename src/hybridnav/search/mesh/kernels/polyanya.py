@@ -118,17 +118,18 @@ def seed(mesh, blocks, endpoints, starts, work):
     start; `work`: an `IntervalWork`. Result: `DONE` or `WORK_FULL`.
     """
     cx, cy, kinds, first = mesh.x, mesh.y, mesh.kinds, mesh.first
+    begins, finishes, twins = mesh.begins, mesh.finishes, mesh.twins
     block_of, is_open = blocks
     sx, sy, _, _ = endpoints
-    whole, real = work.whole, work.real
+    whole, real, heap, bounds = work.whole, work.real, work.heap, work.bounds
     n = size = 0
     for polygon in starts:
         if n + first[polygon + 1] - first[polygon] > len(whole):
             return WORK_FULL
         for slot in range(first[polygon], first[polygon + 1]):
-            if mesh.twins[slot] < 0 or not is_open[block_of[slot]]:
+            if twins[slot] < 0 or not is_open[block_of[slot]]:
                 continue
-            u, w = mesh.begins[slot], mesh.finishes[slot]
+            u, w = begins[slot], finishes[slot]
             ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
             root, g = -1, 0.0
             if turn_of(sx, sy, ux, uy, wx, wy) == 0:
@@ -140,10 +141,10 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = hypot(x - sx, y - sy)
-            put((whole, real), n, mesh.twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
+            put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
             key = g + estimate_of(mesh, endpoints, whole, real, n)
-            if key < work.bounds[UPPER]:
-                size = push(work.heap, size, key, n)
+            if key < bounds[UPPER]:
+                size = push(heap, size, key, n)
                 n += 1
     work.counts[N], work.counts[SIZE] = n, size
     return DONE
@@ -176,13 +177,14 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
         `DONE`, `PAUSED` or `WORK_FULL`.
     """
     first, polygon_of = mesh.first, mesh.polygon_of
-    whole, real, heap = work.whole, work.real, work.heap
+    whole, real, best, heap = work.whole, work.real, work.best, work.heap
+    keys, values = heap.keys, heap.values
     counts, bounds = work.counts, work.bounds
     size, status = counts[SIZE], DONE
     while size and status == DONE:
-        top, key = np.int64(heap.values[0]), heap.keys[0]
+        top, key = np.int64(values[0]), keys[0]
         root = whole[top, ROOT]
-        if root >= 0 and real[top, G] > work.best[root] + _SAME:
+        if root >= 0 and real[top, G] > best[root] + _SAME:
             size = pop(heap, size)
             continue
         if key * factor >= bounds[UPPER]:
@@ -214,7 +216,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
                     if estimated < bounds[UPPER]:
                         size = push(heap, size, max(key, estimated), new)
     counts[SIZE] = size
-    least = min(heap.keys[0], bounds[UPPER]) if size else bounds[UPPER]
+    least = min(keys[0], bounds[UPPER]) if size else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
     return status
 
@@ -226,7 +228,7 @@ def _keep(work, made, n):
 
     Return the only node to expand, -1 for none or several.
     """
-    whole, real, best = work.whole, work.real, work.best
+    whole, real, best, touched = work.whole, work.real, work.best, work.touched
     counts, bounds = work.counts, work.bounds
     kept = made
     n_open = 0
@@ -244,7 +246,7 @@ def _keep(work, made, n):
                     continue
                 if g < best[root]:
                     if best[root] == np.inf:
-                        work.touched[counts[TOUCHED]] = root
+                        touched[counts[TOUCHED]] = root
                         counts[TOUCHED] += 1
                     best[root] = g
             only = kept

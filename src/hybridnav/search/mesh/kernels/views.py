@@ -176,10 +176,10 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
 @njit(cache=True, nogil=True)
 def walls_at(mesh):
     """Return a slot of a wall that begins at each corner, int32 (n,), -1 for none."""
-    begins, twins = mesh.begins, mesh.twins
+    begins, twins, polygon_of, component = mesh.begins, mesh.twins, mesh.polygon_of, mesh.component
     wall = np.full(len(mesh.kinds), -1, np.int32)
     for slot in range(len(begins)):
-        if twins[slot] < 0 and mesh.component[mesh.polygon_of[slot]] >= 0:
+        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
             wall[begins[slot]] = slot
     return wall
 
@@ -213,7 +213,7 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
         Number of pending intervals.
     """
     cx, cy, kinds, finishes = mesh.x, mesh.y, mesh.kinds, mesh.finishes
-    first, twins, polygon_of = mesh.first, mesh.twins, mesh.polygon_of
+    first, twins, polygon_of, seen = mesh.first, mesh.twins, mesh.polygon_of, room.seen
     rx, ry, lx, ly = quadrant
     # The corners beside the point; the far one is the near one of the next polygon.
     slot, far, is_last = sides
@@ -233,7 +233,7 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
             and (w == far or not _is_behind(mesh, x, y, far, w))
             and (w != far or is_last)
         ):
-            room.seen[found] = w
+            seen[found] = w
             found += 1
         twin = twins[slot]
         is_seen = (is_u and turn_of(x, y, lx, ly, ux, uy) < 0) or (right_u < 0 < right_w)
@@ -260,20 +260,20 @@ def _is_behind(mesh, x, y, corner, other):
 
 
 def _is_seen(target, polygon, x, y, rays):
-    lx, ly, rx, ry = rays
-    for goal in target.polygons:
-        if goal == polygon and turn_of(x, y, rx, ry, target.x, target.y) >= 0:
-            return turn_of(x, y, lx, ly, target.x, target.y) <= 0
+    (tx, ty, goals), (lx, ly, rx, ry) = target, rays
+    for goal in goals:
+        if goal == polygon and turn_of(x, y, rx, ry, tx, ty) >= 0:
+            return turn_of(x, y, lx, ly, tx, ty) <= 0
     return False
 
 
 def _are_seen(target, polygon, x, y, rays):
-    begin, points = target.begin, target.points
+    begin, points, is_seen = target.begin, target.points, target.is_seen
     lx, ly, rx, ry = rays
     for k in target.members[begin[polygon] : begin[polygon + 1]]:
         tx, ty = points[k, 1], points[k, 0]
         if turn_of(x, y, rx, ry, tx, ty) >= 0 and turn_of(x, y, lx, ly, tx, ty) <= 0:
-            target.is_seen[k] = True
+            is_seen[k] = True
     return False
 
 
