@@ -114,7 +114,9 @@ def _one_by_one(
     work = works.take()
     while at < count:
         found = (length, bound, starts, positions), at, n
-        at, n, short = many(search.arrays, graph, asked, work, effort, *found)
+        at, n, short = many(
+            search.arrays, search.mesh.polygon_at, graph, asked, work, effort, *found
+        )
         if short == WORK_FULL:
             work = doubled(work)
         elif short == ANSWERS_FULL:

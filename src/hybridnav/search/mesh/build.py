@@ -88,7 +88,7 @@ class ConvexMesh:
         """The mesh as kernels take it."""
         rows, cols = np.ascontiguousarray(self.corners.T, dtype=np.float64)
         sides = self.begins, self.finishes, self.twins, self.polygon_of
-        return Mesh(cols, rows, self.kinds, self.first, *sides, self.component, self.polygon_at)
+        return Mesh(cols, rows, self.kinds, self.first, *sides, self.component)
 
     @property
     def blocks(self) -> Blocks:
@@ -339,8 +339,10 @@ class CornerHierarchy:
         return Hierarchy(self.first, self.arcs, self.middles, self.follow)
 
 
-def contract_corners(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerHierarchy | None:
-    """Contract the graph of the corners of a mesh, results of `find_edges`.
+def contract_corners(
+    mesh: Mesh, edges: tuple[LongArray, IntArray], n_free: int
+) -> CornerHierarchy | None:
+    """Contract the graph of the corners of a mesh, results of `find_edges`; so many cells are free.
 
     None if contraction takes too long because corners see too many others.
 
@@ -350,7 +352,6 @@ def contract_corners(mesh: Mesh, edges: tuple[LongArray, IntArray]) -> CornerHie
     hierarchical routing in road networks, 2008. A shortcut is added only if a path may bend at both
     its corners; otherwise there are five times as many, in 60 times the time.
     """
-    n_free = np.count_nonzero(mesh.polygon_at >= 0)
     if _LOOKED_AN_EDGE * len(edges[1]) > _MOST_LOOKED * n_free:
         return None
     most = n_free * (_MOST_LOOKED if len(mesh.kinds) < MANY_CORNERS else _MORE_LOOKED)

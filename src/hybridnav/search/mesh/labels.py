@@ -37,14 +37,14 @@ class MeshLabels:
 
     def __init__(self, search: MeshSearch, graph: CornerHierarchy) -> None:
         mesh = search.mesh
-        self._mesh = search.arrays
+        self._mesh, self._polygon_at = search.arrays, mesh.polygon_at
         self._hierarchy = mesh.kinds, graph.first, graph.arcs, graph.follow
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 
     def placed(self, ends: Ends) -> Placed:
         """Return points with the polygons that contain them."""
         cells, points = ends[0], rounded_into(*ends)
-        return points, *polygons_of_points(self._mesh, (cells, points))
+        return points, *polygons_of_points(self._mesh, self._polygon_at, (cells, points))
 
     def labels(self, ends: Placed) -> Labels:
         """Return the labels of ends."""
@@ -76,7 +76,7 @@ class ViewLabels(MeshLabels):
 
     def __init__(self, search: MeshSearch, edges: tuple[LongArray, IntArray]) -> None:
         mesh = search.mesh
-        self._mesh = search.arrays
+        self._mesh, self._polygon_at = search.arrays, mesh.polygon_at
         self._edges = edges
         self.n_corners, self._n_polygons = len(mesh.corners), mesh.n_polygons
 

@@ -129,7 +129,7 @@ class MeshSearch:
 
     def __init__(self, mesh: ConvexMesh) -> None:
         self.mesh = mesh
-        self.arrays = mesh.arrays
+        self.arrays, self._polygon_at = mesh.arrays, mesh.polygon_at
         self._use(mesh.blocks)
         self.edges: tuple[LongArray, IntArray] | None = None
         """The edges between corners (see `CornerGraph`); None until they are found."""
@@ -167,7 +167,9 @@ class MeshSearch:
             progress(1, 2)
             graph: CornerGraph | CornerHierarchy | None = None
             if edges is not None:
-                graph = contract_corners(self.arrays, edges) or add_landmarks(self.arrays, edges)
+                n_free = int(np.count_nonzero(self.mesh.polygon_at >= 0))
+                graph = contract_corners(self.arrays, edges, n_free)
+                graph = graph or add_landmarks(self.arrays, edges)
             self.adopt(edges, graph)
             progress(2, 2)
 
@@ -225,7 +227,9 @@ class MeshSearch:
         limit = step = NO_LIMIT if until == math.inf else SLICE
         while True:
             effort = 1.0 + epsilon, limit
-            status, path, length, bound = answer(self.arrays, graph, cells, positions, work, effort)
+            status, path, length, bound = answer(
+                self.arrays, self._polygon_at, graph, cells, positions, work, effort
+            )
             if status == DONE:
                 break
             if status == WORK_FULL:

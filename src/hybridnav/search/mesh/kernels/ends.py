@@ -22,11 +22,11 @@ _ROOM = 4096
 
 @guarded
 @njit(cache=True, nogil=True)
-def polygons_of_points(mesh, ends):
+def polygons_of_points(mesh, polygon_at, ends):
     """Return the polygons that contain each point: int64 (n + 1,) offsets and int32.
 
-    `mesh`: a `Mesh`; `ends`: int64 (n, 2) free cells, float64 (n, 2) points in their closed
-    squares, (row, col).
+    `mesh`: a `Mesh`; `polygon_at`: see `ConvexMesh`; `ends`: int64 (n, 2) free cells, float64 (n,
+    2) points in their closed squares, (row, col).
     """
     cells, points = ends
     inside = np.empty(len(mesh.component), np.int32)
@@ -35,7 +35,7 @@ def polygons_of_points(mesh, ends):
     n = 0
     for k in range(len(cells)):
         row, col, y, x = cells[k, 0], cells[k, 1], points[k, 0], points[k, 1]
-        inner = polygon_in(mesh, row, col)
+        inner = polygon_in(mesh, polygon_at[row, col], row, col)
         n_inside = polygons_with(mesh, inner, row, col, x, y, inside)
         while n + n_inside > len(listed):
             listed = grow(listed)

@@ -322,18 +322,17 @@ APART, MET, SPLIT = -1, 1, 0
 def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
     """Find the polygons that contain the endpoints of a query.
 
-    `mesh`, `endpoints`: see `successors`; `cells`: row and column of the start's cell, then of the
-    goal's; free ones; `starts`, `goals`: int32, room for as many polygons as the mesh has. Returns
-    `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
+    `mesh`, `endpoints`: see `successors`; `cells`: `Ends`; `starts`, `goals`: int32, room for as
+    many polygons as the mesh has. Returns `APART`, `MET` or `SPLIT`; the numbers of polygons that
+    contain the start and the goal.
     """
     sx, sy, tx, ty = endpoints
-    from_row, from_col, to_row, to_col = cells
-    inner = polygon_in(mesh, from_row, from_col)
-    last = polygon_in(mesh, to_row, to_col)
+    inner = polygon_in(mesh, cells.polygon, cells.row, cells.col)
+    last = polygon_in(mesh, cells.to_polygon, cells.to_row, cells.to_col)
     if mesh.component[inner] != mesh.component[last]:
         return APART, 0, 0
-    n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
-    n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
+    n_starts = polygons_with(mesh, inner, cells.row, cells.col, sx, sy, starts)
+    n_goals = polygons_with(mesh, last, cells.to_row, cells.to_col, tx, ty, goals)
     for k in range(n_starts):
         for m in range(n_goals):
             if starts[k] == goals[m]:
@@ -342,11 +341,10 @@ def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
 
 
 @njit(cache=True, nogil=True)
-def polygon_in(mesh, row, col):
+def polygon_in(mesh, polygon, row, col):
     """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
     cx, cy, first, component = mesh.x, mesh.y, mesh.first, mesh.component
     begins, finishes = mesh.begins, mesh.finishes
-    polygon = mesh.polygon_at[row, col]
     if polygon >= 0 and component[polygon] >= 0:
         return polygon
     for other in range(len(first) - 2, -1, -1):

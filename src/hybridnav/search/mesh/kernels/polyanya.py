@@ -152,7 +152,8 @@ def seed(mesh, blocks, endpoints, starts, work):
 
 @njit(cache=True, nogil=True)
 def advance(mesh, blocks, endpoints, goals, work, factor, limit):
-    """Search until the answer is good enough or enough nodes are expanded.
+    """Search until the answer is good enough or enough nodes are expanded, and return `DONE`,
+    `PAUSED` or `WORK_FULL`.
 
     Nodes persist in `work`: the next call resumes a search that was paused or had no room. At the
     end of each run `bounds` holds the length of the best path so far and a lower bound on every
@@ -170,11 +171,6 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
         The answer is good enough when it is at most this factor times the lower bound; >= 1.
     limit
         Expansions, counted from the start, at which to pause.
-
-    Returns
-    -------
-    int
-        `DONE`, `PAUSED` or `WORK_FULL`.
     """
     first, polygon_of = mesh.first, mesh.polygon_of
     whole, real, best, heap = work.whole, work.real, work.best, work.heap

@@ -14,7 +14,7 @@ from hybridnav.search.mesh.kernels.polyanya import (
     WORK_FULL,
     query_intervals,
 )
-from hybridnav.search.mesh.kernels.state import Blocks, Corners, Hierarchy
+from hybridnav.search.mesh.kernels.state import Blocks, Corners, Ends, Hierarchy
 
 _QUERIES = {Blocks: query_intervals, Corners: query_corners, Hierarchy: query_hierarchy}
 """The kernel of one query on each kind of graph."""
@@ -43,7 +43,7 @@ def into_cell(low, at):
 
 @guarded
 @njit(cache=True, nogil=True)
-def answer(mesh, graph, cells, positions, work, effort):
+def answer(mesh, polygon_at, graph, cells, positions, work, effort):
     """Answer one query on any graph, or resume the search.
 
     `mesh`: a `Mesh`; `graph`, `work`: one of `_QUERIES`, and its work; `cells`: (row, col) of the
@@ -54,13 +54,12 @@ def answer(mesh, graph, cells, positions, work, effort):
     """
     (row, col), (to_row, to_col) = cells
     (y, x), (to_y, to_x) = positions
-    where = row, col, to_row, to_col
+    ends = polygon_at[row, col], polygon_at[to_row, to_col]
+    where = Ends(row, col, to_row, to_col, ends[0], ends[1])
     points = into_cell(col, x), into_cell(row, y), into_cell(to_col, to_x), into_cell(to_row, to_y)
     status, path = query(mesh, graph, where, points, work, effort)
     return status, path, work.bounds[UPPER], work.bounds[LOWER]
 
-
-# Kernel of many queries on a mesh, one after the other.
 
 ANSWERS_FULL = 3
 """Status of a run that ends because there are more positions than room."""
@@ -68,12 +67,14 @@ ANSWERS_FULL = 3
 
 @guarded
 @njit(cache=True, nogil=True)
-def many(mesh, graph, asked, work, effort, answers, begin, n):
+def many(mesh, polygon_at, graph, asked, work, effort, answers, begin, n):
     """Answer queries from `begin` on, until all are answered or there is no room.
+
+    Returns the query to resume, positions written, and `DONE`, `WORK_FULL` or `ANSWERS_FULL`.
 
     Parameters
     ----------
-    mesh, graph, work, effort
+    mesh, polygon_at, graph, work, effort
         See `answer`.
     asked
         int64 (q, 4) cells and float64 (q, 4) ends of all queries, as in `query_intervals`.
@@ -84,16 +85,13 @@ def many(mesh, graph, asked, work, effort, answers, begin, n):
         The first query, or the one to resume.
     n
         Positions written.
-
-    Returns
-    -------
-    tuple
-        The query to resume, positions written, and `DONE`, `WORK_FULL` or `ANSWERS_FULL`.
     """
     cells, endpoints = asked
     lengths, least, starts, positions = answers
     for k in range(begin, len(cells)):
-        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
+        row, col, to_row, to_col = cells[k]
+        ends = polygon_at[row, col], polygon_at[to_row, to_col]
+        where = Ends(row, col, to_row, to_col, ends[0], ends[1])
         points = endpoints[k, 0], endpoints[k, 1], endpoints[k, 2], endpoints[k, 3]
         status, path = query(mesh, graph, where, points, work, effort)
         if status == WORK_FULL:

@@ -29,7 +29,17 @@ class Mesh(NamedTuple):
     twins: np.ndarray
     polygon_of: np.ndarray
     component: np.ndarray
-    polygon_at: np.ndarray
+
+
+class Ends(NamedTuple):
+    """The free cells of start and goal, and `ConvexMesh.polygon_at` there."""
+
+    row: int
+    col: int
+    to_row: int
+    to_col: int
+    polygon: int
+    to_polygon: int
 
 
 class Blocks(NamedTuple):

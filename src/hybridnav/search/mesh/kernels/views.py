@@ -137,7 +137,8 @@ def see_from_point(mesh, x, y, starts, target, room, found):
 
 @njit(cache=True, nogil=True)
 def see_from_corner(mesh, corner, slot, lobe, target, room, found):
-    """Find the corners seen from a corner in one of the quadrants beside its blocked cell.
+    """Find the corners seen from a corner in one of the quadrants beside its blocked cell; return
+    their number afterwards, -1 if the room is too small.
 
     Parameters
     ----------
@@ -149,11 +150,6 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
         The wall that begins there: its polygon is the first one round the corner.
     lobe
         See `lobe_of`.
-
-    Returns
-    -------
-    int
-        Number of corners afterwards, -1 if the room is too small.
     """
     first, begins, twins, polygon_of = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
     x, y = mesh.x[corner], mesh.y[corner]
