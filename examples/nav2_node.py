@@ -10,8 +10,6 @@ from rclpy.time import Time
 from tf2_ros import Buffer, TransformException, TransformListener
 
 import hybridnav as hn
-from hybridnav.ext.fleet import load_graph
-from hybridnav.graphs import route_messages
 from hybridnav.messages import fill_message, pose_of, transform_of
 
 USUAL = {"model": "floor.hnm", "graph": "graph.geojson", "preset": "shortest", "base": "base_link"}
@@ -27,7 +25,7 @@ class PlanningNode(Node):
         super().__init__("hybridnav")
         given = {name: self.declare_parameter(name, USUAL[name]).value for name in USUAL}
         self.planner = hn.load(given["model"]).planner(given["preset"])
-        self.graph = load_graph(given["graph"])  # ids are those that the file states
+        self.graph = hn.ext.fleet.load_graph(given["graph"])  # ids are those that the file states
         self.network, self.base, self.transforms = self.graph.to_networkx(), given["base"], Buffer()
         self.listener = TransformListener(self.transforms, self)
         of = {ComputePathToPose: "compute_path_to_pose", ComputeRoute: "compute_route"}
@@ -57,7 +55,8 @@ class PlanningNode(Node):
     def route(self, goal, now):
         at = map(self.node_at, self.ends(goal)) if goal.use_poses else (goal.start_id, goal.goal_id)
         ids = nx.shortest_path(self.network, *at, weight="length_m")
-        return "NONE", route_messages(self.graph, map(self.graph.names.index, ids), stamp_ns=now)
+        nodes = map(self.graph.names.index, ids)
+        return "NONE", hn.graphs.route_messages(self.graph, nodes, stamp_ns=now)
 
     def node_at(self, pose):  # of the eight nearest nodes the one with the shortest path, or -1
         near = np.argsort(np.hypot(*(self.graph.points - pose[:2]).T))[:8].tolist()

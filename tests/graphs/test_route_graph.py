@@ -23,7 +23,7 @@ from tests.nav2_reader import read_nav2
 from tests.nav2_walk import Costmap, line_cells
 from tests.strategies import class_grids, examples, occupancy_grid
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 RADIUS_M = 0.25
 OWN = ("figure1/figure1.yaml", "office/office.yaml")
 OTHERS = ("aws_small_warehouse/005/map.yaml", "strands/g4s/g4s_y2.yaml", "turtlebot4/depot.yaml")

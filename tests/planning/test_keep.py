@@ -124,6 +124,21 @@ def test_what_is_no_result_is_refused(office: hn.TopologicalMap) -> None:
         planner.plan((1.0, 13.2), (5.0, 13.2), keep=old)
 
 
+def test_a_kept_path_does_not_bend_between_cells_that_meet_at_a_corner() -> None:
+    """The closed cell touches the kept path only where it bends round a wall."""
+    free = np.ones((9, 9), np.uint8)
+    free[1, 3] = 0
+    grid = occupancy_grid(free, resolution_m=0.5)
+    planner = hn.HybridPlanner(topology_of(grid), preset="shortest")
+    start, goal = (4.25, 1.75), (0.75, 0.25)
+    old = planner.plan(start, goal)
+    assert old.path is not None
+    assert [2.0, 0.5] in old.path.points.tolist()
+    new = planner.plan((3.25, 1.25), goal, keep=old, blocked={"cells": [(0, 4)]})
+    assert new.path is not None
+    assert [2.0, 0.5] not in new.path.points.tolist()
+
+
 @given(class_grids(max_side=16), seeds, st.sampled_from(["shortest", "octile"]))
 @settings(max_examples=examples(80), deadline=None)
 def test_shortest_paths_are_kept_while_they_are_legal_and_hardly_longer(

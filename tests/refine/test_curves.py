@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.subjects.curves import drawn, faults
@@ -65,6 +65,9 @@ def test_curve_is_as_long_as_that_of_ompl(
         state.setY(y)
         state.setYaw(math.remainder(yaw, math.tau))
     curve = shortest_curve(start, goal, radius_m=RADIUS_M, reverses=reverses)
+    turned = abs(math.remainder(goal[2] - start[2], math.tau))
+    # OMPL 2.0 takes nearly equal headings at one place for equal ones, and drives nothing.
+    assume(not 0 < turned < 1e-6 or math.dist(start[:2], goal[:2]) > 1e-6)
     assert curve.length_m == pytest.approx(space.distance(*states), abs=1e-5)
 
 

@@ -12,7 +12,7 @@ import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import replace_file
 from hybridnav.cli.common import EXIT_NOT_SOLVED, complain, islands_figures, stage
-from hybridnav.cli.query import PlanOptions, Query, checked_at
+from hybridnav.cli.query import PlanOptions, TypedQuery, checked_at
 from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
 from hybridnav.cli.warm import compiling_beside
@@ -39,12 +39,12 @@ def plan(args: PlanOptions) -> None:
     if args.is_building:
         extension("formats", "building").plan_over_floors(args)
         return
-    query = Query.read(args)
+    query = TypedQuery.read(args)
     if not _answer(query, {}):
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 
-def _answer(query: Query, seconds: Seconds) -> bool:
+def _answer(query: TypedQuery, seconds: Seconds) -> bool:
     """Read the map, plan, print, write and draw; return whether it is solved."""
     args, settings = query.args, query.settings
     if settings.planner.method == "ompl":
@@ -81,7 +81,7 @@ def _answer(query: Query, seconds: Seconds) -> bool:
 # The pyramid, and what is planned on it.
 
 
-def grow(query: Query, model: hn.Model, seconds: Seconds) -> hn.TopologicalMap:
+def grow(query: TypedQuery, model: hn.Model, seconds: Seconds) -> hn.TopologicalMap:
     """Build the pyramid, with rooms for a tour, while the search is compiled.
 
     They are those of a file that is named, of the model, of a file in the map's folder, or found.
@@ -114,7 +114,7 @@ def grow(query: Query, model: hn.Model, seconds: Seconds) -> hn.TopologicalMap:
 
 
 def find(
-    query: Query, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
+    query: TypedQuery, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
 ) -> hn.PlanResult | hn.Tour:
     """Plan between two points, or a tour."""
     args, spent = query.args, Seconds()
@@ -129,7 +129,7 @@ def find(
 
 
 def find_alternatives(
-    query: Query, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
+    query: TypedQuery, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: Seconds
 ) -> hn.Alternatives | None:
     """Find alternatives between the two waypoints, None if they are not asked for."""
     args = query.args
@@ -149,7 +149,7 @@ def find_alternatives(
 
 
 def plan_on_whole_grid(
-    query: Query,
+    query: TypedQuery,
     planner: hn.HybridPlanner,
     closed: hn.Blocked | None,
     costs: hn.CostLayer | None,
@@ -229,7 +229,7 @@ def left_closures(
 
 
 def explain(
-    query: Query,
+    query: TypedQuery,
     planner: hn.HybridPlanner,
     outcome: hn.PlanResult | hn.Tour,
     closed: hn.Blocked | None,
@@ -267,7 +267,7 @@ def _results(outcome: hn.PlanResult | hn.Tour) -> Sequence[hn.PlanResult]:
 
 
 def print_refusal(
-    query: Query, grid: hn.OccupancyGrid, status: hn.PlanStatus, seconds: Seconds
+    query: TypedQuery, grid: hn.OccupancyGrid, status: hn.PlanStatus, seconds: Seconds
 ) -> None:
     """Print the answer for points outside the map, as a planner would give it."""
     refused = refused_result(status, query.settings, query.waypoints)
@@ -284,7 +284,7 @@ def print_refusal(
 
 
 def print_answer(
-    query: Query,
+    query: TypedQuery,
     grid: hn.OccupancyGrid,
     outcome: hn.PlanResult | hn.Tour,
     beside: dict[str, Any],

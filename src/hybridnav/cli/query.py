@@ -177,7 +177,7 @@ class PlanOptions(FloorOptions):
 
 
 @dataclass(frozen=True)
-class Query:
+class TypedQuery:
     """What a command line asks of one map: a plan between two points, or a tour in rooms."""
 
     args: PlanOptions
@@ -188,7 +188,7 @@ class Query:
     """The start, what lies between, the goal."""
 
     @classmethod
-    def read(cls, args: PlanOptions) -> Query:
+    def read(cls, args: PlanOptions) -> TypedQuery:
         """Read and check the options; refuse files that cannot be written."""
         _check_files(args)
         checked_at(args.at)

@@ -222,6 +222,9 @@ def compile_plan(preset: str) -> None:
         planner.plan(*endpoints).to_dict()
         if preset == "paper":
             _ = topology.level.through_m  # chooses among arcs that join the same two places
+            # Fields below the places, which this map has none of by default.
+            fine = hn.load_preset("paper", overrides=["planner.field_cells=4"])
+            hn.HybridPlanner(topology, preset=fine).plan(*endpoints)
         if preset == "robot":
             path = planner.plan(*endpoints, smooth="line-of-sight").path
             assert path is not None  # noqa: S101 - the rooms have doors

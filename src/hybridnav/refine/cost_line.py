@@ -149,11 +149,24 @@ class CostLine:
         -------
         FloatArray
             float64 (m, 2), `(x, y)` in metres: `start`, and the points of the line from the first
-            one in its sight. None where a segment may not be driven, or it costs more.
+            one in its sight. None where a segment or a bend may not be driven, or it costs more.
         """
         here, most = self.on_grain(np.array([start]))[0], most_m / self._frame.resolution_m
         rest = kernels.rest_of(self.free, self.factors, self.on_grain(line), here, most)
-        return self.in_metres(rest, start, line[-1]) if len(rest) else None
+        if not len(rest) or not (self._corner_cutting or self._turns_freely(rest)):
+            return None
+        return self.in_metres(rest, start, line[-1])
+
+    def _turns_freely(self, line: FloatArray) -> bool:
+        """Return whether no bend lies between two blocked cells that meet there at a corner."""
+        inner = line[1:-1]
+        rows, cols = inner[(inner == np.rint(inner)).all(axis=1)].astype(np.int64).T
+        shape = self.free.shape
+        within = (rows > 0) & (cols > 0) & (rows < shape[0]) & (cols < shape[1])
+        rows, cols = rows[within], cols[within]
+        down = self.free[rows - 1, cols - 1] | self.free[rows, cols]
+        up = self.free[rows - 1, cols] | self.free[rows, cols - 1]
+        return bool((down & up).all())
 
     def on_grain(self, points: FloatArray) -> FloatArray:
         """Return the positions of points, on the grain of exact tests; points on the rim of the map

@@ -153,7 +153,7 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     """Measure segments and the pairs that touch."""
     reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
     measured = _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
-    shapes = _merging_kernels.Shapes(*chain(*measured))
+    shapes = _merging_kernels.SegmentShapes(*chain(*measured))
     pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
     order, opened, run_begins, run_ends = _runs(pairs, n)
     _, border, border_begins, border_ends = _runs(

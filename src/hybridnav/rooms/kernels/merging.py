@@ -118,8 +118,8 @@ def union_hull(state, u, v):
     return corners, size, area
 
 
-class Shapes(NamedTuple):
-    """Shapes of segments; see `SegmentState`."""
+class SegmentShapes(NamedTuple):
+    """SegmentShapes of segments; see `SegmentState`."""
 
     free: np.ndarray
     moments: np.ndarray

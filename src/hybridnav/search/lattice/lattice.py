@@ -77,9 +77,9 @@ class Lattice:
     """Cells on a side of a block."""
 
     @property
-    def arrays(self) -> kernels.Network:
+    def arrays(self) -> kernels.LatticeNet:
         """The lattice as kernels take it."""
-        return kernels.Network(*(getattr(self, name) for name in kernels.Network._fields))
+        return kernels.LatticeNet(*(getattr(self, name) for name in kernels.LatticeNet._fields))
 
     @property
     def n_nodes(self) -> int:

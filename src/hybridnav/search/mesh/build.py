@@ -23,7 +23,7 @@ from hybridnav.search.mesh.kernels.blocks import (
     sides_of_triangles,
 )
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER, kinds_of, walls_of
-from hybridnav.search.mesh.kernels.state import Blocks, Corners, Hierarchy, Mesh
+from hybridnav.search.mesh.kernels.state import Corners, Hierarchy, Mesh, MeshBlocks
 from hybridnav.search.mesh.kernels.views import arcs_of, classes_that_follow
 
 if TYPE_CHECKING:
@@ -91,10 +91,10 @@ class ConvexMesh:
         return Mesh(cols, rows, self.kinds, self.first, *sides, self.component)
 
     @property
-    def blocks(self) -> Blocks:
+    def blocks(self) -> MeshBlocks:
         """The blocks as kernels take them."""
         up = self.block_up
-        return Blocks(self.block_of, self.block_head, up, self.component, self.depth)
+        return MeshBlocks(self.block_of, self.block_head, up, self.component, self.depth)
 
     @property
     def is_convex(self) -> BoolArray:

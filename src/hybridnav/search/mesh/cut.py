@@ -14,7 +14,7 @@ from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_tria
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
 from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
-from hybridnav.search.mesh.kernels.state import Blocks
+from hybridnav.search.mesh.kernels.state import MeshBlocks
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
@@ -69,7 +69,7 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     vertices = _vertices_of(mesh, slots, free, changed)
     anew = _polygons_in(mesh, hole, vertices, free)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
-    blocks = Blocks(*chain(*blocks_of(polygons[0], *polygons[2:])))
+    blocks = MeshBlocks(*chain(*blocks_of(polygons[0], *polygons[2:])))
     is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
     is_gone[cut] = True
     blocks.component[is_gone] = -1

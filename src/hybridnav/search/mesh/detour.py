@@ -11,7 +11,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.cut import renew_mesh
 from hybridnav.search.mesh.kernels import closures as kernels
-from hybridnav.search.mesh.kernels.state import Closure
+from hybridnav.search.mesh.kernels.state import MeshClosure
 from hybridnav.search.mesh.search import MeshPath, MeshSearch
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class DetourSearch:
         self._open, self._free = opened, free
         self._scratch = Pool(partial(np.copy, free)) if scratch is None else scratch
         self._closed = closed[free.ravel()[closed]]
-        self._closure = Closure(*kernels.closure_of(self._closed, free.shape[1]))
+        self._closure = MeshClosure(*kernels.closure_of(self._closed, free.shape[1]))
         self._search: MeshSearch | None = None
 
     @property

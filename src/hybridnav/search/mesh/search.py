@@ -20,12 +20,12 @@ from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, N_COUNTS, WOR
 from hybridnav.search.mesh.kernels.queries import answer
 from hybridnav.search.mesh.kernels.state import (
     GROWING,
-    Blocks,
     CornerWork,
     Heap,
     Hierarchy,
     HierarchyWork,
     IntervalWork,
+    MeshBlocks,
     ViewRoom,
 )
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from hybridnav.search.mesh.build import ConvexMesh, CornerGraph, CornerHierarchy
     from hybridnav.search.mesh.kernels.state import Corners
 
-    Graph = Blocks | Corners | Hierarchy
+    Graph = MeshBlocks | Corners | Hierarchy
     Work = IntervalWork | CornerWork | HierarchyWork
 
 
@@ -77,7 +77,7 @@ def _work_for(mesh: ConvexMesh, graph: Graph) -> Work:
     counts, bounds = np.zeros(N_COUNTS, np.int64), np.zeros(2)
     every = np.empty(n_polygons, np.int32), np.empty(n_polygons, np.int32), counts, bounds
     touched = np.empty(n, np.int32)
-    if isinstance(graph, Blocks):
+    if isinstance(graph, MeshBlocks):
         is_open, marked = np.zeros(len(graph.head), np.bool_), np.empty(len(graph.head), np.int32)
         nodes, best = (np.empty((_ROOM, 4), np.int32), np.empty((_ROOM, 5))), np.full(n, np.inf)
         return IntervalWork(*every, is_open, marked, *nodes, heap, best, touched)

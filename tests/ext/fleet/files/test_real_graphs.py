@@ -90,7 +90,8 @@ def test_the_graph_of_both_floors_is_judged_as_if_no_file_lay_between(gdc, tmp_p
     writers[kind](align_floors(own))
     matched = match_graph(house, hn.ext.fleet.load_building_graph(path), align=True)
     for name, floor in matched.floors.items():
-        assert np.allclose(floor.graph.points, own.floor(name).graph.points, rtol=0, atol=1e-5)
+        # A node on the side of a blocked cell is placed a grain of the cell, 0.05 m / 1024, aside.
+        assert np.allclose(floor.graph.points, own.floor(name).graph.points, rtol=0, atol=5e-5)
     check = check_building_graph(matched)
     assert {found.kind for found in check.findings} <= {"island"}  # as free space has them
     for checked in check.floors.values():

@@ -27,7 +27,7 @@ FULL = -1
 """Number of expanded nodes that says that the open list had no room."""
 
 
-class Network(NamedTuple):
+class LatticeNet(NamedTuple):
     """A lattice; see `Lattice` for its fields."""
 
     free: np.ndarray
@@ -66,7 +66,7 @@ def _nodes_near(lattice, at, cell, nodes, costs):
 
     Return how many there are, and whether the only one is not seen.
 
-    `lattice`: a `Network`; `at`: float64 (2,), position; `cell`: int64 (2,), (row, col) of the
+    `lattice`: a `LatticeNet`; `at`: float64 (2,), position; `cell`: int64 (2,), (row, col) of the
     free cell that holds it: on a side, which one; `nodes`, `costs`: int64 and float64, with room
     for the nodes of nine blocks.
     """
@@ -260,7 +260,7 @@ def find_line(lattice, ends, ends_in, work):
     The line has no positions if there is no path. `FULL` in place of the number of nodes asks for
     more room in the open list.
 
-    `lattice`: a `Network`; `ends`: float64 (2, 2), start and goal; `ends_in`: int64 (2, 2), (row,
+    `lattice`: `LatticeNet`; `ends`: float64 (2, 2), start and goal; `ends_in`: int64 (2, 2), (row,
     col) of the free cells that hold them; `work`: a `Work`.
     """
     free, factors = lattice.free, lattice.factors

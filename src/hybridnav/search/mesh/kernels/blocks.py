@@ -108,7 +108,7 @@ def blocks_of(first, twins, polygon_of):
 def open_blocks(blocks, start, goal, is_open, marked, n):
     """Open the blocks between two polygons of one component; return the index behind the last one.
 
-    `blocks`: `Blocks`; `is_open`: bool (b,), changed; `marked`, `n`: int32, receives newly opened
+    `blocks`: `MeshBlocks`; `is_open`: bool (b,), changed; `marked`, `n`: int32, receives opened
     blocks from index n on.
     """
     head, up, depth = blocks.head, blocks.up, blocks.depth

@@ -145,7 +145,7 @@ def _is_beside(box, ax, ay, bx, by):
 def _crosses(closure, free, ax, ay, bx, by):
     """Return whether a segment that is legal in free space is illegal with cells closed.
 
-    `closure`: a `Closure`; `free`: bool (rows, cols), before it; `ax`, `ay`, `bx`, `by`: the
+    `closure`: a `MeshClosure`; `free`: bool (rows, cols), before it; `ax`, `ay`, `bx`, `by`: the
     segment. Its endpoints are not tested: a path that goes on in another direction must be tested
     there.
     """

@@ -26,7 +26,7 @@ from hybridnav.search.mesh.kernels.polyanya import (
     push,
     put_corner,
 )
-from hybridnav.search.mesh.kernels.state import Bend, Target
+from hybridnav.search.mesh.kernels.state import CornerBend, Target
 from hybridnav.search.mesh.kernels.views import distance, lobe_of, see_from_point
 
 _SLACK = 1e-9
@@ -129,7 +129,7 @@ def _seed(mesh, table, endpoints, seen, work):
         if goal_bounds[0, k] == np.inf:
             goal_bounds[0, k], goal_bounds[1, k] = -np.inf, np.inf
     work.counts[SIZE] = 0
-    _relax(mesh, table, endpoints, work, -1, Bend(sx, sy, sx, sy, 0.0), 0.0, from_start)
+    _relax(mesh, table, endpoints, work, -1, CornerBend(sx, sy, sx, sy, 0.0), 0.0, from_start)
 
 
 @njit(cache=True, nogil=True)
@@ -173,7 +173,7 @@ def _advance(mesh, graph, endpoints, work, factor, limit):
         counts[EXPANDED] += 1
         # The blocked cell lies on the left of the path here, or on the right.
         hand = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
-        bend = Bend(px, py, x, y, hand)
+        bend = CornerBend(px, py, x, y, hand)
         _relax(mesh, table, endpoints, work, here, bend, costs[here], heads[low:high])
     least = min(keys[0], bounds[UPPER]) if counts[SIZE] else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
@@ -195,7 +195,7 @@ def _relax(mesh, table, endpoints, work, before, bend, cost_before, heads):
     before, cost_before
         Number of the corner, and its cost in cells.
     bend
-        A `Bend` there.
+        A `CornerBend` there.
     heads
         int32, the corners to reach.
     """

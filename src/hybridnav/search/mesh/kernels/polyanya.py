@@ -49,10 +49,10 @@ _SAME = 1e-9
 def query_intervals(mesh, blocks, cells, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
-    `mesh`, `endpoints`: see `successors`; `blocks`: `Blocks`; `cells`: see `polygons_of_endpoints`;
-    `work`: an `IntervalWork`; `effort`: `factor` and `limit` of `advance`; a limit below zero ends
-    the query. Returns `DONE`, `PAUSED` or `WORK_FULL`; when done the path, float64 (n, 2) as (row,
-    col), without rows if there is none.
+    `mesh`, `endpoints`: see `successors`; `blocks`: `MeshBlocks`; `cells`: see
+    `polygons_of_endpoints`; `work`: an `IntervalWork`; `effort`: `factor` and `limit` of `advance`;
+    a limit below zero ends the query. Returns `DONE`, `PAUSED` or `WORK_FULL`; when done the
+    path, float64 (n, 2) as (row, col), without rows if there is none.
     """
     starts, goals, whole = work.starts, work.goals, work.whole
     counts, bounds = work.counts, work.bounds

@@ -14,9 +14,9 @@ from hybridnav.search.mesh.kernels.polyanya import (
     WORK_FULL,
     query_intervals,
 )
-from hybridnav.search.mesh.kernels.state import Blocks, Corners, Ends, Hierarchy
+from hybridnav.search.mesh.kernels.state import Corners, Ends, Hierarchy, MeshBlocks
 
-_QUERIES = {Blocks: query_intervals, Corners: query_corners, Hierarchy: query_hierarchy}
+_QUERIES = {MeshBlocks: query_intervals, Corners: query_corners, Hierarchy: query_hierarchy}
 """The kernel of one query on each kind of graph."""
 
 

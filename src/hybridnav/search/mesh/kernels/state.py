@@ -1,5 +1,5 @@
-"""State of the mesh's kernels: `Mesh`; what is searched, `Blocks`, `Corners` or `Hierarchy`; their
-work arrays; rooms and targets of views; `Closure`.
+"""State of the mesh's kernels: `Mesh`; what is searched, `MeshBlocks`, `Corners` or `Hierarchy`;
+their work arrays; rooms and targets of views; `MeshClosure`.
 
 Points are x = column, y = row in grid units: corners are whole numbers. Kernels that exist for each
 kind of graph, or of target, are chosen by the class of the tuple.
@@ -42,7 +42,7 @@ class Ends(NamedTuple):
     to_polygon: int
 
 
-class Blocks(NamedTuple):
+class MeshBlocks(NamedTuple):
     """What a query of intervals searches: the blocks of a mesh and their tree; see `blocks_of`."""
 
     block_of: np.ndarray
@@ -183,7 +183,7 @@ class HierarchyWork(NamedTuple):
     from_goal: np.ndarray
 
 
-class Bend(NamedTuple):
+class CornerBend(NamedTuple):
     """A corner at which a path may bend, or its start."""
 
     px: float
@@ -195,7 +195,7 @@ class Bend(NamedTuple):
     """The hand to which a path bends there: above zero for the left, 0 for either."""
 
 
-class Closure(NamedTuple):
+class MeshClosure(NamedTuple):
     """Closed cells in rows."""
 
     box: np.ndarray
