@@ -17,7 +17,7 @@ LIMITS = {
     "code": 61_700,
     "lines": 98_000,
     "files": 410,
-    "code outside ext": 46_500,
+    "code outside ext": 46_600,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 124,

@@ -220,8 +220,8 @@ def test_a_route_is_the_shortest_of_the_graph_of_the_bundle(actions: Any, node: 
         network.add_edge(tail, head, cost=file.costs[number], id=number)
     lengths = dict(nx.all_pairs_dijkstra_path_length(network, weight="cost"))
     tried = 0
-    for tail in list(file.points)[:8:3]:
-        for head in list(file.points)[::3]:
+    for tail in list(file.points)[:4]:
+        for head in list(file.points)[:10]:
             goal = actions.ComputeRoute.Goal()
             goal.start_id, goal.goal_id = tail, head
             status, result = call(node, "compute_route", goal)

@@ -197,6 +197,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
                 size = push(heap, size, key, top)
                 status = WORK_FULL
                 break
+            # The goal may lie on a side of several polygons.
             is_goal = False
             for goal in goals:
                 is_goal = is_goal or goal == polygon
@@ -206,6 +207,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
             top = _keep(work, made, n)
             if top >= 0:
                 continue
+            # Several: they wait for their turn, by their estimates.
             for new in range(made, counts[N]):
                 if whole[new, SLOT] >= 0:
                     estimated = real[new, G] + estimate_of(mesh, endpoints, whole, real, new)
