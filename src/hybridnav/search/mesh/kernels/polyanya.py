@@ -183,6 +183,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
         if root >= 0 and real[top, G] > best[root] + _SAME:
             size = pop(heap, size)
             continue
+        # No path is shorter than the least key.
         if key * factor >= bounds[UPPER]:
             break
         if counts[EXPANDED] >= limit:
@@ -213,6 +214,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
                     estimated = real[new, G] + estimate_of(mesh, endpoints, whole, real, new)
                     if estimated < bounds[UPPER]:
                         size = push(heap, size, max(key, estimated), new)
+    # What the next run goes on with.
     counts[SIZE] = size
     least = min(keys[0], bounds[UPPER]) if size else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
