@@ -73,8 +73,8 @@ def page(data: Data) -> str:
 
 Thrun's three questions, asked of every method on {_maps_in_words(data)}.
 `make study` asks them anew and writes this page and its charts. This is {_how_much(data)}.
-Every number comes from [its data](data/study.json), which a script fills from the records, and
-which have more: consistency by kinds of checks, work, each map. [The harness](harness.md) describes
+Every number comes from its data (`docs/data/study.json`), which a script fills from the records.
+They have more: consistency by kinds of checks, work, each map. [The harness](harness.md) describes
 the checks and the columns.
 
 ## The answers

@@ -253,7 +253,7 @@ def test_all_that_plans_is_in_a_list(cli: Any) -> None:
         "plan_blocked"
     }
     assert set(hn.preset_names()) == HONOUR.keys() | REFUSE
-    listed = re.findall(r"^  ([a-z]+)  +\S", cli("--help").out, flags=re.MULTILINE)
+    listed = re.findall(r"^    ([a-z]+)  +\S", cli("--help").out, flags=re.MULTILINE)
     assert set(listed) == COMMANDS | NO_PLANNER
 
 

@@ -68,7 +68,6 @@ def test_a_picture_looks_as_it_did(name, tmp_path):
         ("dual", "INK", style.FREE),
         ("plan", "PATH", style.FREE),
         ("rooms", "PLACES", style.PLACES[::-1]),
-        ("search", "PATH", style.FREE),
     ],
 )
 def test_a_picture_that_lacks_something_does_not(name, setting, value, tmp_path, monkeypatch):

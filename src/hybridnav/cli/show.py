@@ -68,7 +68,7 @@ def show(args: ShowOptions) -> None:
     check_picture(args.plot)
     if watch is not None:
         if watch[0] != "descent":
-            raise UsageError(f"--watch must be 'descent FILE', got {printable(watch[0])!r}")
+            raise UsageError(f"--watch must be 'descent FILE', got {printable(watch[0])!r:.80}")
         check_output(watch[1], "--watch", (".gif", ".png", ".pdf", ".svg"))
     settings = args.settings()
     seconds: dict[str, float] = {}

@@ -34,11 +34,13 @@ class FramePose(NamedTuple):
     resolution: float
     """Side of a cell in metres."""
     x: float
-    """Of the origin, in metres."""
+    """x of the origin, metres."""
     y: float
+    """y of the origin, metres."""
     cosine: float
-    """Of the yaw."""
+    """Cosine of the yaw."""
     sine: float
+    """Sine of the yaw."""
 
 
 @dataclass(frozen=True, slots=True)

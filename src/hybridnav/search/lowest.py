@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.rows import unique_rows
 from hybridnav.pyramid.record import SURVIVES, farthest_apart
 from hybridnav.search.kernels import fields as _kernels
 
@@ -271,9 +272,12 @@ def _patched_top(
     sizes = np.concatenate([np.diff(top.hulls[0])[stays], np.diff(start)])[order]
     ends = np.cumsum(sizes)
     every = np.concatenate([top.hulls[1], points])
-    hulls = np.append(0, ends), every[np.repeat(begins - ends + sizes, sizes) + np.arange(ends[-1])]
+    hulls = (
+        np.append(0, ends),
+        every[np.repeat(begins - ends + sizes, sizes) + np.arange(sizes.sum())],
+    )
 
-    fields = np.unique(layer.of[pairs], axis=0)
+    fields = unique_rows(layer.of[pairs]).rows
     fields = fields[fields[:, 0] != fields[:, 1]]
     distances = np.sqrt(farthest_apart(hulls, fields))
     keys, costs = _sorted_costs(new[fields], distances, n_cells)

@@ -247,3 +247,20 @@ def test_an_interrupted_update_leaves_the_version_before_or_now() -> None:
         assert told(planner.plan(*ends)) in answers
         planner.update(grid=now)
         assert told(planner.plan(*ends)) == answers[1]
+
+
+@pytest.mark.parametrize("merge_m", [1.6, 0.1])
+def test_a_map_that_closes_whole_and_opens_again_is_followed(merge_m: float) -> None:
+    free = np.zeros((12, 12), np.float32)
+    ends = (0.05, 0.05), (1.15, 1.15)
+    built = hn.DualGraphPyramid.build(grid_of(free, "", 0.0), merge_distance_m=merge_m)
+    version = OnlinePyramid.of(built)
+    preset = hn.load_preset("paper", overrides=["planner.field_cells=4"])
+    planner = hn.HybridPlanner(hn.TopologicalMap(version), preset=preset)
+    open_m = planner.plan(*ends).cost
+    for values in (free + 1, free):
+        version = version.update(grid_of(values, "", 0.0)).version
+        planner.update(grid=version)
+        result = planner.plan(*ends)
+        assert result.solved is not bool(values[0, 0])
+    assert result.cost == open_m

@@ -62,12 +62,17 @@ class BaseTemplates(NamedTuple):
     """`Templates` on one map."""
 
     vertex_end: np.ndarray
+    """The level at which a cell joins its parent, by its place in its block."""
     parent: np.ndarray
     """int64, `steps_to_parents`."""
     inside_east: np.ndarray
+    """The end of the edge to the east inside a block."""
     inside_north: np.ndarray
+    """To the north."""
     across_east: np.ndarray
+    """The end of the edge to the next block in the east."""
     across_north: np.ndarray
+    """In the north."""
 
 
 @guarded

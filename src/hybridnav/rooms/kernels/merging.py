@@ -122,13 +122,21 @@ class SegmentShapes(NamedTuple):
     """SegmentShapes of segments; see `SegmentState`."""
 
     free: np.ndarray
+    """Free cells of each."""
     moments: np.ndarray
+    """Sums of rows, columns and their products over the cells."""
     rims: np.ndarray
+    """Sides of cells at walls and at other segments."""
     peaks: np.ndarray
+    """The greatest clearance."""
     hull_begins: np.ndarray
+    """Offsets of the hulls in `hulls`."""
     hull_sizes: np.ndarray
+    """How many corners each hull has."""
     hull_areas: np.ndarray
+    """Areas inside the hulls, cells."""
     diameters: np.ndarray
+    """Greatest distances of two corners, cells."""
     hulls: np.ndarray
     """float64 (m, 2), corners of the hulls, one after the other."""
 

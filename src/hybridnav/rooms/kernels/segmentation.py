@@ -105,6 +105,7 @@ class GapLengths(NamedTuple):
     """Lengths of gaps between walls, in cells."""
 
     longest: int
+    """The longest gap that is looked for."""
     door: int
     """A gap that needs no least wall on either side."""
     window: int

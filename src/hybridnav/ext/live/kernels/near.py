@@ -17,9 +17,13 @@ class PlaceColumns(NamedTuple):
     numbers: np.ndarray
     """int64 (n,), ascending."""
     area: np.ndarray
+    """Cells."""
     survivor: np.ndarray
+    """Flat cell."""
     box: np.ndarray
+    """First and last row, first and last column."""
     part: np.ndarray
+    """The part of free space, or of obstacles, that it belongs to."""
 
 
 @njit(cache=True, nogil=True)

@@ -31,15 +31,25 @@ class LatticeNet(NamedTuple):
     """A lattice; see `Lattice` for its fields."""
 
     free: np.ndarray
+    """Cells that may be entered."""
     factors: np.ndarray
+    """What a metre costs in each."""
     nodes_of: np.ndarray
+    """Offsets of the nodes of each cell."""
     parts: np.ndarray
+    """The places of nodes on the sides of their cells."""
     cells: np.ndarray
+    """The cells of nodes."""
     edges_of: np.ndarray
+    """Offsets of the edges of each node."""
     to: np.ndarray
+    """The heads of edges."""
     costs: np.ndarray
+    """What edges cost, in cells."""
     landmarks: np.ndarray
+    """Distances from landmarks to nodes."""
     side: int
+    """Nodes on a side of a cell."""
 
 
 class Work(NamedTuple):

@@ -46,11 +46,24 @@ def into_cell(low, at):
 def answer(mesh, polygon_at, graph, cells, positions, work, effort):
     """Answer one query on any graph, or resume the search.
 
-    `mesh`: a `Mesh`; `graph`, `work`: one of `_QUERIES`, and its work; `cells`: (row, col) of the
-    cells of start and goal; `positions`: start and goal, (row, col), which are rounded and moved
-    into the closed squares of these cells; `effort`: the answer is good enough when it is at most
-    this factor times the lower bound; the expansions at which to pause, below zero to end. Returns
-    status and path as `query_intervals`, the length and the lower bound.
+    Returns status and path as `query_intervals`, the length and the lower bound.
+
+    Parameters
+    ----------
+    mesh
+        A `Mesh`.
+    polygon_at
+        See `ConvexMesh.polygon_at`.
+    graph, work
+        One of `_QUERIES`, and its work.
+    cells
+        (row, col) of the cells of start and goal.
+    positions
+        Start and goal, (row, col), which are rounded and moved into the closed squares of these
+        cells.
+    effort
+        The answer is good enough when it is at most this factor times the lower bound; the
+        expansions at which to pause, below zero to end.
     """
     (row, col), (to_row, to_col) = cells
     (y, x), (to_y, to_x) = positions

@@ -19,27 +19,40 @@ class Mesh(NamedTuple):
     """A mesh; see `ConvexMesh` for a field that says nothing here."""
 
     x: np.ndarray
-    """float64 (n,), of the corners."""
+    """Those of the corners."""
     y: np.ndarray
+    """Those of the corners."""
     kinds: np.ndarray
+    """What blocked cells meet at each corner."""
     first: np.ndarray
+    """Offsets of the sides of each polygon."""
     begins: np.ndarray
+    """The corner at which each side begins."""
     finishes: np.ndarray
     """int32 (s,), the corner at which each side ends."""
     twins: np.ndarray
+    """The same side of the next polygon, -1 for walls."""
     polygon_of: np.ndarray
+    """The polygon of each side."""
     component: np.ndarray
+    """The part of free space of each polygon."""
 
 
 class Ends(NamedTuple):
     """The free cells of start and goal, and `ConvexMesh.polygon_at` there."""
 
     row: int
+    """That of the start."""
     col: int
+    """That of the start."""
     to_row: int
+    """That of the goal."""
     to_col: int
+    """That of the goal."""
     polygon: int
+    """At the start."""
     to_polygon: int
+    """At the goal."""
 
 
 class MeshBlocks(NamedTuple):
@@ -61,17 +74,24 @@ class Corners(NamedTuple):
     """The graph of the corners of a mesh, with landmarks; see `CornerGraph`."""
 
     first: np.ndarray
+    """Offsets of the edges of each corner."""
     heads: np.ndarray
+    """The corners to which they lead."""
     landmark_distances: np.ndarray
+    """Lengths of shortest paths."""
 
 
 class Hierarchy(NamedTuple):
     """The contracted graph of the corners of a mesh; see `CornerHierarchy`."""
 
     first: np.ndarray
+    """Offsets of the arcs of each corner."""
     arcs: np.ndarray
+    """Their heads and lengths, upward in the order of contraction."""
     middles: np.ndarray
+    """The corner that an arc skips, -1 for none."""
     follow: np.ndarray
+    """By what a path goes on at each corner."""
 
 
 class Heap(NamedTuple):
@@ -98,7 +118,9 @@ class Target(NamedTuple):
     """A point that a view looks for."""
 
     x: float
+    """Column, grid units."""
     y: float
+    """Row, grid units."""
     polygons: np.ndarray
     """int32, those that contain it, none of which contains the point that looks; none for no
     target."""
@@ -123,6 +145,7 @@ class IntervalWork(NamedTuple):
     starts: np.ndarray
     """int32 (p,), room for the polygons of the start."""
     goals: np.ndarray
+    """int32 (p,), room for the polygons of the goal."""
     counts: np.ndarray
     """int64 (`N_COUNTS`,), see `polyanya`."""
     bounds: np.ndarray
@@ -136,6 +159,7 @@ class IntervalWork(NamedTuple):
     real: np.ndarray
     """float64 (m, 5), cost of their roots, points on their rays."""
     heap: Heap
+    """Nodes that wait, by their estimates."""
     best: np.ndarray
     """float64 (n,), best cost of each corner, infinite."""
     touched: np.ndarray
@@ -146,10 +170,15 @@ class CornerWork(NamedTuple):
     """Work arrays of a query of the graph of corners; the first four are those of intervals."""
 
     starts: np.ndarray
+    """As in `IntervalWork`."""
     goals: np.ndarray
+    """As in `IntervalWork`."""
     counts: np.ndarray
+    """As in `IntervalWork`."""
     bounds: np.ndarray
+    """As in `IntervalWork`."""
     room: ViewRoom
+    """For the views of both ends."""
     costs: np.ndarray
     """float64 (n,), cost of each corner, infinite."""
     estimates: np.ndarray
@@ -161,6 +190,7 @@ class CornerWork(NamedTuple):
     touched: np.ndarray
     """int32 (n,), corners whose cost is set."""
     heap: Heap
+    """Corners that wait."""
     goal_bounds: np.ndarray
     """float64 (2, landmarks), bounds on the distance of the goal from each."""
 
@@ -169,10 +199,15 @@ class HierarchyWork(NamedTuple):
     """Work arrays of a query of the hierarchy; the first four are those of intervals."""
 
     starts: np.ndarray
+    """As in `IntervalWork`."""
     goals: np.ndarray
+    """As in `IntervalWork`."""
     counts: np.ndarray
+    """As in `IntervalWork`."""
     bounds: np.ndarray
+    """As in `IntervalWork`."""
     room: ViewRoom
+    """For the views of both ends."""
     records: np.ndarray
     """int64 (n, 4), cost of each corner from the start and from the goal (`FAR`), and the tail and
     arc by which it was reached from either."""
@@ -181,6 +216,7 @@ class HierarchyWork(NamedTuple):
     from_start: np.ndarray
     """int64 (m, 2), heap."""
     from_goal: np.ndarray
+    """int64 (m, 2), heap of the search from the goal."""
 
 
 class CornerBend(NamedTuple):
@@ -189,8 +225,11 @@ class CornerBend(NamedTuple):
     px: float
     """x of the point before."""
     py: float
+    """Y of the point before."""
     x: float
+    """Place of the corner, grid units."""
     y: float
+    """Place of the corner, grid units."""
     hand: float
     """The hand to which a path bends there: above zero for the left, 0 for either."""
 

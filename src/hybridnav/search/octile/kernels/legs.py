@@ -282,11 +282,15 @@ class CornerCells(NamedTuple):
     tables: tuple[np.ndarray, np.ndarray, np.ndarray, int]
     """See `join`."""
     places: np.ndarray
+    """The corners' cells."""
     component: np.ndarray
+    """The part of free space of each."""
     follow: np.ndarray
     """The legs that may follow, see `legs_that_follow`."""
     first: np.ndarray
+    """Offsets of the arcs of each corner."""
     arcs: np.ndarray
+    """The corners to which they lead."""
 
 
 @njit(cache=True, nogil=True)
