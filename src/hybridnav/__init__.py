@@ -5,11 +5,11 @@ in `hybridnav.errors`; what stands beside the mission is in `hybridnav.ext`.
 """
 
 import logging
-import warnings
 from importlib import import_module
 
 import lazy_loader
 
+from hybridnav._base.renamed import renamed
 from hybridnav._version import __version__ as __version__
 
 _named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
@@ -30,7 +30,6 @@ def __getattr__(name: str) -> object:
     for home in homes:
         module = import_module(f"{__name__}.{home}")
         if name in getattr(module, "__all__", dir(module)):
-            text = f"hybridnav.{name} is now hybridnav.{home}.{name}: write that"
-            warnings.warn(text, FutureWarning, stacklevel=2)
+            renamed(f"hybridnav.{name}", f"hybridnav.{home}.{name}")
             return getattr(module, name)
     raise AttributeError(f"module {__name__} has no attribute {name}")

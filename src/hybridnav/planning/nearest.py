@@ -57,9 +57,9 @@ def nearest_reachable(
     nearest = np.clip(at, cells + _INSIDE, cells + 1 - _INSIDE)
     apart = nearest - at
     squared = (apart * apart).sum(axis=1)
-    # Of equal distances the first in the order of rows.
     if not len(cells) or squared.min() > (reach + _INSIDE) ** 2:
         return None
+    # Where several cells are equally near, the one in the first row.
     x, y = grid.frame.points_of_grid(nearest[squared.argmin()]).tolist()
     return x, y
 

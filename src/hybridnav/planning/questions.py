@@ -50,11 +50,11 @@ class Unanswered:
     closed: Closable | ClosedCells | None
     """What was closed."""
 
-    def __call__(self) -> Explanation:
-        """Find the reasons."""
+    def __call__(self, radius_m: float | None = None) -> Explanation:
+        """Find the reasons, for a robot of a radius in metres; None for the map's."""
         from hybridnav.reasons.why import reasons_of  # noqa: PLC0415 - plans need no shapely
 
-        return reasons_of(self.now, self.ends, self.closed)
+        return reasons_of(self.now, self.ends, self.closed, radius_m=radius_m)
 
 
 class Questions:

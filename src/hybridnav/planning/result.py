@@ -210,8 +210,10 @@ class PlanResult:
     def instructions(self) -> tuple[Instruction, ...]:
         """Instructions for a person; none without a path, and on a map without rooms."""
         source = self.instruction_source
-        if not isinstance(source, Walk) or self.path is None:
-            return source if not isinstance(source, Walk) else ()
+        if not isinstance(source, Walk):
+            return source
+        if self.path is None:
+            return ()
         from hybridnav.guide.words.itinerary import instructions_of  # noqa: PLC0415 - with rooms
 
         return instructions_of(self.path, *source)

@@ -389,8 +389,7 @@ def explain(
     >>> print(hn.explain(planner, (0.5, 0.5), (-2.0, 2.5)).words("de")[0])
     Das Ziel liegt außerhalb der Karte.
     """
-    query = planner.asked(start, goal, blocked)
-    return reasons_of(query.now, query.ends, query.closed, radius_m=radius_m)
+    return planner.asked(start, goal, blocked)(radius_m)
 
 
 def reasons_of(

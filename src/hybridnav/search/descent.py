@@ -356,14 +356,14 @@ class Descent:
         `patch`: what became of the pyramid's record; `enterable`, `units`: as in the constructor.
         """
         lowest, settings = self._lowest, self._settings
-        _, sizes = patched_ends(lowest, patch)
+        ended, sizes = patched_ends(lowest, patch)
         is_small = has_small_places(sizes, settings)
         levels = [len(sizes) - 1] if is_small else levels_by(sizes, settings)
         if is_small is not (lowest.top is None) or levels[1:] != lowest.levels[1:]:
             return None
         made = copy(self)
         vars(made).pop("field_of", None)
-        now = patched(lowest, patch, levels, units)
+        now = patched(lowest, patch, levels, ended, units)
         Descent._lay(made, now, enterable, by_units=units is not None)
         return made
 

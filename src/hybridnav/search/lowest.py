@@ -193,13 +193,15 @@ def patched_ends(before: Lowest, patch: Patch) -> tuple[LongArray, list[int]]:
     return ended, sizes
 
 
-def patched(before: Lowest, patch: Patch, levels: list[int], units: IntArray | None) -> Lowest:
+def patched(
+    before: Lowest, patch: Patch, levels: list[int], ended: LongArray, units: IntArray | None
+) -> Lowest:
     """Return the vertices of the map now, equal to those of its whole pyramid.
 
     What lies outside the window is taken over, and copied.
 
     `before`: the vertices of the map before; `levels`: those that a descent visits now, the same
-    ones but for the first; `units`: as in `lowest_of`.
+    ones but for the first; `ended`: see `patched_ends`; `units`: as in `lowest_of`.
     """
     (row, col), (rows, cols), n_cols = patch.low, patch.was.shape, before.holder.shape[1]
     window, record = np.s_[row : row + rows, col : col + cols], patch.record
@@ -237,7 +239,6 @@ def patched(before: Lowest, patch: Patch, levels: list[int], units: IntArray | N
     sums_new[:, 1:3] += sums_new[:, :1] * np.array([row, col])
     sums[merged.old[stays]], sums[merged.new] = before.sums[stays], sums_new
     top = _patched_top(before, merged, layers[0], pairs, patch)
-    ended, _ = patched_ends(before, patch)
     found = Lowest(levels, merged.cells, sums, arcs, layers, top, holder, ends, ended)
     if units is not None:
         found.sums[:, 3] = sums_of(found.field_of, units, n)[:, 3]

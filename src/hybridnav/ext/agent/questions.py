@@ -201,7 +201,7 @@ class Answer(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     ok: bool
-    """False if there is no answer; `text` then says what to ask or to change."""
+    """Whether there is an answer. If there is none, `text` says what to ask or to change."""
     text: str
     """The answer in words."""
     choices: list[Room | dict[str, str]] | None = None
