@@ -16,6 +16,7 @@ from .guide.words import words as words
 from .closures import (
     Blocked as Blocked,
     Journal as Journal,
+    OneWay as OneWay,
     OutOfOrder as OutOfOrder,
     load_blocked as load_blocked,
 )

@@ -77,6 +77,7 @@ def things() -> dict[str, Any]:
         "door": topo.rooms.doors[0],
         "preset": hn.load_preset("paper"),
         "blocked": hn.Blocked(cells=[[1, 1]], polygons=[box(0, 0, 1, 1)]),
+        "one-way": hn.OneWay(sides=[[1, 1, 1, 2]], lines=[[(1, 0), (1, 2)]]),
         "tour": hn.plan_tour(planner("shortest"), [START, topo.rooms.names[0], GOAL]),
         "alternatives": hn.plan_alternatives(planner("shortest"), START, GOAL, 2),
         "dual": topo.level.dual,

@@ -201,14 +201,8 @@ class Blocked:
         """Return the cells of arcs and doors, level by level, so that no closed arc is spared."""
         if not self.arcs and not self.doors:
             return []
-        places = topology.pyramid.place_level
-        ids = [arc for arc in self.arcs if not isinstance(arc, LevelArc)]
-        closed = [LevelArc(places, arc) for arc in _found("arc", ids, topology.arc_ids).tolist()]
-        for arc in self.arcs:
-            if isinstance(arc, LevelArc):
-                _check_arc(arc, topology)
-                closed.append(arc)
-        doors = [_door_on(topology.rooms, door) for door in self.doors]
+        closed = [arc_on(topology, arc) for arc in self.arcs]
+        doors = [door_on(topology.rooms, door) for door in self.doors]
         whole = []
         if topology.grid.corner_cutting:
             # A diagonal between two cells closed by inflation crosses the door on no arc.
@@ -256,7 +250,7 @@ def as_blocked(value: Closable) -> Blocked:
     return Blocked(**value)
 
 
-def _door_on(rooms: Rooms, door: int | Door) -> Door:
+def door_on(rooms: Rooms, door: int | Door) -> Door:
     """Return the door of a map for a number, as lists show it, or a door."""
     if not isinstance(door, Door):
         return rooms.listed_door(door)
@@ -275,7 +269,11 @@ def _rooms_of(door: Door) -> str:
     return f"{one} and {other} at ({x:.2f}, {y:.2f})"
 
 
-def _check_arc(arc: LevelArc, topology: TopologicalMap) -> None:
+def arc_on(topology: TopologicalMap, arc: int | LevelArc) -> LevelArc:
+    """Return the arc of a map for an id of the arcs of places, or an arc of any level."""
+    if not isinstance(arc, LevelArc):
+        (index,) = _found("arc", [arc], topology.arc_ids).tolist()
+        return LevelArc(topology.pyramid.place_level, index)
     levels = len(topology.pyramid)
     if not 0 <= arc.level < levels:
         raise InvalidValueError(f"there is no level {arc.level}, levels are 0 to {levels - 1}")
@@ -284,6 +282,7 @@ def _check_arc(arc: LevelArc, topology: TopologicalMap) -> None:
         raise InvalidValueError(
             f"there is no arc {arc.index} at level {arc.level} of this map, it has {count}"
         )
+    return arc
 
 
 def _checked_ids(name: str, ids: Any, typed: type | None = None) -> tuple[Any, ...]:
