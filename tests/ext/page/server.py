@@ -183,7 +183,7 @@ class Client:
         headers: dict[str, str] | None = None,
     ) -> Answer:
         """Send any request; the path is that after the server's name."""
-        connection = HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection = HTTPConnection("127.0.0.1", self.port, timeout=300)  # one may compile
         try:
             connection.request(method, path, body, headers or {})
             response = connection.getresponse()
