@@ -17,6 +17,7 @@ from hybridnav.closures.one_way import as_one_way
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.pyramid import LevelArc
+from hybridnav.search.found import ClosedCells, Query
 from tests.plans import TWO_ROOMS as ROOMS
 from tests.strategies import examples, occupancy_grid
 
@@ -196,3 +197,20 @@ def test_mistakes_end_in_one_line(given_: Any, said: str) -> None:
     with pytest.raises(InvalidValueError, match=said) as caught:
         as_one_way(given_).on(open_map())
     assert "\n" not in str(caught.value)
+
+
+def test_closed_cells_hold_directions_and_join_them() -> None:
+    grid = open_map()
+    none = np.empty(0, np.int64)
+    line = ClosedCells(none, one_way=hn.OneWay(lines=[[(2, 1), (2, 3)]]).on(grid))
+    back = ClosedCells(none, one_way=hn.OneWay(lines=[[(2, 2), (2, 1)]]).on(grid))
+    east, west = np.array([[1, 1], [1, 2]]), np.array([[1, 2], [1, 1]])
+    assert (line.meets(east, grid), line.meets(west, grid)) == (False, True)
+    both = line | back | ClosedCells(np.array([0]))
+    assert both.meets(east, grid)
+    assert not both.meets(east + np.array([1, 0]), grid)
+    assert both.one_way is not None
+    assert both.one_way.parts["line 1"].tolist() == [0, 1, 2]
+    query = Query(((1, 1), (1, 2)), (np.zeros(2), np.zeros(2)), both)
+    assert query.one_way is both.one_way
+    assert Query(query.cells, query.points).one_way is None

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.rows import unique_rows
 from hybridnav.closures.areas import shown
-from hybridnav.closures.blocked import arc_on, door_on
+from hybridnav.closures.ids import arc_on, door_on
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import LevelArc
 from hybridnav.rooms import Door

@@ -60,6 +60,15 @@ class DirectedSides:
         places = {name: np.unique(one) for name, one in zip(kept, which, strict=True)}
         return cls(frozen(found.rows), shape, places)
 
+    def __or__(self, other: DirectedSides) -> DirectedSides:
+        """Return what either forbids."""
+        parts = [
+            (name, each.sides[places])
+            for each in (self, other)
+            for name, places in each.parts.items()
+        ]
+        return DirectedSides.of(parts, self.shape)
+
     @cached_property
     def forbidden(self) -> tuple[LongArray, ByteArray]:
         """The cells out of which moves are forbidden: int64 (m,), flat, ascending; and the mask of

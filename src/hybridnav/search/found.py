@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
     from hybridnav.route.route import Route, RouteOfPlaces
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.distance_table import LabelSource
     from hybridnav.topology import TopologicalMap
 
@@ -58,6 +59,8 @@ class ClosedCells:
     solid: LongArray | None = None
     """int64 (m,), flat cells that no part of a footprint may meet; None for none. Discs are kept
     off by the closed cells alone."""
+    one_way: DirectedSides | None = None
+    """Sides that may be crossed in one direction only; None for none."""
 
     def holds(self, flat: LongArray) -> BoolArray:
         """Return which of some flat cells are closed."""
@@ -67,17 +70,24 @@ class ClosedCells:
         return self.flat[at] == flat
 
     def __or__(self, other: ClosedCells) -> ClosedCells:
-        """Return the cells that either closes."""
+        """Return what either closes."""
         solids = [each.solid for each in (self, other) if each.solid is not None]
         solid = np.unique(np.concatenate(solids)) if solids else None
-        return ClosedCells(np.union1d(self.flat, other.flat), solid)
+        one, two = self.one_way, other.one_way
+        one_way = one | two if one and two and one is not two else one or two
+        return ClosedCells(np.union1d(self.flat, other.flat), solid, one_way)
 
     def meets(self, cells: LongArray, grid: OccupancyGrid) -> bool:
-        """Return whether a path stands on a closed cell, or illegally passes one on a diagonal.
+        """Return whether a path stands on a closed cell, illegally passes one on a diagonal, or
+        crosses a side the wrong way.
 
         `cells`: int64 (n, 2), legal moves; `grid`: the map; if its corners may be cut, diagonals
         need no side cells.
         """
+        if self.one_way is not None and self.one_way.meets(cells):
+            return True
+        if not len(self.flat):
+            return False
         cols = grid.shape[1]
         flat = cells[:, 0] * cols + cells[:, 1]
         if not grid.corner_cutting:
@@ -110,6 +120,11 @@ class Query(NamedTuple):
     """The line to stay on; None for none."""
     positions: tuple[Position, Position] | None = None
     """The points as (row, col) in grid units; None where nobody has found them yet."""
+
+    @property
+    def one_way(self) -> DirectedSides | None:
+        """Sides that may be crossed in one direction only; None for none."""
+        return None if self.closed is None else self.closed.one_way
 
     @property
     def straight_m(self) -> float:
