@@ -25,6 +25,7 @@ from .maps import (
     DroppedIslands as DroppedIslands,
     Frame as Frame,
     OccupancyGrid as OccupancyGrid,
+    OneWayRule as OneWayRule,
     RoomLabels as RoomLabels,
     RoomUse as RoomUse,
     drop_islands as drop_islands,

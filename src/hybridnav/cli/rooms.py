@@ -448,6 +448,7 @@ class Older:
         lines += [f"new        {', '.join(to.new_rooms)}"] if to.new_rooms else []
         if to.lost_points:
             lines.append(f"lost       points {', '.join(to.lost_points)}")
+        lines += [f"lost       one-way {rule}" for rule in to.lost_one_way]
         return lines
 
     def figures(self) -> dict[str, Any]:
@@ -461,4 +462,5 @@ class Older:
             "new_rooms": to.new_rooms,
             "new_doors": to.new_doors,
             "lost_points": to.lost_points,
+            "lost_one_way": [str(rule) for rule in to.lost_one_way],
         }

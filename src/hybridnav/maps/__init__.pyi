@@ -7,6 +7,7 @@ from .cells import (
 from .islands import DroppedIslands as DroppedIslands
 from .frame import Frame as Frame
 from .occupancy import OccupancyGrid as OccupancyGrid, drop_islands as drop_islands
+from .one_way import OneWayRule as OneWayRule
 from .room_labels import (
     MAX_ROOMS as MAX_ROOMS,
     NO_ROOM as NO_ROOM,

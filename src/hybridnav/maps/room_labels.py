@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.names import check_names, check_number, did_you_mean
+from hybridnav.maps.one_way import OneWayRule
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,13 +82,15 @@ class RoomLabels:
         its number when rooms are written, read, or planned on for another robot.
     uses
         What routes may do in some rooms, by their names; others have no limits.
+    one_way
+        Doors and lines that all plans pass in one direction alone.
 
     Raises
     ------
     InvalidValueError
         When a name is given twice, empty, too long, not one printable line or reads as a point
         (`1,2`). When a label has no name, a point is not finite, the number of a door is not a
-        positive whole one, or a use is that of no room.
+        positive whole one, or a use is that of no room. When a door leads into no room.
 
     Examples
     --------
@@ -102,6 +105,7 @@ class RoomLabels:
     points: Mapping[str, Point] = field(default_factory=dict)
     doors: Mapping[int, Point] = field(default_factory=dict, repr=False)
     uses: Mapping[str, RoomUse] = field(default_factory=dict, repr=False)
+    one_way: tuple[OneWayRule, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         names = tuple(self.names)
@@ -123,12 +127,18 @@ class RoomLabels:
         if unknown := [name for name in self.uses if name not in names]:
             raise InvalidValueError(f"uses: no room is called {unknown[0]!r:.80}")
         uses = {name: use for name, use in self.uses.items() if use != RoomUse()}
+        one_way = tuple(dict.fromkeys(map(OneWayRule.of, self.one_way)))
+        for rule in one_way:
+            if rule.into is not None and rule.into not in names:
+                known = did_you_mean(rule.into, names)
+                raise InvalidValueError(f"one_way {brief(str(rule))}: there is no such room{known}")
         for name, value in (
             ("names", names),
             ("label_of", label_of),
             ("points", MappingProxyType(points)),
             ("doors", MappingProxyType(doors)),
             ("uses", MappingProxyType(uses)),
+            ("one_way", one_way),
         ):
             object.__setattr__(self, name, value)
 

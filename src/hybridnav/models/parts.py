@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import Frame, OccupancyGrid, RoomLabels, RoomUse
+from hybridnav.maps import Frame, OccupancyGrid, OneWayRule, RoomLabels, RoomUse
 from hybridnav.maps.files.limits import check_size
 from hybridnav.maps.islands import DroppedIslands
 from hybridnav.models.structures import GRID, PRESET, PYRAMID, ROOMS, refusal
@@ -50,6 +50,7 @@ class _RoomsValues(_Values):
     points: dict[str, tuple[float, float]]
     doors: list[tuple[int, float, float]]
     uses: dict[str, RoomUse] = {}
+    one_way: list[str] = []
 
 
 class _PyramidValues(_Values):
@@ -185,6 +186,8 @@ def rooms_part(rooms: RoomLabels) -> Part:
     }
     if rooms.uses:  # models without are read by earlier versions too
         values["uses"] = {name: asdict(use) for name, use in rooms.uses.items()}
+    if rooms.one_way:
+        values["one_way"] = [str(rule) for rule in rooms.one_way]
     return ROOMS.part(rooms, {}, values)
 
 
@@ -197,7 +200,8 @@ def rooms_of(filed: FiledPart, known: dict[str, int]) -> RoomLabels:
     label_of = ROOMS.read(filed, known)["label_of"]
     try:
         doors = {number: (x, y) for number, x, y in values.doors}
-        return RoomLabels(tuple(values.names), label_of, values.points, doors, values.uses)
+        names, rules = tuple(values.names), tuple(map(OneWayRule.of, values.one_way))
+        return RoomLabels(names, label_of, values.points, doors, values.uses, rules)
     except InvalidValueError as error:
         raise refusal(filed, str(error)) from None
 

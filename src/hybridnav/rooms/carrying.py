@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,9 +11,15 @@ import numpy as np
 
 from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, OneWayRule, RoomLabels
 from hybridnav.maps.checks import checked_type
-from hybridnav.rooms.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m, numbered
+from hybridnav.rooms.doors import (
+    LEAST_DOOR_M,
+    RoomBoundaries,
+    measured_clearance_m,
+    numbered,
+    one_way_that_holds,
+)
 from hybridnav.rooms.registering import (
     Candidate,
     Surface,
@@ -128,6 +134,8 @@ class CarriedNames:
     """Doors of the new map that no old number was carried to, as `labels` number them."""
     lost_points: tuple[str, ...]
     """Named points that lie in an obstacle or outside of the new map."""
+    lost_one_way: tuple[OneWayRule, ...]
+    """Rules whose door or room was not carried, or whose line meets no free cell."""
 
     @property
     def undecided(self) -> tuple[str, ...]:
@@ -205,8 +213,19 @@ def carry_names(
         if is_free.all() and is_free.size and (name not in old.names or room == name):
             kept[name] = at
     uses = {name: use for name, use in old.uses.items() if rooms[name].status == "carried"}
+    labels = RoomLabels(names, new.label_of, kept, door_points, uses)
+    moved = {
+        rule: replace(rule, line=tuple(moving.moved(at, old, old_grid) for at in rule.line))
+        for rule in old.one_way
+    }
+    held = one_way_that_holds(moved.values(), labels, new_grid)
+    lost_doors, lost_rooms = (
+        {name for name, fate in fates.items() if fate.status != "carried"}
+        for fates in (doors, rooms)
+    )
+    held = [r for r in held if r.door not in lost_doors and r.into not in lost_rooms]
     return CarriedNames(
-        RoomLabels(names, new.label_of, kept, door_points, uses),
+        replace(labels, one_way=tuple(held)),
         transform_of(found.best, one, other),
         "",
         MappingProxyType(rooms),
@@ -214,6 +233,7 @@ def carry_names(
         new_rooms,
         new_doors,
         tuple(name for name in points if name not in kept),
+        tuple(rule for rule in moved if moved[rule] not in held),
     )
 
 
@@ -225,7 +245,7 @@ def _nothing(
     doors = dict.fromkeys(numbered(old, old_grid), none)
     rooms = dict.fromkeys(old.names, none)
     return CarriedNames(
-        new, None, reason, rooms, doors, new.names, tuple(new.doors), tuple(old.points)
+        new, None, reason, rooms, doors, new.names, tuple(new.doors), tuple(old.points), old.one_way
     )
 
 

@@ -4,6 +4,7 @@ distance, so that the numbers of doors are lasting names."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +17,10 @@ from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, side
 from hybridnav.pyramid.start import kinds_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps.one_way import OneWayRule
     from hybridnav.maps.room_labels import Point
 
 LEAST_DOOR_M = 0.3
@@ -294,3 +296,28 @@ def numbered(rooms: RoomLabels, grid: OccupancyGrid) -> dict[int, Point]:
     each = zip(found.numbers(rooms.doors).tolist(), found.middles.tolist(), is_door, strict=True)
     doors |= {n: (x, y) for n, (x, y), door in each if door or n in rooms.doors}
     return dict(sorted(doors.items()))
+
+
+def one_way_that_holds(
+    rules: Collection[OneWayRule], rooms: RoomLabels, grid: OccupancyGrid
+) -> list[OneWayRule]:
+    """Return the rules whose door is there and joins their room, or whose line meets free cells."""
+    rooms_of: dict[int | None, set[str | None]] = {}
+    if any(rule.door is not None for rule in rules):
+        found, names = RoomBoundaries.of(rooms, grid, measured_clearance_m(grid)), rooms.names
+        each = zip(found.numbers(rooms.doors).tolist(), found.labels.tolist(), strict=True)
+        rooms_of = {n: {None if at < 0 else names[at] for at in sides} for n, sides in each}
+    free = grid.measured == CellClass.FREE
+
+    def is_free(line: Sequence[Point]) -> bool:
+        ends = grid.frame.positions_of(np.array(line))
+        steps = 2 * int(np.abs(np.diff(ends, axis=0)).max()) + 2
+        cells = np.floor([np.linspace(*pair, steps) for pair in pairwise(ends)]).astype(np.int64)
+        inside = cells[((cells >= 0) & (cells < grid.shape)).all(axis=-1)]
+        return bool(free[tuple(inside.T)].any())
+
+    return [
+        rule
+        for rule in rules
+        if (rule.into in rooms_of.get(rule.door, ()) if rule.door else is_free(rule.line))
+    ]

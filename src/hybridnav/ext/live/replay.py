@@ -309,6 +309,7 @@ class ReplayFigures:
         self._last: ReplayStep | None = None
         self._n_doors: Counter[str] = Counter()
         self._lost_names: list[str] = []
+        self._lost_one_way: list[str] = []
 
     def add(self, step: ReplayStep) -> None:
         """Count a step."""
@@ -320,6 +321,7 @@ class ReplayFigures:
             for event in _OF_DOORS:
                 self._n_doors[event] += len(getattr(step.rooms_update.doors, event))
             self._lost_names += step.rooms_update.lost_names.values()
+            self._lost_one_way += map(str, step.rooms_update.lost_one_way)
 
     def figures(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON.
@@ -349,6 +351,7 @@ class ReplayFigures:
             "rooms": self._rooms.figures(),
             "doors": {event: self._n_doors[event] for event in _OF_DOORS},
             "lost_names": list(self._lost_names),
+            "lost_one_way": list(self._lost_one_way),
             "levels": len(pyramid),
             "faults": faults_of(pyramid),
         }

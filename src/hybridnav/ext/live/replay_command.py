@@ -182,6 +182,8 @@ def _summary(figures: dict[str, Any]) -> str:
     ]
     if figures["lost_names"]:
         lines.append(f"names      lost with their rooms: {', '.join(figures['lost_names'])}")
+    if figures["lost_one_way"]:
+        lines.append(f"one-way    holds no more: {', '.join(figures['lost_one_way'])}")
     if "log" in figures:
         lines.append(f"log        {figures['log']}")
     n_levels, faults = figures["levels"], figures["faults"]

@@ -17,12 +17,14 @@ from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names
 from hybridnav.rooms.carrying import NUMBERED
+from hybridnav.rooms.doors import one_way_that_holds
 from hybridnav.rooms.find import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from hybridnav._base.typing import BoolArray, IntArray
+    from hybridnav.maps.one_way import OneWayRule
     from hybridnav.maps.room_labels import Point
 
 
@@ -61,6 +63,8 @@ class OnlineRooms:
     """All boundaries between rooms by number, gaps included."""
     points: Mapping[str, Point]
     """Named points, `(x, y)` in metres: they stay whatever the rooms."""
+    one_way: tuple[OneWayRule, ...] = field(repr=False)
+    """What is passed in one direction alone; rooms as `room-` and their number."""
     least_area_m2: float
     """As in `find_rooms`."""
     low: tuple[int, int]
@@ -106,6 +110,7 @@ class OnlineRooms:
             for n, name in zip(numbers, labels.names, strict=True)
             if not NUMBERED.fullmatch(name)
         }
+        called = {name: f"room-{n}" for n, name in zip(numbers, labels.names, strict=True)}
         number_of = np.append(np.array(numbers, np.int32), np.int32(NO_ROOM))[labels.label_of]
         found = window.doors_of(number_of, grid, (0, 0), labels.doors)
         doors = {door.number: door for door in sorted(found, key=lambda door: door.number)}
@@ -115,6 +120,7 @@ class OnlineRooms:
             MappingProxyType(names),
             MappingProxyType(doors),
             labels.points,
+            tuple(rule.renamed(called) for rule in labels.one_way),
             float(least_area_m2),
             (0, 0),
             frozen(outside_of(grid)),
@@ -173,7 +179,9 @@ class OnlineRooms:
             differs |= new & window.beside_rooms(number_of, grid)
         moved = replace(self, grid=grid, number_of=frozen(number_of), low=low, _outside=outside)
         if not differs.any():
-            return RoomsUpdate(moved, (), (), {}, {}, (), window.DoorEvents((), (), (), {}, {}), {})
+            return RoomsUpdate(
+                moved, (), (), {}, {}, (), window.DoorEvents((), (), (), {}, {}), {}, ()
+            )
         before = window.RoomCells(number_of, (measured == CellClass.FREE) & ~was_outside)
         settings = self.least_area_m2, self._next[0]
         number_of, events = window.renew(before, grid, outside, differs, settings)
@@ -190,7 +198,8 @@ class OnlineRooms:
             doors=MappingProxyType(new_doors),
             _next=(self._next[0] + len(events.born), self._next[1] + len(door_events.born)),
         )
-        return RoomsUpdate(version, *events, door_events, lost)
+        version, gone = _with_rules(version, self, door_events.split)
+        return RoomsUpdate(version, *events, door_events, lost, gone)
 
     @cached_property
     def numbers(self) -> tuple[int, ...]:
@@ -241,6 +250,11 @@ class OnlineRooms:
                 f"{len(self.numbers)}: an update states what became of a room"
             )
 
+    @property
+    def called(self) -> dict[str, str]:
+        """The name of each room by `room-` and its number."""
+        return {f"room-{n}": self.names.get(n, f"room-{n}") for n in self.numbers}
+
     @cached_property
     def labels(self) -> RoomLabels:
         """The rooms for all who plan, draw and write: with names, points and numbers of doors.
@@ -252,12 +266,33 @@ class OnlineRooms:
         """
         label_of = np.full((self.numbers[-1] if self.numbers else 0) + 2, NO_ROOM, np.int32)
         label_of[list(self.numbers)] = np.arange(len(self.numbers))
+        called = self.called
         return RoomLabels(
-            tuple(self.names.get(n, f"room-{n}") for n in self.numbers),
+            tuple(called.values()),
             label_of[self.number_of],
             self.points,
             {n: door.position for n, door in self.doors.items()},
+            one_way=tuple(rule.renamed(called) for rule in self.one_way),
         )
+
+
+def _with_rules(
+    version: OnlineRooms, before: OnlineRooms, split: Mapping[int, Sequence[int]]
+) -> tuple[OnlineRooms, tuple[OneWayRule, ...]]:
+    """Return a version with the rules that hold, also for the parts of doors, and the others as
+    people know them."""
+    called, bare = before.called | version.called, replace(version, one_way=())
+    rule_of = {
+        replace(rule, door=part): rule
+        for rule in before.one_way
+        for part in split.get(rule.door or 0, [rule.door])
+    }
+    shown = {rule: rule.renamed(called) for rule in rule_of}
+    held = one_way_that_holds(shown.values(), bare.labels, version.grid) if shown else []
+    kept = tuple(rule for rule in rule_of if shown[rule] in held)
+    left = {rule_of[rule] for rule in kept}
+    gone = tuple(rule.renamed(called) for rule in before.one_way if rule not in left)
+    return replace(bare, one_way=kept), gone
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,6 +327,8 @@ class RoomsUpdate:
     """What became of the doors."""
     lost_names: dict[int, str]
     """Names of rooms that died, by the number these had."""
+    lost_one_way: tuple[OneWayRule, ...]
+    """Rules that hold no more: of doors or rooms that are gone, of lines in no free cell."""
 
     def closed_doors(self, closed: Iterable[int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Carry closed doors over to the new version.

@@ -237,12 +237,18 @@ def changed(rooms: RoomLabels, change: Change, grid: OccupancyGrid) -> RoomLabel
     off, or a room would lose its last free cell.
     """
     if isinstance(change, Rename):
-        return _renamed(rooms, change)
-    if isinstance(change, Merge):
-        return _merged(rooms, change)
-    if isinstance(change, Split):
-        return _split(rooms, change, grid)
-    return _moved(rooms, change, grid)
+        after = _renamed(rooms, change)
+    elif isinstance(change, Merge):
+        after = _merged(rooms, change)
+    elif isinstance(change, Split):
+        after = _split(rooms, change, grid)
+    else:
+        after = _moved(rooms, change, grid)
+    if not after.one_way:
+        return after
+    from hybridnav.rooms.doors import one_way_that_holds  # noqa: PLC0415 - loads numba
+
+    return replace(after, one_way=tuple(one_way_that_holds(after.one_way, after, grid)))
 
 
 def rings_of(rooms: RoomLabels, grid: OccupancyGrid) -> list[list[list[list[float]]]]:
@@ -263,7 +269,8 @@ def _renamed(rooms: RoomLabels, change: Rename) -> RoomLabels:
     names = tuple(change.name if at == label else name for at, name in enumerate(rooms.names))
     points = {change.name if name == change.room else name: p for name, p in rooms.points.items()}
     uses = {change.name if name == change.room else name: u for name, u in rooms.uses.items()}
-    return replace(rooms, names=names, points=points, uses=uses)
+    rules = tuple(rule.renamed({change.room: change.name}) for rule in rooms.one_way)
+    return replace(rooms, names=names, points=points, uses=uses, one_way=rules)
 
 
 def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
@@ -287,7 +294,8 @@ def _merged(rooms: RoomLabels, change: Merge) -> RoomLabels:
     uses[change.room] = replace(  # the stricter of both
         one, private=one.private or other.private, cost=max(one.cost, other.cost)
     )
-    return replace(rooms, names=names, label_of=renumbered, points=points, uses=uses)
+    rules = tuple(rule.renamed({change.other: change.room}) for rule in rooms.one_way)
+    return replace(rooms, names=names, label_of=renumbered, points=points, uses=uses, one_way=rules)
 
 
 def _split(rooms: RoomLabels, change: Split, grid: OccupancyGrid) -> RoomLabels:

@@ -17,7 +17,7 @@ import shapely
 
 from hybridnav._base.yaml_file import Limits, Marked
 from hybridnav.errors import InvalidValueError, RoomsError, brief
-from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomUse
+from hybridnav.maps import NO_ROOM, OccupancyGrid, OneWayRule, RoomUse
 from hybridnav.maps.names import check_number
 from hybridnav.maps.occupancy import extent
 
@@ -176,7 +176,7 @@ def _varints(content: bytes) -> Iterator[int]:
 USE_KEYS = ("use", "prefer", "cost")
 ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point", *USE_KEYS)
 SHAPE_KEYS = ("polygon", "polygons", "seed")
-FILE_KEYS = ("rooms", "points", "doors", "cells", "map")
+FILE_KEYS = ("rooms", "points", "doors", "one_way", "cells", "map")
 _OUTSIDE_CELLS = 1.0
 """Greatest distance that an outline may reach over the rim of the map."""
 _FEWEST_CORNERS = 3
@@ -216,6 +216,7 @@ class Read:
     points: dict[str, tuple[float, float]] = field(default_factory=dict)
     doors: dict[int, tuple[float, float]] = field(default_factory=dict)
     uses: dict[str, RoomUse] = field(default_factory=dict)
+    one_way: list[OneWayRule] = field(default_factory=list)
     cells: list[str] = field(default_factory=list)
     label_of: IntArray | None = None
 
@@ -253,6 +254,11 @@ def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
             entry.get("point"), f"{at}: point {brief(entry['name'])}"
         )
     read.doors = _doors(marked, where)
+    for number, text in enumerate(list_of(values.get("one_way", []), f"{where}: one_way")):
+        try:
+            read.one_way.append(OneWayRule.of(text))
+        except InvalidValueError as error:
+            raise RoomsError(f"{where}, line {marked.line('one_way', number)}: {error}") from None
     read.cells = list_of(values.get("cells", []), f"{where}: cells")
     return read
 

@@ -55,6 +55,7 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         has the cells, and the later one of several. In addition, `points:` is a list of named
         points. `doors:` is a mapping from numbers of doors to a point [x, y] of the boundary, or a
         list with `number` and `point`. The door nearest to it, within a metre, keeps the number.
+        `one_way:` is a list of rules as text, such as `door:5=corridor`; see `OneWayRule`.
         `cells:` holds cells that written outlines miss. In the other form `locations:` is a list of
         names. Beside it stands an image `data:` of the size of the map's, whose pixel values index
         the list, or flat `polygons:` in pixels of that image. Polygons win if both are present, and
@@ -111,7 +112,8 @@ def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
             label_of = labels_of(read, grid)
         check_rooms(read, label_of, grid)
         check_points(read.points, read.where, grid)
-        return RoomLabels(tuple(read.names), label_of, read.points, read.doors, read.uses)
+        names, rules = tuple(read.names), tuple(read.one_way)
+        return RoomLabels(names, label_of, read.points, read.doors, read.uses, rules)
     except InvalidValueError as error:
         raise RoomsError(f"{read.where}: {error}") from None
 

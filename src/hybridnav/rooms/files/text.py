@@ -37,7 +37,7 @@ _TITLE = re.compile(r"# Rooms of .*: outlines in metres, map frame, \[x, y\]\.")
 _COMMENT = re.compile(r"#[^\r\n\x85\u2028\u2029]*")
 _NUMBERED = re.compile(r"room-[0-9]+")
 """Names that nobody has given."""
-_WRITTEN = ("points", "doors", "cells")
+_WRITTEN = ("points", "doors", "one_way", "cells")
 """Keys that are written anew."""
 
 

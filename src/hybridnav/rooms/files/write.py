@@ -152,6 +152,8 @@ class _Writer:
         from hybridnav.rooms.doors import numbered  # noqa: PLC0415
 
         doors = _door_lines(numbered(self._rooms, self._grid), self._grid)
+        rules = self._rooms.one_way
+        doors += ["one_way:"] * bool(rules) + [f"- {scalar(str(rule))}" for rule in rules]
         most = _MOST_BYTES - sum(len(line.encode()) + 1 for line in doors)
         for kept in [old, None] if old is not None and old.blocks else [None]:
             target = self._target(kept)
