@@ -13,6 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.rows import in_runs
 from hybridnav.closures.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.closures.ids import arc_on, door_on, found_ids
+from hybridnav.closures.one_way import OneWay, OneWayLike, as_one_way, joined
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import LevelArc
 from hybridnav.rooms import Door
@@ -67,6 +68,9 @@ class Blocked:
         two cells that were measured as occupied crosses no door.
     rooms
         Names of rooms; all their cells are closed.
+    one_way
+        What may be crossed in one direction only: a `OneWay`, a line, or a mapping of its
+        attributes.
     named
         Other closures by what reasons call them: `{"keepout: zone.yaml": Blocked(...)}`. In a union
         a name is that of both.
@@ -92,6 +96,7 @@ class Blocked:
     rooms: Sequence[str] = ()
     keepout: Sequence[BaseGeometry | ArrayLike] = ()
     named: Mapping[str, Blocked] = field(default_factory=dict)
+    one_way: OneWayLike | None = None
 
     def __post_init__(self) -> None:
         checked = {
@@ -103,6 +108,7 @@ class Blocked:
             "doors": _checked_ids("doors", self.doors, Door),
             "rooms": _checked_names(self.rooms),
             "named": _checked_named(self.named),
+            "one_way": None if self.one_way is None else as_one_way(self.one_way),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -114,13 +120,19 @@ class Blocked:
         both = {
             one.name: (*getattr(self, one.name), *getattr(other, one.name))
             for one in fields(self)
-            if one.name not in {"cells", "named"}
+            if one.name not in {"cells", "named", "one_way"}
         }
         cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
         named = {**self.named, **other.named}
         for name in self.named.keys() & other.named.keys():
             named[name] = self.named[name] | other.named[name]
-        return Blocked(**both, cells=cells, named=named)
+        one_way = joined([self.one_way, other.one_way])
+        return Blocked(**both, cells=cells, named=named, one_way=one_way)
+
+    @property
+    def directions(self) -> OneWay | None:
+        """What may be crossed in one direction only, that of `named` too; None for nothing."""
+        return joined([self.one_way, *(one.directions for one in self.named.values())])
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -131,7 +143,17 @@ class Blocked:
         ]
         cells = np.asarray(self.cells).tobytes()
         named = tuple((name, one.key) for name, one in self.named.items())
-        return tuple(self.arcs), tuple(self.places), cells, *areas, self.doors, self.rooms, named
+        way = () if self.one_way is None else as_one_way(self.one_way).key
+        return (
+            tuple(self.arcs),
+            tuple(self.places),
+            cells,
+            *areas,
+            self.doors,
+            self.rooms,
+            named,
+            way,
+        )
 
     def cells_of(self, topology: TopologicalMap) -> LongArray:
         """Find the cells that may not be entered; occupied ones may be among them.

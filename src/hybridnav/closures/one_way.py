@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import reduce
 from itertools import pairwise
+from operator import or_
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.maps import Frame, OccupancyGrid
+    from hybridnav.maps import Frame, OccupancyGrid, OneWayRule
     from hybridnav.topology import TopologicalMap
 
 _FARTHEST_CELLS = 1e6
@@ -93,6 +95,13 @@ class OneWay:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, rules: Iterable[OneWayRule]) -> OneWay:
+        """Return what rules state: those of rooms, of files and of graphs."""
+        listed = list(rules)
+        doors = [(rule.door, rule.into) for rule in listed if rule.door is not None]
+        return cls(lines=[rule.line for rule in listed if rule.line], doors=doors)
 
     def __or__(self, other: OneWay) -> OneWay:
         """Return the union of two."""
@@ -195,6 +204,24 @@ def as_one_way(value: OneWayLike) -> OneWay:
             f"one_way takes {', '.join(names)}, got {', '.join(map(str, unknown)):.80}"
         )
     return OneWay(**value)
+
+
+def joined(each: Iterable[OneWayLike | None]) -> OneWay | None:
+    """Return the union of some, None for none."""
+    given = [as_one_way(one) for one in each if one is not None]
+    return reduce(or_, given) if given else None
+
+
+def directions_on(topology: TopologicalMap, one_way: OneWay | None = None) -> DirectedSides | None:
+    """Return the sides of what the rooms of a map let cross in one direction only, with more.
+
+    `one_way`: what else has a direction. Returns None for nothing. Raises `InvalidValueError` when
+    the map has no such door.
+    """
+    rooms = topology.pyramid.rooms
+    lasting = None if rooms is None or not rooms.one_way else OneWay.of(rooms.one_way)
+    both = joined([lasting, one_way])
+    return None if both is None else both.on(topology.grid, topology)
 
 
 def sides_along(points: ArrayLike, frame: Frame) -> LongArray:

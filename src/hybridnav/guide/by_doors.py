@@ -246,7 +246,9 @@ class DoorTours:
         assert whole.start is not None  # noqa: S101 - the plan is solved
         assert whole.goal is not None  # noqa: S101
         self.n_planned += 1
-        result = self._planner.plan(whole.start, whole.goal, blocked=ClosedCells(shut))
+        one_way = None if self._closed is None else self._closed.one_way
+        blocked = ClosedCells(shut, one_way=one_way)
+        result = self._planner.plan(whole.start, whole.goal, blocked=blocked)
         if not result.solved:
             return None
         result = replace(result, bound_source=partial(_least_bound, whole, result.cost))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
+    from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning.settings import Finish
     from hybridnav.search.found import ClosedCells, KeptLine
@@ -79,6 +81,18 @@ def places_of_endpoints(
         if of_class != _FREE and not (allow_unexplored and of_class == _UNEXPLORED):
             return refused[CellClass(of_class)]
     return (start[1], goal[1]), (start[2], goal[2])
+
+
+def directed(
+    blocked: Closable | ClosedCells | None, one_way: OneWayLike | None
+) -> Closable | ClosedCells | None:
+    """Return closures with directions: they are one thing from here on."""
+    if one_way is None:
+        return blocked
+    from hybridnav.closures.blocked import Blocked, as_blocked  # noqa: PLC0415 - loads shapely
+
+    given: Any = {} if blocked is None else blocked
+    return as_blocked(given) | Blocked(one_way=one_way)
 
 
 def refusal(

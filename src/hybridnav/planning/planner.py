@@ -16,7 +16,7 @@ from hybridnav.maps.areas import box_of_area
 from hybridnav.planning import PlanStatus, Preset, load_preset
 from hybridnav.planning.batch import plan_many
 from hybridnav.planning.costs import PlannerCosts
-from hybridnav.planning.endpoints import read_points
+from hybridnav.planning.endpoints import directed, read_points
 from hybridnav.planning.follow import PlannerUpdate, begun, opened, update_of
 from hybridnav.planning.methods import make_method
 from hybridnav.planning.methods.grid import KnownMap
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import PathLike
     from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlanBatch, PlanResult
@@ -196,6 +197,7 @@ class HybridPlanner(Questions):
         *,
         smooth: Smooth | None = None,
         blocked: Closable | ClosedCells | None = None,
+        one_way: OneWayLike | None = None,
         at: At = "anywhere",
         keep: PlanResult | None = None,
         within_m: float | None = None,
@@ -221,6 +223,10 @@ class HybridPlanner(Questions):
             Closures for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. If they
             meet the path, the whole map is searched.
+        one_way
+            What may be crossed in one direction only in this query: a `OneWay`, a line, or a
+            mapping with keys of `OneWay`, such as `{"doors": [(5, "hall")]}`. The rules of the
+            rooms of the map hold for every query.
         at
             Position in a named room: `"anywhere"`, at the cells that make the cell path shortest,
             or at its `"point"`.
@@ -250,6 +256,7 @@ class HybridPlanner(Questions):
             is not on the map. When `smooth` is `"arcs"` and the planner plans by lengths, or
             another method is given `keep`. When `leave_zone` is given with OMPL or `within_m`.
         """
+        blocked = directed(blocked, one_way)
         with self._query():
             now, own = self._now, self._privacy
             closed = blocked if own is None else self._closing([start, goal], blocked)
@@ -279,17 +286,19 @@ class HybridPlanner(Questions):
         goal: ArrayLike | str,
         *,
         blocked: Closable | ClosedCells | None = None,
+        one_way: OneWayLike | None = None,
         at: At = "anywhere",
     ) -> PlanDraft:
         """Plan a path as `plan` does, and make its result only if it is wanted: of many plans.
 
         Parameters
         ----------
-        start, goal, blocked, at
+        start, goal, blocked, one_way, at
             As in `plan`.
         """
         with self._query():
-            now, closed = self._now, self._closing([start, goal], blocked)
+            closed = self._closing([start, goal], directed(blocked, one_way))
+            now = self._now
             return now.draft(now.read(start, goal, None, closed, at))
 
     def plan_many(
@@ -299,6 +308,7 @@ class HybridPlanner(Questions):
         *,
         smooth: Smooth | None = None,
         blocked: Closable | ClosedCells | None = None,
+        one_way: OneWayLike | None = None,
     ) -> PlanBatch:
         """Plan paths between many pairs of points, with the answers of `plan` in arrays.
 
@@ -311,7 +321,7 @@ class HybridPlanner(Questions):
             `(x, y)` in metres, map frame, shape (n, 2) each, or `(x, y, yaw)`, shape (n, 3). OMPL
             in a space with headings needs the yaw; with others it changes no point of a path, and
             arrays of points do not hold it.
-        smooth, blocked
+        smooth, blocked, one_way
             As in `plan`.
 
         Raises
@@ -326,6 +336,7 @@ class HybridPlanner(Questions):
                 f"there are {len(first)} starts and {len(last)} goals, expected as many of both: "
                 "give each start its goal"
             )
+        blocked = directed(blocked, one_way)
         if self._privacy is not None:  # each has private rooms of its own
             alone = partial(self.plan, smooth=smooth, blocked=blocked)
             return plan_many(self.grid, None, (first, last), None, alone)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray
-    from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.blocked import Blocked, Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning import PlanBatch, Preset
     from hybridnav.planning.costs import PlannerCosts
@@ -105,7 +105,7 @@ class Planning:
             check_at(at)
         if isinstance(start, str) or isinstance(goal, str):
             start, goal = self.points_of([start, goal], at, blocked)
-        closed = None if blocked is None else self.closed(blocked)
+        closed = self.closed(blocked)
         turns = self.ompl is not None and self.needs_headings
         poses = read_ends(start, goal, needs_heading=turns)
         kept = None if keep is None else self._kept(keep, poses[1])
@@ -158,30 +158,51 @@ class Planning:
         )
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
-        """Return the cells of a closure, None for no closure; the last ones are kept."""
-        if blocked is None or isinstance(blocked, ClosedCells):
+        """Return what a closure closes, with the directions of the rooms; None for nothing. The
+        last ones are kept."""
+        always = self._directed
+        if blocked is None:
+            return always
+        if isinstance(blocked, ClosedCells) and (always is None or blocked.one_way is not None):
             return blocked
         known = self.closures
         with suppress(TypeError):  # a mapping has to be read; areas and doors are found as given
-            if (given := known.pop(blocked, None)) is not None:
-                known[blocked] = given  # the last one now
-                return given
+            if (kept := known.pop(blocked, None)) is not None:
+                known[blocked] = kept  # the last one now
+                return kept
         # Loads shapely, which most queries do not need.
         from hybridnav.closures.blocked import as_blocked  # noqa: PLC0415
 
-        closure = as_blocked(blocked)
+        given = blocked if isinstance(blocked, ClosedCells) else as_blocked(blocked)
+        key: object = given if isinstance(given, ClosedCells) else given.key
         # Without a lock: two threads may compute the same cells.
-        found = known.pop(closure.key, None)
+        found = known.pop(key, None)
         if found is None:
-            is_solid = self.ompl is not None and self.ompl.body is not None
-            solid = closure.solid_on(self.grid) if is_solid else None
-            found = ClosedCells(closure.cells_on(self.grid, self.topology), solid)
-        known[closure.key] = found
+            found = given if isinstance(given, ClosedCells) else self._closed_by(given)
+            found = found if always is None else found | always
+        known[key] = found
         with suppress(TypeError):
             known[blocked] = found
         for old in list(known)[:-_KEPT]:
             known.pop(old, None)
         return found
+
+    def _closed_by(self, closure: Blocked) -> ClosedCells:
+        is_solid = self.ompl is not None and self.ompl.body is not None
+        solid = closure.solid_on(self.grid) if is_solid else None
+        one_way = closure.directions
+        directed = None if one_way is None else one_way.on(self.grid, self.topology)
+        return ClosedCells(closure.cells_on(self.grid, self.topology), solid, directed)
+
+    @cached_property
+    def _directed(self) -> ClosedCells | None:
+        """The directions of the rooms, for all queries; None without any."""
+        rooms = self.built.pyramid.rooms
+        if rooms is None or not rooms.one_way:
+            return None
+        from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
+
+        return ClosedCells(np.empty(0, np.int64), None, directions_on(self.built))
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
@@ -280,7 +301,7 @@ class Planning:
         if way is None:
             return stays
         if closed is not None:
-            left = ClosedCells(np.setdiff1d(closed.flat, way[0]), closed.solid)
+            left = replace(closed, flat=np.setdiff1d(closed.flat, way[0]))
             request = request._replace(closed=left)
         opened = [] if always is None or not always.holds(ends[:1])[0] else way[0]
         return request, way[1] * self.grid.resolution_m, opened

@@ -12,7 +12,7 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.renamed import renamed
 from hybridnav.errors import InvalidValueError
 from hybridnav.planning import PlanStatus
-from hybridnav.planning.endpoints import read_points
+from hybridnav.planning.endpoints import directed, read_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import HybridPlanner, PlanBatch
     from hybridnav.planning.planning import Planning
@@ -77,12 +78,13 @@ class Questions:
         goal: ArrayLike | str,
         *,
         blocked: Closable | ClosedCells | None = None,
+        one_way: OneWayLike | None = None,
     ) -> float:
         """Return the cost that a plan would have, and nothing else.
 
         Parameters
         ----------
-        start, goal, blocked
+        start, goal, blocked, one_way
             As in `plan`.
 
         Returns
@@ -98,9 +100,9 @@ class Questions:
         2.546
         """
         with self._query():
-            now, closed = self._now, blocked
+            now, closed = self._now, directed(blocked, one_way)
             if self._privacy is not None:
-                closed = self._closing([start, goal], blocked)
+                closed = self._closing([start, goal], closed)
             return _distance(now, now.read(start, goal, None, closed, "anywhere"))
 
     def asked(
@@ -128,13 +130,14 @@ class Questions:
 
         return explain(cast("HybridPlanner", self), start, goal, blocked=blocked, radius_m=radius_m)
 
-    def distances(
+    def distances(  # noqa: PLR0913 - all but two have defaults
         self,
         starts: ArrayLike,
         goals: ArrayLike,
         *,
         nearest: int | None = None,
         blocked: Closable | ClosedCells | None = None,
+        one_way: OneWayLike | None = None,
         progress: Progress = no_progress,
     ) -> Any:
         """Return the costs of plans from all starts to all goals, exactly.
@@ -150,8 +153,8 @@ class Questions:
             `(x, y)` in metres, map frame, shape (n, 2) and (m, 2).
         nearest
             Number of goals to keep for each start; None for all.
-        blocked
-            As in `plan`.
+        blocked, one_way
+            As in `plan`. The costs there and back may differ then.
         progress
             Called after each block with the number of pairs done and of all pairs.
 
@@ -175,7 +178,7 @@ class Questions:
         array([[0.   , 2.546],
                [1.   , 2.125]])
         """
-        wanted = nearest, progress
+        wanted, blocked = (nearest, progress), directed(blocked, one_way)
         if self._privacy is not None:  # each pair has private rooms of its own
 
             def planned(pairs: tuple[FloatArray, FloatArray]) -> PlanBatch:
