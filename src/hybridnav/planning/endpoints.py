@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass
 from hybridnav.maps.geometry import classes_at
-from hybridnav.planning import PlanStatus
+from hybridnav.search.found import PlanStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from hybridnav.closures.blocked import Closable
     from hybridnav.closures.one_way import OneWayLike
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning.settings import Finish
-    from hybridnav.search.found import ClosedCells, KeptLine
+    from hybridnav.search.found import Cell, ClosedCells, Pose, Position
 
-Cell = tuple[int, int]
-Position = tuple[float, float]
-Points = tuple["FloatArray", "FloatArray"]
+    Ends = tuple[tuple[FloatArray, FloatArray], tuple[Pose, Pose]]
+    """Points of start and goal, float64 (2,), and positions, or poses where given or needed."""
 
 _FREE, _UNEXPLORED = int(CellClass.FREE), int(CellClass.UNEXPLORED)
 _OUTSIDE = PlanStatus.START_OUTSIDE, PlanStatus.GOAL_OUTSIDE
@@ -40,23 +38,6 @@ _REFUSED = (
 )
 
 
-class PlanRequest(NamedTuple):
-    """What a caller wants to know, read."""
-
-    poses: tuple[FloatArray, FloatArray]
-    """Start and goal, float64 (2,) or (3,) each: metres and radians, map frame."""
-    smooth: Finish
-    """What is done with the path that the method finds."""
-    closed: ClosedCells | None
-    """Cells that are closed for this query; None for none."""
-    goal: ArrayLike | str
-    """The goal as it was given."""
-    kept: KeptLine | None
-    """The line to stay on; None for none."""
-    began: float
-    """The time at which reading began, of `clock`."""
-
-
 def check_at(at: str) -> None:
     """Refuse a position in a room that is none of the two.
 
@@ -67,20 +48,26 @@ def check_at(at: str) -> None:
 
 
 def places_of_endpoints(
-    grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
-) -> tuple[tuple[Cell, Cell], tuple[Position, Position]] | PlanStatus:
-    """Return the cells of start and goal and their positions, (row, col) in grid units, or the
-    status of one that is not valid."""
-    ends = (*points[0].tolist(), *points[1].tolist())
-    start, goal = classes_at(ends, grid.classes, grid.frame.for_kernels)
-    if start[0] == _FREE == goal[0]:
-        return (start[1], goal[1]), (start[2], goal[2])
-    if start[0] < 0 or goal[0] < 0:
-        return _OUTSIDE[start[0] >= 0]
-    for (of_class, *_), refused in ((start, _REFUSED[0]), (goal, _REFUSED[1])):
+    grid: OccupancyGrid, poses: tuple[Pose, Pose], *, allow_unexplored: bool
+) -> tuple[tuple[Cell, Cell], tuple[Position, Position], PlanStatus | None]:
+    """Return the cells of start and goal, their positions, (row, col) in grid units, and the status
+    of one that is not valid; `poses`: `(x, y)` in metres, map frame, and maybe a yaw."""
+    (x, y, *_), (to_x, to_y, *_) = poses
+    start, goal = classes_at((x, y, to_x, to_y), grid.classes, grid.frame.for_kernels)
+    cells, positions, status = (start[1], goal[1]), (start[2], goal[2]), None
+    if not start[0] == _FREE == goal[0]:
+        status = _refused(start[0], goal[0], allow_unexplored=allow_unexplored)
+    return cells, positions, status
+
+
+def _refused(start: int, goal: int, *, allow_unexplored: bool) -> PlanStatus | None:
+    """Return the status of a query by the classes of its ends, -1 outside the map."""
+    if start < 0 or goal < 0:
+        return _OUTSIDE[start >= 0]
+    for of_class, refused in zip((start, goal), _REFUSED, strict=True):
         if of_class != _FREE and not (allow_unexplored and of_class == _UNEXPLORED):
             return refused[CellClass(of_class)]
-    return (start[1], goal[1]), (start[2], goal[2])
+    return None
 
 
 def directed(
@@ -123,20 +110,19 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
     return xy
 
 
-def read_ends(start: ArrayLike, goal: ArrayLike, *, needs_heading: bool) -> Points:
-    """Return start and goal: positions, float64 (2,), or poses, (3,), where given or needed."""
+def read_ends(start: ArrayLike, goal: ArrayLike, *, needs_heading: bool) -> Ends:
+    """Return start and goal."""
     try:
         ends = np.asarray(start, dtype=np.float64), np.asarray(goal, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         ends = _numbers(start), _numbers(goal)
     if not needs_heading and ends[0].shape == ends[1].shape == (2,):
-        (x, y), (to_x, to_y) = ends[0].tolist(), ends[1].tolist()
-        if math.isfinite(x + y + to_x + to_y):
-            return ends
-    return (
-        _pose("start", start, ends[0], needs_heading=needs_heading),
-        _pose("goal", goal, ends[1], needs_heading=needs_heading),
-    )
+        first, last = ends[0].tolist(), ends[1].tolist()
+        if math.isfinite(first[0] + first[1] + last[0] + last[1]):
+            return ends, (tuple(first), tuple(last))
+    first = _pose("start", start, ends[0], needs_heading=needs_heading)
+    last = _pose("goal", goal, ends[1], needs_heading=needs_heading)
+    return (first[:2], last[:2]), (tuple(first.tolist()), tuple(last.tolist()))
 
 
 def _pose(name: str, given: ArrayLike, pose: FloatArray, *, needs_heading: bool) -> FloatArray:

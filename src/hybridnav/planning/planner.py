@@ -260,15 +260,17 @@ class HybridPlanner(Questions):
         with self._query():
             now, own = self._now, self._privacy
             closed = blocked if own is None else self._closing([start, goal], blocked)
-            request, leaves_m = now.read(start, goal, smooth, closed, at, keep), None
+            if smooth is not None:
+                now = now.finishing(smooth)
+            query, leaves_m = now.read(start, goal, closed, at, keep), None
             if leave_zone:
-                request, leaves_m, cells = now.leaving(request, within_m)
+                query, leaves_m, cells = now.leaving(query, within_m)
                 now = opened(now, cells) if cells else now
-            result = now.plan(request)
+            result = now.plan(query)
             if leaves_m is not None:
-                closed, result = request.closed, replace(result, leaves_m=leaves_m)
+                closed, result = query.closed, replace(result, leaves_m=leaves_m)
             if within_m is not None:
-                result = now.near(request, result, within_m)
+                result = now.near(query, result, within_m)
         if result.path is None or result.status is PlanStatus.NEAR_GOAL:
             ends = result.start, result.goal
             result = replace(result, why_source=Unanswered(now, ends, closed))
@@ -299,7 +301,7 @@ class HybridPlanner(Questions):
         with self._query():
             closed = self._closing([start, goal], directed(blocked, one_way))
             now = self._now
-            return now.draft(now.read(start, goal, None, closed, at))
+            return now.draft(now.read(start, goal, closed, at))
 
     def plan_many(
         self,

@@ -19,13 +19,7 @@ from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning import Path, PlanResult, PlanStatus
 from hybridnav.planning.batch import plan_many
 from hybridnav.planning.costs import CostFinish
-from hybridnav.planning.endpoints import (
-    PlanRequest,
-    check_at,
-    places_of_endpoints,
-    read_ends,
-    refusal,
-)
+from hybridnav.planning.endpoints import check_at, places_of_endpoints, read_ends, refusal
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planning.path import path_of
 from hybridnav.planning.result import PlanDraft, Walk
@@ -44,10 +38,11 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning import PlanBatch, Preset
     from hybridnav.planning.costs import PlannerCosts
+    from hybridnav.planning.endpoints import Ends
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
     from hybridnav.refine import CostLine
-    from hybridnav.search.found import Found, Method
+    from hybridnav.search.found import Cell, Found, Method
     from hybridnav.topology import TopologicalMap
 
 Smooth = Literal["none", "line-of-sight", "arcs"]
@@ -82,6 +77,8 @@ class Planning:
     """Refines the paths in the robot's space; None for those of the method."""
     closures: dict[object, ClosedCells] = field(default_factory=dict)
     """The cells of the last closures, by their keys."""
+    smooth: Smooth | None = None
+    """What is done with the paths that the method finds; None as in the preset."""
 
     @property
     def topology(self) -> TopologicalMap | None:
@@ -90,27 +87,46 @@ class Planning:
 
     # Reading: names to points, closures to cells.
 
-    def read(  # noqa: PLR0913, PLR0917 - as `HybridPlanner.plan`
+    def read(
         self,
         start: ArrayLike | str,
         goal: ArrayLike | str,
-        smooth: Smooth | None,
         blocked: Closable | ClosedCells | None,
-        at: At,
+        at: At = "anywhere",
         keep: PlanResult | None = None,
-    ) -> PlanRequest:
+    ) -> Query:
         """Read a query; see `HybridPlanner.plan`."""
-        began, waypoint = clock(), goal
+        began, name = clock(), None
         if at != "anywhere":
             check_at(at)
         if isinstance(start, str) or isinstance(goal, str):
+            name = goal if isinstance(goal, str) else None
             start, goal = self.points_of([start, goal], at, blocked)
         closed = self.closed(blocked)
-        turns = self.ompl is not None and self.needs_headings
-        poses = read_ends(start, goal, needs_heading=turns)
-        kept = None if keep is None else self._kept(keep, poses[1])
-        finish = self._finish if smooth is None else self._checked(smooth)
-        return PlanRequest(poses, finish, closed, waypoint, kept, began)
+        ends = read_ends(start, goal, needs_heading=self.needs_headings)
+        kept = None if keep is None else self._kept(keep, ends[0][1])
+        return self._query(ends, closed, kept, name, began)
+
+    def _query(
+        self,
+        ends: Ends,
+        closed: ClosedCells | None,
+        kept: KeptLine | None = None,
+        name: str | None = None,
+        began: float = 0.0,
+    ) -> Query:
+        """Return the query between two points, which may be refused."""
+        points, poses = ends
+        allowed = self.preset.planner.allow_unexplored
+        cells, positions, refused = places_of_endpoints(self.grid, poses, allow_unexplored=allowed)
+        if refused is None and not (closed is None and self.costs.closed is None):
+            refused = self._shut(closed, cells)
+        return Query(cells, points, closed, kept, positions, refused, poses, name, began)
+
+    def _shut(self, closed: ClosedCells | None, cells: tuple[Cell, Cell]) -> PlanStatus | None:
+        """Return the status of a query whose start or goal is closed, None if neither is."""
+        shut = self.closed_for_all(closed)
+        return None if shut is None else refusal(shut, cells, self.grid.shape)
 
     def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
         """Return the line of a result, None if it ends elsewhere or there is none."""
@@ -125,12 +141,12 @@ class Planning:
         within = getattr(planner, "keep_within", _KEEP_WITHIN)
         if planner.method == "octile":
             cells = None if path is None else path.cells
-            if cells is None or tuple(cells[-1].tolist()) != self.grid.frame.cell_of(*goal[:2]):
+            if cells is None or tuple(cells[-1].tolist()) != self.grid.frame.cell_of(*goal):
                 return None
             return KeptLine(self.grid.frame.points_of(cells), within, cells)
         if points is None and path is not None and not path.is_curved:
             points = path.points
-        if points is None or len(points) == 1 or not np.array_equal(points[-1], goal[:2]):
+        if points is None or len(points) == 1 or not np.array_equal(points[-1], goal):
             return None
         return KeptLine(points, within)
 
@@ -210,22 +226,12 @@ class Planning:
         return closed | always if closed and always else closed or always
 
     @cached_property
-    def _finish(self) -> Smooth:
-        """The finish of the preset."""
-        return self._checked(None)
-
-    @cached_property
-    def is_plain(self) -> bool:
-        """Whether the cost of a plan is that of the path that the method finds."""
-        is_kept = self._finish == "none" or self.method.metric == "any-angle"
-        return is_kept and self.ompl is None
-
-    def _checked(self, smooth: Smooth | None) -> Smooth:
-        """Return the finish asked for, or that of the preset for None."""
-        chosen = self.preset.planner.finish if smooth is None else smooth
+    def finish(self) -> Smooth:
+        """What is done with the paths that the method finds."""
+        chosen = self.preset.planner.finish if self.smooth is None else self.smooth
         if chosen not in _SMOOTH:
             known = ", ".join(map(repr, _SMOOTH))
-            raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
+            raise InvalidValueError(f"smooth must be {known}, or None, got {self.smooth!r:.80}")
         if chosen == "arcs" and (self._by_costs is None or self.ompl is not None):
             raise InvalidValueError(
                 "smooth 'arcs' rounds bends of paths by costs without OMPL, and this planner plans "
@@ -233,33 +239,41 @@ class Planning:
             )
         return chosen
 
-    def query(self, request: PlanRequest) -> Query | PlanStatus:
-        """Return the query for the method, or the status that refuses start or goal."""
-        (first, last), _, closed, _, kept, _ = request
-        points, allowed = (first[:2], last[:2]), self.preset.planner.allow_unexplored
-        places = places_of_endpoints(self.grid, points, allow_unexplored=allowed)
-        if isinstance(places, PlanStatus):
-            return places
-        cells, positions = places
-        shut = closed if self.costs.closed is None else self.closed_for_all(closed)
-        if shut is not None and (refused := refusal(shut, cells, self.grid.shape)):
-            return refused
-        return Query(cells, points, closed, kept, positions)
+    def finishing(self, smooth: Smooth | None) -> Planning:
+        """Return how to plan with another finish of paths; None for that of the preset."""
+        if smooth is None or smooth == self.finish:
+            return self
+        for other in self._others:
+            if other.smooth == smooth:
+                return other
+        other = replace(self, smooth=smooth)
+        _ = other.finish  # refuses what is none
+        self._others.append(other)
+        return other
+
+    @cached_property
+    def _others(self) -> list[Planning]:
+        return []
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether the cost of a plan is that of the path that the method finds."""
+        is_kept = self.finish == "none" or self.method.metric == "any-angle"
+        return is_kept and self.ompl is None
 
     # Planning: a path found by the method, then refined.
 
-    def plan(self, request: PlanRequest) -> PlanResult:
+    def plan(self, query: Query) -> PlanResult:
         """Plan a path."""
-        query = self.query(request)
-        if isinstance(query, PlanStatus):
-            return self._answer(query, request)
+        if query.refused is not None:
+            return self._answer(query.refused, query)
         found = self.method.find(query)
         if query.kept is not None and found.has_path and self.preset.planner.method != "cheapest":
             from hybridnav.planning.keeping import staying  # noqa: PLC0415 - loads the lattice
 
             line = self._open if query.closed is None else self._open.closing(query.closed.flat)
             found = staying(self.grid, line, query, found)
-        return self.result(request, query, found)
+        return self.result(query, found)
 
     @cached_property
     def _open(self) -> CostLine:
@@ -272,19 +286,19 @@ class Planning:
         return CostLine(self.grid, layer, allow_unexplored=allowed)
 
     def leaving(
-        self, request: PlanRequest, within_m: float | None
-    ) -> tuple[PlanRequest, float | None, list[int]]:
-        """Return a request whose closed start may leave the closed cells, and how long the way out
-        is. The request is as it was, and the length None, where nothing closes the start alone, or
-        no way leads out.
+        self, query: Query, within_m: float | None
+    ) -> tuple[Query, float | None, list[int]]:
+        """Return a query whose closed start may leave the closed cells, how long the way out is,
+        and the cells of it that the costs close. The query is as it was, and the length None, where
+        nothing closes the start alone, or no way leads out.
         """
         if self.ompl is not None or within_m is not None:
             given = (
                 "within_m" if self.ompl is None else f"OMPL, which preset {self.preset.name} has"
             )
             raise InvalidValueError(f"leave_zone does not go with {given}: leave one out")
-        stays, closed, always = (request, None, list[int]()), request.closed, self.costs.closed
-        cells = self.grid.frame.cells_of(np.stack([pose[:2] for pose in request.poses]))
+        stays, closed, always = (query, None, list[int]()), query.closed, self.costs.closed
+        cells = self.grid.frame.cells_of(np.stack(query.points))
         if not ((cells >= 0) & (cells < self.grid.shape)).all():
             return stays
         ends = cells @ np.array([self.grid.shape[1], 1])
@@ -301,12 +315,13 @@ class Planning:
         if way is None:
             return stays
         if closed is not None:
-            left = replace(closed, flat=np.setdiff1d(closed.flat, way[0]))
-            request = request._replace(closed=left)
+            closed = replace(closed, flat=np.setdiff1d(closed.flat, way[0]))
+        # With the way open both ends may be entered: nothing else closes the start.
+        query = query._replace(closed=closed, refused=None)
         opened = [] if always is None or not always.holds(ends[:1])[0] else way[0]
-        return request, way[1] * self.grid.resolution_m, opened
+        return query, way[1] * self.grid.resolution_m, opened
 
-    def near(self, request: PlanRequest, result: PlanResult, within_m: float) -> PlanResult:
+    def near(self, query: Query, result: PlanResult, within_m: float) -> PlanResult:
         """Return a result, or where its goal cannot be reached one to the nearest point that can
         be; see `HybridPlanner.plan`."""
         check_within(within_m)
@@ -317,61 +332,58 @@ class Planning:
             )
         if result.path is not None or result.status.value.startswith("start"):
             return result
-        shut = self.closed_for_all(request.closed)
+        shut = self.closed_for_all(query.closed)
         is_open = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
         if shut is not None:
             is_open.ravel()[shut.flat] = False
-        first, last = request.poses
-        point = nearest_reachable(
-            self.grid, is_open, first[:2].tolist(), last[:2].tolist(), within_m
-        )
+        start, goal = query.poses
+        point = nearest_reachable(self.grid, is_open, start, goal, within_m)
         if point is None:
             return result
-        poses = first, np.array([*point, *last[2:]])
-        found = self.plan(request._replace(poses=poses, goal=point, kept=None))
-        return replace(found, status=PlanStatus.NEAR_GOAL, goal=tuple(last.tolist()))
+        ends = (query.points[0], np.array(point)), (start, (*point, *goal[2:]))
+        found = self.plan(self._query(ends, query.closed))
+        return replace(found, status=PlanStatus.NEAR_GOAL, goal=goal)
 
-    def draft(self, request: PlanRequest) -> PlanDraft:
+    def draft(self, query: Query) -> PlanDraft:
         """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
-        query = self.query(request)
-        if isinstance(query, PlanStatus):
-            return PlanDraft.of(self._answer(query, request))
+        if query.refused is not None:
+            return PlanDraft.of(self._answer(query.refused, query))
         found = self.method.find(query)
-        made = partial(self.result, request, query, found)
-        if not found.has_path or self.ompl is not None or request.smooth != "none":
+        made = partial(self.result, query, found)
+        if not found.has_path or self.ompl is not None or self.finish != "none":
             return PlanDraft.of(made())
         bound = self._bound(query, found, found.cost_m)
         return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
 
-    def result(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
+    def result(self, query: Query, found: Found) -> PlanResult:
         """Refine a path that was found, and return its result."""
         metric = self.method.metric
         if found.passed is None:
             bound, stats = found.lower_bound_m, found.stats
             status, how = PlanStatus.NO_PATH, None if self.ompl is None else self.ompl.no_path
             return self._answer(
-                status, request, metric=metric, bound_source=bound, stats=stats, refinement=how
+                status, query, metric=metric, bound_source=bound, stats=stats, refinement=how
             )
         if self.ompl is not None:
-            result = self._by_ompl(self.ompl, request, query, found)
+            result = self._by_ompl(self.ompl, query, found)
         elif self._by_costs is not None:
             by_cells = metric == "weighted"
             finished = self._cheapest if by_cells else self._rounded
-            result = finished(self._by_costs, request, query, found)
-        elif metric == "octile" and request.smooth == "line-of-sight":
-            result = self._in_sight(request, query, found)
+            result = finished(self._by_costs, query, found)
+        elif metric == "octile" and self.finish == "line-of-sight":
+            result = self._in_sight(query, found)
         else:
             path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
             least = found.optimum or min(found.lower_bound_m, path.length_m)
-            result = self._solved(request, found, path, least, metric=metric)
+            result = self._solved(query, found, path, least, metric=metric)
         if not self.has_rooms or result.path is None or not result.solved:
             return result
-        source = Walk(self.built, request.goal, request.poses[0].tolist())
+        source = Walk(self.built, query.goal_name or query.points[1], query.poses[0])
         return replace(result, instruction_source=source)
 
-    def _in_sight(self, request: PlanRequest, query: Query, found: Found) -> PlanResult:
+    def _in_sight(self, query: Query, found: Found) -> PlanResult:
         """Return the result of a path of cells that is shortened by line of sight."""
-        began, sight, closed = clock(), self._sight, request.closed
+        began, sight, closed = clock(), self._sight, query.closed
         if closed is not None:  # one for this query
             allowed = self.preset.planner.allow_unexplored
             sight = LineOfSight(self.grid, allow_unexplored=allowed, closed=closed.flat)
@@ -379,7 +391,7 @@ class Planning:
         found.stats.seconds["smooth"] = clock() - began
         length_m = polyline_length(points)
         path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
-        return self._solved(request, found, path, query.straight_m, metric="any-angle")
+        return self._solved(query, found, path, query.straight_m, metric="any-angle")
 
     @cached_property
     def _sight(self) -> LineOfSight:
@@ -391,34 +403,30 @@ class Planning:
         layer = self.costs.layer
         return None if layer is None else CostFinish(self.grid, layer, self.preset.planner)
 
-    def _cheapest(
-        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
-    ) -> PlanResult:
+    def _cheapest(self, costs: CostFinish, query: Query, found: Found) -> PlanResult:
         """Return the result of a cheapest path of cells."""
-        solved = partial(self._solved, request, found)
-        if request.smooth == "none":
+        solved = partial(self._solved, query, found)
+        if self.finish == "none":
             points = self.grid.frame.points_of(found.cells)
             length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
             path, cost_m = Path(found.cells, points, length_m), found.cost_m
             least = found.optimum or found.lower_bound_m
             return solved(path, least, metric="weighted", weighted_cost=cost_m)
         began = clock()
-        finish = costs.arcs if request.smooth == "arcs" else costs.line
-        path, cost_m = finish(found.cells, request.poses, request.closed)
+        finish = costs.arcs if self.finish == "arcs" else costs.line
+        path, cost_m = finish(found.cells, query.points, query.closed)
         found.stats.seconds["smooth"] = clock() - began
         bound, of_cells = self._cost_bound(query, cost_m), found.lower_bound_m
         metric: Any = "any-angle-weighted"
         return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
 
-    def _rounded(
-        self, costs: CostFinish, request: PlanRequest, query: Query, found: Found
-    ) -> PlanResult:
+    def _rounded(self, costs: CostFinish, query: Query, found: Found) -> PlanResult:
         """Return the result of a cheapest any-angle path, with arcs if the request says so."""
         points = found.points
         assert points is not None  # noqa: S101 - any-angle methods state them
-        if request.smooth == "arcs":
+        if self.finish == "arcs":
             began = clock()
-            path, cost_m = costs.arcs_along(found.cells, points, request.closed)
+            path, cost_m = costs.arcs_along(found.cells, points, query.closed)
             found.stats.seconds["arcs"] = clock() - began
         else:
             length_m, cost_m = polyline_length(points), found.cost_m
@@ -426,7 +434,7 @@ class Planning:
         bound = self._cost_bound(query, cost_m)
         metric, weighted = self.method.metric, cost_m
         return self._solved(
-            request, found, path, bound, metric=metric, weighted_cost=weighted, line=points
+            query, found, path, bound, metric=metric, weighted_cost=weighted, line=points
         )
 
     def _bound(self, query: Query, found: Found, cost_m: float) -> float | Callable[[], float]:
@@ -441,31 +449,26 @@ class Planning:
         assert costs is not None  # noqa: S101 - the plan is by costs
         return partial(costs.bound, query, cost_m)
 
-    def _by_ompl(
-        self, ompl: OmplPlanner, request: PlanRequest, query: Query, found: Found
-    ) -> PlanResult:
+    def _by_ompl(self, ompl: OmplPlanner, query: Query, found: Found) -> PlanResult:
         """Return the result of a path refined by OMPL, with the bound of the method too."""
         now = clock()
-        first, last = (
-            pose if len(pose) > 2 else np.append(pose, 0.0)  # noqa: PLR2004
-            for pose in request.poses
-        )
+        first, last = (np.array([*pose, 0.0][:3]) for pose in query.poses)
         is_any_angle = self.method.metric == "any-angle"
         refined = ompl.plan(
             found.cells,
             (first, last),
-            self.closed_for_all(request.closed),
-            spent_s=now - request.began,
+            self.closed_for_all(query.closed),
+            spent_s=now - query.began,
             least_m=found.lower_bound_m if is_any_angle else query.straight_m,
             along=found,
         )
         found.stats.seconds["ompl"] = clock() - now
         bound, path = refined.lower_bound, refined.path
         if path is not None and refined.status is PlanStatus.SOLVED:
-            path = path if path.headings_rad is not None else path.turned_at_ends(*request.poses)
+            path = path if path.headings_rad is not None else path.turned_at_ends(*query.poses)
         return self._answer(
             refined.status,
-            request,
+            query,
             metric=refined.metric,
             path=path,
             route_source=self._route_of(path),
@@ -479,18 +482,18 @@ class Planning:
 
     def _solved(
         self,
-        request: PlanRequest,
+        query: Query,
         found: Found,
         path: Path,
         bound: float | Callable[[], float],
         **outcome: Any,
     ) -> PlanResult:
         """Return the result of a path, whose bound is at most its cost."""
-        cost_m, ends = outcome.get("weighted_cost", path.length_m), request.poses
+        cost_m, ends = outcome.get("weighted_cost", path.length_m), query.poses
         turns = len(ends[0]) + len(ends[1]) > 4  # noqa: PLR2004 - numbers of two points
         return self._answer(
             PlanStatus.SOLVED,
-            request,
+            query,
             path=path.turned_at_ends(*ends) if turns else path,
             route_source=found.route or self._route_of(path),
             bound_source=bound if callable(bound) else min(bound, cost_m),
@@ -498,12 +501,12 @@ class Planning:
             **outcome,
         )
 
-    def _answer(self, status: PlanStatus, request: PlanRequest, **outcome: Any) -> PlanResult:
+    def _answer(self, status: PlanStatus, query: Query, **outcome: Any) -> PlanResult:
         """Return a result that records endpoints, preset and settings of the pyramid."""
-        first, last = request.poses
+        start, goal = query.poses
         made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
-        made |= {"proof_source": (self.grid, self.costs, request.closed), "status": status}
-        made |= {"start": tuple(first.tolist()), "goal": tuple(last.tolist())}
+        made |= {"proof_source": (self.grid, self.costs, query.closed), "status": status}
+        made |= {"start": start, "goal": goal}
         return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
@@ -549,11 +552,9 @@ class Planning:
         blocked: Closable | ClosedCells | None,
     ) -> PlanBatch:
         """Plan paths between many pairs of points; see `HybridPlanner.plan_many`."""
-        finish, closed, method = self._checked(smooth), self.closed(blocked), self.method
-        is_kept = finish == "none" or method.metric == "any-angle"
-        at_once = method if self.ompl is None and is_kept else None
+        now, closed = self.finishing(smooth), self.closed(blocked)
 
         def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
-            return self.plan(self.read(start, goal, finish, closed, "anywhere"))
+            return now.plan(now.read(start, goal, closed))
 
-        return plan_many(self.grid, at_once, pairs, closed, alone)
+        return plan_many(now.grid, now.method if now.is_plain else None, pairs, closed, alone)

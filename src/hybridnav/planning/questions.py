@@ -11,7 +11,6 @@ import numpy as np
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.renamed import renamed
 from hybridnav.errors import InvalidValueError
-from hybridnav.planning import PlanStatus
 from hybridnav.planning.endpoints import directed, read_points
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.planning.planning import Planning
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.reasons import Explanation
-    from hybridnav.search.found import ClosedCells
+    from hybridnav.search.found import ClosedCells, Query
 
     Block = tuple[slice, slice, FloatArray]
     Planned = Callable[[tuple[FloatArray, FloatArray]], PlanBatch]
@@ -103,7 +102,7 @@ class Questions:
             now, closed = self._now, directed(blocked, one_way)
             if self._privacy is not None:
                 closed = self._closing([start, goal], closed)
-            return _distance(now, now.read(start, goal, None, closed, "anywhere"))
+            return _distance(now, now.read(start, goal, closed))
 
     def asked(
         self,
@@ -114,7 +113,7 @@ class Questions:
         """Return what the reasons of a query are found from; see `hybridnav.explain`."""
         with self._query():
             now, closed = self._now, self._closing([start, goal], blocked)
-            return Unanswered(now, now.read(start, goal, None, closed, "point").poses, closed)
+            return Unanswered(now, now.read(start, goal, closed, "point").poses, closed)
 
     def explain(
         self,
@@ -189,13 +188,12 @@ class Questions:
             return _distances(self._now, (starts, goals), self._now.closed(blocked), wanted)
 
 
-def _distance(now: Planning, request: Any) -> float:
+def _distance(now: Planning, query: Query) -> float:
     """Return the cost of a shortest path; see `HybridPlanner.distance`."""
-    query = now.query(request)
-    if isinstance(query, PlanStatus):
+    if query.refused is not None:
         return math.nan
     if not now.is_plain:
-        return now.plan(request).cost
+        return now.plan(query).cost
     return now.method.find(query).cost_m
 
 

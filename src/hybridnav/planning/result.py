@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
@@ -19,6 +18,7 @@ from hybridnav.errors import PlanError
 from hybridnav.route.route import Route
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
+from hybridnav.search.found import PlanStatus as PlanStatus  # noqa: PLC0414
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,37 +38,6 @@ if TYPE_CHECKING:
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
-
-
-class PlanStatus(str, Enum):
-    """Outcome of a plan, as a value, not an error.
-
-    Examples
-    --------
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> print(hn.HybridPlanner(topology).plan((-1.0, 0.0), (0.5, 0.5)).status)
-    start outside the map
-    """
-
-    SOLVED = "solved"
-    START_OUTSIDE = "start outside the map"
-    GOAL_OUTSIDE = "goal outside the map"
-    START_OCCUPIED = "start occupied"
-    GOAL_OCCUPIED = "goal occupied"
-    START_UNEXPLORED = "start unexplored"
-    GOAL_UNEXPLORED = "goal unexplored"
-    START_BLOCKED = "start blocked"
-    GOAL_BLOCKED = "goal blocked"
-    NO_PATH = "no path"
-    APPROXIMATE = "approximate"
-    """A sampling-based planner came near the goal but did not reach it."""
-    NEAR_GOAL = "near the goal"
-    """The goal cannot be reached, and the path ends at the nearest point that can be, as asked for
-    by `within_m`."""
-    TIMEOUT = "timeout"
-    """A sampling-based planner found nothing in its time."""
-
-    __str__ = str.__str__
 
 
 class RouteSource(Protocol):

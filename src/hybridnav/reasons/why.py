@@ -241,10 +241,10 @@ class Case:
         """Return the ends that the robot cannot stand on, the start first."""
         found = []
         for is_start, point, cell in zip((True, False), self.points, self._cells, strict=True):
-            both = (point, point)
-            status = places_of_endpoints(self.grid, both, allow_unexplored=self.allow_unexplored)
+            pose, allowed = tuple(point.tolist()), self.allow_unexplored
+            *_, status = places_of_endpoints(self.grid, (pose, pose), allow_unexplored=allowed)
             by: tuple[Closure, ...] = ()
-            if not isinstance(status, PlanStatus):
+            if status is None:
                 if not self._shut[cell]:
                     continue
                 flat = cell[0] * self.grid.shape[1] + cell[1]
@@ -420,8 +420,9 @@ def reasons_of(
         blocked = as_blocked(blocked)
     unfit = None
     if now.ompl is not None and radius_m is None:
-        asked = now.read(ends[0], ends[1], None, blocked, "point")
-        unfit = now.ompl.refused(asked.poses, asked.closed)
+        query = now.read(ends[0], ends[1], blocked, "point")
+        start, goal = map(np.array, query.poses)
+        unfit = now.ompl.refused((start, goal), query.closed)
     case = Case(
         grid=grid,
         topology=now.topology,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
@@ -29,8 +30,40 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 Position = tuple[float, float]
+Pose = tuple[float, ...]
 Metric = Literal["octile", "weighted", "any-angle", "any-angle-weighted", "dubins", "reeds-shepp"]
 """What a path is judged by: the kind of its length, or of its cost."""
+
+
+class PlanStatus(str, Enum):
+    """Outcome of a plan, as a value, not an error.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> print(hn.HybridPlanner(topology).plan((-1.0, 0.0), (0.5, 0.5)).status)
+    start outside the map
+    """
+
+    SOLVED = "solved"
+    START_OUTSIDE = "start outside the map"
+    GOAL_OUTSIDE = "goal outside the map"
+    START_OCCUPIED = "start occupied"
+    GOAL_OCCUPIED = "goal occupied"
+    START_UNEXPLORED = "start unexplored"
+    GOAL_UNEXPLORED = "goal unexplored"
+    START_BLOCKED = "start blocked"
+    GOAL_BLOCKED = "goal blocked"
+    NO_PATH = "no path"
+    APPROXIMATE = "approximate"
+    """A sampling-based planner came near the goal but did not reach it."""
+    NEAR_GOAL = "near the goal"
+    """The goal cannot be reached, and the path ends at the nearest point that can be, as asked for
+    by `within_m`."""
+    TIMEOUT = "timeout"
+    """A sampling-based planner found nothing in its time."""
+
+    __str__ = str.__str__
 
 
 @dataclass(frozen=True)
@@ -108,10 +141,11 @@ class KeptLine(NamedTuple):
 
 
 class Query(NamedTuple):
-    """One query: two cells that may be entered, points in them, and what is closed for it."""
+    """One query: two cells that may be entered, points in them, and what is closed for it. Searches
+    need no more than the first three; the planner reads the rest from its caller."""
 
     cells: tuple[Cell, Cell]
-    """Start and goal, (row, col)."""
+    """Start and goal, (row, col); (0, 0) for one outside the map."""
     points: tuple[FloatArray, FloatArray]
     """float64 (2,) each, start and goal, `(x, y)` in metres, map frame."""
     closed: ClosedCells | None = None
@@ -120,6 +154,15 @@ class Query(NamedTuple):
     """The line to stay on; None for none."""
     positions: tuple[Position, Position] | None = None
     """The points as (row, col) in grid units; None where nobody has found them yet."""
+    refused: PlanStatus | None = None
+    """Why start or goal is none, so that no search is asked; None if both may be entered."""
+    poses: tuple[Pose, Pose] = ((), ())
+    """Start and goal as planned between, `(x, y)` or `(x, y, yaw)` each, metres and radians, map
+    frame; empty where a search alone is asked."""
+    goal_name: str | None = None
+    """The name by which the goal was given; None for a point."""
+    began: float = 0.0
+    """The time at which reading began, of `clock`."""
 
     @property
     def one_way(self) -> DirectedSides | None:

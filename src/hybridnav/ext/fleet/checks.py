@@ -259,12 +259,11 @@ def refusal_of(
             continue
         planner = floors[end.floor].planner
         grid, allowed = planner.grid, planner.preset.planner.allow_unexplored
-        point = read_point(kind, end.waypoint)
-        places = places_of_endpoints(grid, (point, point), allow_unexplored=allowed)
-        status = places if isinstance(places, PlanStatus) else None
+        point = tuple(read_point(kind, end.waypoint).tolist())
+        cells, _, status = places_of_endpoints(grid, (point, point), allow_unexplored=allowed)
         shut = planner.closed_for_all(closed.get(end.floor))
-        if shut is not None and not isinstance(places, PlanStatus):
-            status = refusal(shut, places[0], grid.shape)
+        if shut is not None and status is None:
+            status = refusal(shut, cells, grid.shape)
         if status is not None:
             return PlanStatus[status.name.replace("START", kind)]
     return None
