@@ -61,3 +61,10 @@ def test_closures_and_directions_are_joined() -> None:
 def test_what_is_no_direction_is_refused(given: object) -> None:
     with pytest.raises(InvalidValueError, match=r"one_way|no door has the number"):
         planner().plan((0.5, 0.5), (8.5, 0.5), one_way=given)  # type: ignore[arg-type]
+
+
+def test_reasons_know_that_a_direction_closes_no_cell() -> None:
+    shut = hn.Blocked(one_way=hn.OneWay.of([INTO_HALL]), doors=[1])
+    asked = planner(INTO_HALL).plan((0.5, 0.5), (8.5, 0.5), blocked=shut)
+    assert asked.explanation is not None
+    assert [each.kind for each in asked.explanation.to_open] == ["doors"]

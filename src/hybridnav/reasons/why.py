@@ -331,6 +331,8 @@ def each_closure(blocked: Blocked) -> Iterator[tuple[Closure, Blocked]]:
     """Yield each closure with a `Blocked` of it alone."""
     for one in fields(blocked):
         items = getattr(blocked, one.name)
+        if one.name == "one_way":
+            continue  # it closes no cells
         if one.name == "cells":
             if len(items):
                 yield Closure("cells", None), Blocked(cells=items)
