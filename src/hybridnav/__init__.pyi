@@ -13,6 +13,7 @@ from .guide import (
     plan_tour as plan_tour,
 )
 from .guide.words import words as words
+from .harness.recorded import judge as judge
 from .closures import (
     Blocked as Blocked,
     Journal as Journal,

@@ -1,6 +1,8 @@
 from .analysis import Study as Study, load_study as load_study, to_frame as to_frame
 from .compare import compare_runs as compare_runs
 from .names import NamedMethod as NamedMethod
+from .judges import Clearance as Clearance, Contact as Contact
+from .recorded import Detour as Detour, JudgedPath as JudgedPath
 from .output import write_outputs as write_outputs
 from .run import RunSettings as RunSettings, evaluate as evaluate
 from .workers import distances_on_cluster as distances_on_cluster

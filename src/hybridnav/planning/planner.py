@@ -12,6 +12,7 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.renamed import renamed
 from hybridnav._base.threads import Turns
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planning import PlanStatus, Preset, load_preset
 from hybridnav.planning.batch import plan_many
@@ -24,6 +25,7 @@ from hybridnav.planning.planning import Planning
 from hybridnav.planning.preset import check_radius
 from hybridnav.planning.questions import Questions, Unanswered
 from hybridnav.planning.settings import OmplPlannerSettings
+from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import PathLike
     from hybridnav.closures.blocked import Closable
     from hybridnav.closures.one_way import OneWayLike
-    from hybridnav.maps import OccupancyGrid, RoomLabels
+    from hybridnav.maps import RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlanBatch, PlanResult
     from hybridnav.planning.named import At
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from hybridnav.planning.profile import Profile
     from hybridnav.planning.result import PlanDraft
     from hybridnav.search.found import ClosedCells, Method
-    from hybridnav.topology import TopologicalMap
     from hybridnav.topology.map import Version
 
 
@@ -62,7 +63,8 @@ class HybridPlanner(Questions):
     ----------
     topology
         The topological map with its grid. It may have been built with other settings than the
-        preset's `pyramid` section: results record the actual ones.
+        preset's `pyramid` section: results record the actual ones. Or the grid alone: then results
+        have no route, and names, places and doors are refused.
     preset
         Name of a preset, path to a preset file, or a `Preset`.
     prepared
@@ -78,6 +80,7 @@ class HybridPlanner(Questions):
         When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another.
+        When the preset needs places, and a grid alone is given.
         When the costs are those of another map, or the preset cannot plan by costs. When the map
         allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl`).
 
@@ -92,24 +95,31 @@ class HybridPlanner(Questions):
 
     def __init__(
         self,
-        topology: TopologicalMap,
+        topology: TopologicalMap | OccupancyGrid,
         *,
         preset: PathLike | Preset = "shortest",
         prepared: object | None = None,
         costs: CostLayer | None = None,
     ) -> None:
         self.preset = load_preset(preset)
-        grid, settings = topology.grid, self.preset.planner
+        built = topology if isinstance(topology, TopologicalMap) else None
+        grid = topology if isinstance(topology, OccupancyGrid) else topology.grid
+        settings = self.preset.planner
         check_radius(grid, self.preset)
+        if built is None and settings.underlying.needs_places:
+            raise InvalidValueError(
+                f"preset {self.preset.name} plans on the places of its map, and only a grid is "
+                "given: build its topological map, or take preset shortest"
+            )
         by = PlannerCosts(grid, self.preset, costs)
-        known = KnownMap(grid, topology, by.layer, prepared)
+        known = KnownMap(grid, built, by.layer, prepared)
         method, ompl = make_method(known, settings), None
         if isinstance(settings, OmplPlannerSettings):
             # Loads modules for these presets only, or reports which one to install.
             from hybridnav.planning.methods.ompl import ompl_planner  # noqa: PLC0415
 
             ompl = ompl_planner(known, method, settings)
-        self._now = Planning(self.preset, grid, topology, method, by, ompl)
+        self._now = Planning(self.preset, grid, built, method, by, ompl)
         self._turns, self._preparing = Turns(), Turns()
         self._profiled: dict[Profile, tuple[Planning, HybridPlanner]] = {}
         self._privacy: Privacy | None = None
@@ -128,7 +138,8 @@ class HybridPlanner(Questions):
         Raises
         ------
         InvalidValueError
-            When the map changed, by an `update` with a grid alone, after its places were built.
+            When the planner was made of a grid alone, or the map changed, by an `update` with a
+            grid alone, after its places were built.
         """
         topology = self._now.topology
         return no_places() if topology is None else topology

@@ -67,8 +67,8 @@ class Planning:
     preset: Preset
     grid: OccupancyGrid
     """The map."""
-    built: TopologicalMap
-    """The places that were built last, of this grid or of one before."""
+    built: TopologicalMap | None
+    """The places that were built last, of this grid or of one before; None for a grid alone."""
     method: Method
     """Finds paths."""
     costs: PlannerCosts
@@ -83,7 +83,8 @@ class Planning:
     @property
     def topology(self) -> TopologicalMap | None:
         """The places of the map; None if it changed since they were built."""
-        return self.built if self.built.grid is self.grid else None
+        built = self.built
+        return built if built is not None and built.grid is self.grid else None
 
     # Reading: names to points, closures to cells.
 
@@ -213,12 +214,12 @@ class Planning:
     @cached_property
     def _directed(self) -> ClosedCells | None:
         """The directions of the rooms, for all queries; None without any."""
-        rooms = self.built.pyramid.rooms
-        if rooms is None or not rooms.one_way:
+        built = self.built
+        if built is None or (rooms := built.pyramid.rooms) is None or not rooms.one_way:
             return None
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 
-        return ClosedCells(np.empty(0, np.int64), None, directions_on(self.built))
+        return ClosedCells(np.empty(0, np.int64), None, directions_on(built))
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
@@ -378,6 +379,7 @@ class Planning:
             result = self._solved(query, found, path, least, metric=metric)
         if not self.has_rooms or result.path is None or not result.solved:
             return result
+        assert self.built is not None  # noqa: S101 - it has rooms
         source = Walk(self.built, query.goal_name or query.points[1], query.poses[0])
         return replace(result, instruction_source=source)
 
@@ -511,7 +513,7 @@ class Planning:
 
     def _route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path or no places."""
-        if path is None or self._route_finder is None:
+        if path is None or self.built is None or self._route_finder is None:
             return None
         cells = partial(getattr, path, "cells")
         return filled(RouteOfCells, topology=self.built, finder=self._route_finder, cells=cells)
@@ -522,16 +524,15 @@ class Planning:
 
     @cached_property
     def _settings(self) -> dict[str, Any]:
-        pyramid, layer = self.built.source, self.costs.layer
+        built, layer = None if self.built is None else self.built.source, self.costs.layer
+        names = () if built is None else ("merge_distance_m", "linkage", "seed")
         costs = {} if layer is None else {"costs": layer.source}
         limits = self.preset.limits
         return {
             "preset": self.preset.name,
             "planner": self.preset.planner.model_dump(),
             "pyramid": {
-                "merge_distance_m": pyramid.merge_distance_m,
-                "linkage": pyramid.linkage,
-                "seed": pyramid.seed,
+                **{name: getattr(built, name) for name in names},
                 "robot_radius_m": self.grid.robot_radius_m,
             },
             **({} if limits is None else {"limits": limits.model_dump()}),

@@ -421,8 +421,9 @@ def _check_index(what: str, index: int, count: int) -> None:
 
 
 def no_places() -> NoReturn:
-    """Refuse what needs places, on a grid that changed after they were built."""
+    """Refuse what needs places, on a grid without any or that changed after they were built."""
     raise InvalidValueError(
-        "the map changed after its places were built, and places, rooms and doors belong to them: "
-        "call update with topology, the topological map of the grid now"
+        "the planner has a grid alone, or the map changed after its places were built, and places, "
+        "rooms and doors belong to them: call update with topology, the topological map of the "
+        "grid now"
     )

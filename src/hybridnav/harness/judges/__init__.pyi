@@ -1,6 +1,12 @@
 from .judge_line import AnyAnglePath as AnyAnglePath, VisibilityGraph as VisibilityGraph
 from .cheapest import Chords as Chords, chords_of as chords_of
 from .cheapest import CheapestCost as CheapestCost
+from .contacts import (
+    Clearance as Clearance,
+    Contact as Contact,
+    clearance_of as clearance_of,
+    contacts_of as contacts_of,
+)
 from .judge import (
     ScipyOptimum as ScipyOptimum,
     Verdict as Verdict,

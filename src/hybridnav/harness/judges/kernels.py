@@ -388,3 +388,174 @@ def cheapest_cost(factors, cuts_corners, start, goal):
                 left += 1
         turn += 1
     return np.inf
+
+
+# Where a line leaves the free space, how deep, and how far it stays off obstacles.
+
+SMALL = 1e-9
+"""Cells below which a piece between two lines of the lattice is what rounding leaves."""
+FAR = 1 << 30
+"""Column of no cell."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def faulty_spans(classes, free_of, positions, faulty):
+    """Return the pieces of faulty segments that lie outside the free space, float64 (m, 3).
+
+    Each is a segment, and the shares of it at which the piece begins and ends: the same share
+    where it passes a corner between two blocked cells.
+
+    `positions`: float64 (n, 2); `faulty`: bool (max(n - 1, 1),), the segments with a fault.
+    """
+    spans = [(0.0, 0.0, 0.0)][:0]
+    for i in range(faulty.size):
+        if not faulty[i]:
+            continue
+        row0, col0 = positions[i]
+        row1, col1 = positions[min(i + 1, len(positions) - 1)]
+        up, across = row1 - row0, col1 - col0
+        length = hypot(up, across)
+
+        # The lines of the lattice ahead; beyond the map there are none.
+        row_line = _first_line(row0, up, classes.shape[0])
+        col_line = _first_line(col0, across, classes.shape[1])
+        n_before, share, begun, tiny = len(spans), 0.0, -1.0, 0.0
+        while share < 1.0:
+            to_row = (row_line - row0) / up if 0 <= row_line <= classes.shape[0] else np.inf
+            to_col = (col_line - col0) / across if 0 <= col_line <= classes.shape[1] else np.inf
+            end = min(to_row, to_col, 1.0)
+            if to_row <= end:
+                row_line += math.copysign(1.0, up)
+            if to_col <= end:
+                col_line += math.copysign(1.0, across)
+
+            # The middle of a piece decides on all of it.
+            middle = (share + end) / 2
+            if (end - share) * length <= SMALL < length:
+                tiny = middle
+            elif _point_code(classes, free_of, row0 + middle * up, col0 + middle * across) != CLEAR:
+                begun = share if begun < 0 else begun
+            elif begun >= 0:
+                spans.append((float(i), begun, share))
+                begun = -1.0
+
+            # At a corner with two free cells it comes from the one into the other.
+            row, col = row0 + end * up, col0 + end * across
+            at_row, at_col = math.floor(row + 0.5), math.floor(col + 0.5)
+            is_corner = abs(row - at_row) <= SMALL and abs(col - at_col) <= SMALL
+            if is_corner and end < 1.0 and begun < 0:
+                if crossing_at(classes, free_of, at_row, at_col) != 0:
+                    spans.append((float(i), end, end))
+            share = end
+        if begun >= 0:
+            spans.append((float(i), begun, 1.0))
+        elif len(spans) == n_before:  # it enters a cell by less than rounding
+            spans.append((float(i), tiny, tiny))
+    found = np.empty((len(spans), 3))
+    for k in range(len(spans)):
+        found[k, 0], found[k, 1], found[k, 2] = spans[k]
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _first_line(start, ahead, most):
+    """Return the first whole number from 0 to `most` that a coordinate comes to, -1 for none."""
+    if ahead == 0:
+        return -1.0
+    if ahead > 0:
+        return max(math.floor(start) + 1.0, 0.0)
+    return min(math.ceil(start) - 1.0, float(most))
+
+
+@njit(cache=True, nogil=True)
+def neighbours_in_row(cells):
+    """Return for each cell the column of the nearest one of some cells in its row, int32 (2, rows,
+    cols): to the left, or its own, and to the right, or its own; `FAR` away for none.
+
+    `cells`: bool (rows, cols).
+    """
+    rows, cols = cells.shape
+    near = np.empty((2, rows, cols), np.int32)
+    for row in range(rows):
+        last = -FAR
+        for col in range(cols):
+            last = col if cells[row, col] else last
+            near[0, row, col] = last
+        last = FAR
+        for col in range(cols - 1, -1, -1):
+            last = col if cells[row, col] else last
+            near[1, row, col] = last
+    return near
+
+
+@njit(cache=True, nogil=True)
+def distance_to(near, row, col):
+    """Return the distance from a position to the nearest closed square of some cells, in cells; at
+    least `FAR` / 2 for none. `near`: see `neighbours_in_row`."""
+    rows, cols = near.shape[1], near.shape[2]
+    c = min(max(math.floor(col), 0), cols - 1)
+    middle = min(max(math.floor(row), 0), rows - 1)
+    best = float(FAR) * FAR
+    for away in range(rows):
+        # The rows above and below, until they alone are farther than what was found.
+        is_done = True
+        for r in (middle - away, middle + away):
+            up = max(r - row, row - r - 1, 0.0)
+            if r < 0 or r >= rows or up * up >= best:
+                continue
+            is_done = False
+            left, right = near[0, r, c], near[1, r, c]
+            across = max(col - left - 1, left - col, 0.0)
+            across = min(across, max(right - col, col - right - 1, 0.0))
+            best = min(best, up * up + across * across)
+        if is_done:
+            break
+    return math.sqrt(best)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def distances_to(near, positions):
+    """Return `distance_to` of many positions, float64 (n,)."""
+    found = np.empty(len(positions))
+    for i in range(len(positions)):
+        found[i] = distance_to(near, positions[i, 0], positions[i, 1])
+    return found
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def farthest(near, starts, ends, sign, within):
+    """Return for each of some segments where it is farthest from some cells, float64 (n, 2): the
+    share of the segment, and the distance there; with sign -1 where it is nearest.
+
+    A distance changes by at most one cell a cell: halves that cannot hold a better one are left
+    out. `starts`, `ends`: float64 (n, 2); `within`: cells by which an answer may be off.
+    """
+    found = np.empty((len(starts), 2))
+    waiting = np.empty((128, 4))
+    for i in range(len(starts)):
+        row, col = starts[i]
+        up, across = ends[i, 0] - row, ends[i, 1] - col
+        length = hypot(up, across)
+        first, last = distance_to(near, row, col), distance_to(near, row + up, col + across)
+        share, best = (0.0, first) if sign * first >= sign * last else (1.0, last)
+        waiting[0, 0], waiting[0, 1], waiting[0, 2], waiting[0, 3] = 0.0, first, 1.0, last
+        size = 1
+        while size > 0:
+            low, at_low, high, at_high = waiting[size - 1]
+            hope = (sign * (at_low + at_high) + (high - low) * length) / 2
+            middle = (low + high) / 2
+            if hope <= sign * best + within or not low < middle < high:
+                size -= 1
+                continue
+            here = distance_to(near, row + middle * up, col + middle * across)
+            if sign * here > sign * best:
+                share, best = middle, here
+            waiting[size, 0], waiting[size, 1] = middle, here
+            waiting[size, 2], waiting[size, 3] = high, at_high
+            waiting[size - 1, 2], waiting[size - 1, 3] = middle, here
+            size += 1
+        found[i, 0], found[i, 1] = share, best
+    return found
