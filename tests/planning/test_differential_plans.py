@@ -21,9 +21,11 @@ pytest.importorskip("ompl")
 ROBOT = str([list(corner) for corner in CORNERS])
 
 
-def planner_of(topology: hn.TopologicalMap, *settings: str) -> hn.HybridPlanner:
+def planner_of(
+    topology: hn.TopologicalMap, *settings: str, budget_s: float = 2
+) -> hn.HybridPlanner:
     """A planner for a robot of 0.6 x 1.8 m, or another."""
-    given = ["space=differential", f"footprint={ROBOT}", "budget_s=2", *settings]
+    given = ["space=differential", f"footprint={ROBOT}", f"budget_s={budget_s}", *settings]
     # The doors of the corridor's own fields may leave no room to turn before them.
     overrides = ["planner.corridor=neighbours", *(f"planner.ompl.{text}" for text in given)]
     return hn.HybridPlanner(topology, preset=load_preset("ompl", overrides=overrides))
@@ -71,9 +73,11 @@ def test_every_planner_of_the_space_goes_through_doors_without_touching(
     planner: str,
     reverses: bool,  # noqa: FBT001
 ) -> None:
-    made = planner_of(rooms, f"planner={planner}", f"reverses={str(reverses).lower()}")
+    settings = f"planner={planner}", f"reverses={str(reverses).lower()}"
     start, goal = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
-    result = made.plan(start, goal)
+    result = planner_of(rooms, *settings).plan(start, goal)
+    if result.status is hn.PlanStatus.APPROXIMATE:  # the budget is of wall time, beside other jobs
+        result = planner_of(rooms, *settings, budget_s=60).plan(start, goal)
     poses = poses_of(result, reverses=reverses)
     assert result.refinement is not None
     assert not result.refinement.by_grid
