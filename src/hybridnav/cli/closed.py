@@ -22,8 +22,8 @@ CloseOption = Annotated[
     list[str] | None,
     option(
         "--close WHAT",
-        "Close door:N or room:NAME; in a building link:NAME, link:NAME@FLOOR, FLOOR:door:N or "
-        "FLOOR:room:NAME. May be repeated.",
+        "Close door:N or room:NAME, or close it one way, one-way:door:N=ROOM; in a building with "
+        "FLOOR: before it, or link:NAME, link:NAME@FLOOR. May be repeated.",
     ),
 ]
 OpenOption = Annotated[

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError
 from hybridnav.errors import InvalidValueError, MapError
@@ -196,9 +197,17 @@ BlockedOption = Annotated[
         "Nav2 takes its masks. May be repeated.",
     ),
 ]
+OneWayOption = Annotated[
+    list[str] | None,
+    option(
+        "--one-way WHAT",
+        "Pass in one direction alone: door:N=ROOM into that room, line:X,Y:X,Y from its left to "
+        "its right, or the one-way edges of a graph:FILE. May be repeated.",
+    ),
+]
 
 
-_KINDS = frozenset({"door", "room", "keepout"})
+_KINDS = frozenset({"door", "room", "keepout", "one-way"})
 
 
 def out_of_order(map_file: Path) -> list[str]:
@@ -229,11 +238,15 @@ class Closing:
     files: tuple[Path, ...] = ()
     masks: tuple[CostSpec, ...] = ()
     """Files of zones for the centre of the robot."""
+    one_way: tuple[hn.OneWayRule, ...] = ()
+    """What is passed in one direction alone."""
+    graphs: tuple[Path, ...] = ()
+    """Files of graphs whose one-way edges are passed so."""
 
     @property
     def needs_rooms(self) -> bool:
         """Whether the closures make sense only on a map with rooms."""
-        return bool(self.doors or self.rooms)
+        return bool(self.doors or self.rooms) or any(rule.door for rule in self.one_way)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the closures as plain values for JSON: null for none."""
@@ -244,9 +257,15 @@ class Closing:
         if not self.texts:
             return None
         # They load shapely.
-        from hybridnav.closures import Blocked, load_blocked  # noqa: PLC0415
+        from hybridnav.closures import Blocked, OneWay, load_blocked  # noqa: PLC0415
 
-        closed = Blocked(doors=self.doors, rooms=self.rooms)
+        rules = list(self.one_way)
+        for file in self.graphs:
+            from hybridnav.graphs import one_way_rules  # noqa: PLC0415 - loads numba
+
+            rules += one_way_rules(extension("formats", "graph").load_graph(file), grid)
+        one_way = OneWay.of(rules) if rules else None
+        closed = Blocked(doors=self.doors, rooms=self.rooms, one_way=one_way)
         named = {printable(path): load_blocked(path, grid) for path in self.files}
         for mask in self.masks:
             name = f"keepout: {printable(mask.file)}"
@@ -278,11 +297,11 @@ def parsed_closing(texts: list[str] | None) -> Closing:
     Raises `UsageError` when a door has no number, a room or a file no name, or a mask other
     settings.
     """
-    doors, rooms, files, masks = [], [], [], []
+    doors, rooms, files, masks, rules, graphs = [], [], [], [], [], []
     for text in texts or ():
         kind, colon, name = text.partition(":")
         if not text or (colon and kind in _KINDS and not name.strip()):
-            kinds = "door:N, room:NAME, keepout:FILE"
+            kinds = "door:N, room:NAME, keepout:FILE, one-way:RULE"
             raise UsageError(f"--blocked must be {kinds} or a file, got {text!r:.80}")
         if colon and kind == "door":
             doors.append(_number(name))
@@ -290,10 +309,24 @@ def parsed_closing(texts: list[str] | None) -> Closing:
             rooms.append(name)
         elif colon and kind == "keepout":
             masks.append(_mask(text))
+        elif colon and kind == "one-way" and name.startswith("graph:"):
+            graphs.append(Path(name.removeprefix("graph:")))
+        elif colon and kind == "one-way":
+            rules.append(_rule(name))
         else:
             files.append(Path(text))
     typed = tuple(map(printable, texts or ()))
-    return Closing(typed, tuple(doors), tuple(rooms), tuple(files), tuple(masks))
+    given = tuple(doors), tuple(rooms), tuple(files), tuple(masks), tuple(rules), tuple(graphs)
+    return Closing(typed, *given)
+
+
+def _rule(text: str) -> hn.OneWayRule:
+    from hybridnav.maps import OneWayRule  # noqa: PLC0415 - loads numpy
+
+    try:
+        return OneWayRule.of(text)
+    except InvalidValueError as error:
+        raise UsageError(f"--one-way: {error}") from None
 
 
 def _mask(text: str) -> CostSpec:

@@ -87,7 +87,8 @@ def grow(query: TypedQuery, model: hn.Model, seconds: Seconds) -> hn.Topological
     They are those of a file that is named, of the model, of a file in the map's folder, or found.
     """
     rooms_file, beside = query.args.rooms_file, query.args.map_file.parent / "rooms.yaml"
-    if rooms_file is None and model.rooms is None and query.is_tour:
+    has_rules = beside.is_file() and b"\none_way:" in beside.read_bytes()
+    if rooms_file is None and model.rooms is None and (query.is_tour or has_rules):
         rooms_file = beside if beside.is_file() else None
         if rooms_file is None:
             complain(

@@ -152,6 +152,7 @@ class PlanOptions(FloorOptions):
     max_overlap: OneMap[OverlapOption] = None
     max_stretch: StretchOption = None
     blocked: options.BlockedOption = None
+    one_way: options.OneWayOption = None
     leave_zone: OneMap[LeaveZoneOption] = False
     profile: options.ProfileOption = None
     no_stairs: OfBuilding[options.NoStairsOption] = False
@@ -169,11 +170,20 @@ class PlanOptions(FloorOptions):
     PANELS: ClassVar = {
         "Typed first": ("origin", "to", "start", "goal", "plot"),
         "Ends and routes": ("via", "at", "within_m", "alternatives", "max_overlap", "max_stretch"),
-        "What is closed": ("blocked", "leave_zone", "profile", "no_stairs"),
+        "What is closed": ("blocked", "one_way", "leave_zone", "profile", "no_stairs"),
         "Costs": ("costs", "smooth", "compare"),
         "Output": ("why", "poses", "bag", "proof", "language", "as_json", "help"),
         "Map": ("rooms_file", *MapOptions.PANELS["Map"]),
     }
+
+    @property
+    def shut(self) -> list[str]:
+        """What the query closes, and lets pass one way, as `--blocked` takes it."""
+        found = list(self.blocked or ())
+        for text in self.one_way or ():
+            floor, colon, rest = text.partition(":") if self.is_building else ("", "", text)
+            found.append(f"{floor}{colon}one-way:{rest}")
+        return found
 
 
 @dataclass(frozen=True)
@@ -197,7 +207,7 @@ class TypedQuery:
         settings = args.settings(
             options.PRESET if costs else None, overrides=costs.overrides, smooth=args.smooth
         )
-        texts = [*(args.blocked or ()), *options.out_of_order(args.map_file)]
+        texts = [*args.shut, *options.out_of_order(args.map_file)]
         closing = options.parsed_closing(texts)
         start = _end("start", args.start, "from", args.origin)
         goal = _end("goal", args.goal, "to", args.to)

@@ -143,7 +143,7 @@ class Blocked:
         ]
         cells = np.asarray(self.cells).tobytes()
         named = tuple((name, one.key) for name, one in self.named.items())
-        way = () if self.one_way is None else as_one_way(self.one_way).key
+        directed = () if self.one_way is None else as_one_way(self.one_way).key
         return (
             tuple(self.arcs),
             tuple(self.places),
@@ -152,7 +152,7 @@ class Blocked:
             self.doors,
             self.rooms,
             named,
-            way,
+            directed,
         )
 
     def cells_of(self, topology: TopologicalMap) -> LongArray:

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 from hybridnav._base.files import printable, replace_file
 from hybridnav._base.yaml_file import Limits, read_marked
 from hybridnav.closures.blocked import Blocked
+from hybridnav.closures.one_way import OneWay, directions_on
 from hybridnav.errors import InvalidValueError, MapError, brief
+from hybridnav.maps import OneWayRule
 
 try:
     import fcntl
@@ -30,7 +32,8 @@ if TYPE_CHECKING:
 
 _ENDING = ".closed.yaml"
 _WHAT = re.compile(
-    r"link:(?P<link>.+)|(?:(?P<floor>.+?):)?(?:door:(?P<door>[0-9]{1,9})|room:(?P<room>.+))"
+    r"link:(?P<link>.+)|(?:(?P<floor>.+?):)?"
+    r"(?:door:(?P<door>[0-9]{1,9})|room:(?P<room>.+)|one-way:(?P<one_way>(?:door|line):.+))"
 )
 _MOST_ITEMS, _MOST_TEXT = 1000, 200
 _LIMITS = Limits(max_bytes=2**22, max_values=10_000)
@@ -56,8 +59,8 @@ class OutOfOrder:
     """
 
     what: str
-    """`link:NAME`, `door:N`, `room:NAME`; with `FLOOR:` before the last two in a building.
-    `link:NAME@FLOOR` for a link that is closed on one floor."""
+    """`link:NAME`, `door:N`, `room:NAME`, or `one-way:` and a `OneWayRule`; with `FLOOR:` before
+    the last three in a building. `link:NAME@FLOOR` for a link that is closed on one floor."""
     since: str = ""
     """When it was closed, UTC."""
     why: str = ""
@@ -73,9 +76,10 @@ class OutOfOrder:
                 )
         if not _WHAT.fullmatch(self.what):
             raise InvalidValueError(
-                "a closed thing must be link:NAME, door:N or room:NAME, in a building with FLOOR: "
-                f"before a door or a room, got {brief(self.what)}"
+                "a closed thing must be link:NAME, door:N, room:NAME or one-way:RULE, in a "
+                f"building with FLOOR: before all but links, got {brief(self.what)}"
             )
+        _ = self.blocked
 
     @property
     def _parts(self) -> dict[str, str | None]:
@@ -95,9 +99,12 @@ class OutOfOrder:
 
     @property
     def blocked(self) -> Blocked:
-        """The closure of the door or the room."""
-        door, room = self._parts["door"], self._parts["room"]
-        return Blocked(doors=[int(door)] if door else [], rooms=[room] if room else [])
+        """The closure of the door or the room, or the direction."""
+        door, room, rule = (self._parts[name] for name in ("door", "room", "one_way"))
+        one_way = OneWay.of([OneWayRule.of(rule)]) if rule else None
+        return Blocked(
+            doors=[int(door)] if door else [], rooms=[room] if room else [], one_way=one_way
+        )
 
     def check_on(self, topology: TopologicalMap) -> None:
         """Refuse things that are not on a map without floors.
@@ -109,7 +116,12 @@ class OutOfOrder:
         """
         if self.link is not None or self.floor is not None:
             raise InvalidValueError(f"{self.what} is of a building, and this is one map")
+        self.check_in(topology)
+
+    def check_in(self, topology: TopologicalMap) -> None:
+        """Refuse a door, a room or a direction that is not on a map, or on a floor."""
         self.blocked.cells_of(topology)
+        directions_on(topology, self.blocked.directions)
 
 
 def _mark(state: os.stat_result) -> tuple[int, int, int]:

@@ -14,6 +14,7 @@ from .judge import (
 )
 from .lane_graph import build_lane_graph as build_lane_graph
 from .lanes import keep_right as keep_right
+from .one_way import one_way_rules as one_way_rules
 from .plot import plot_graph_check as plot_graph_check, plot_route_graph as plot_route_graph
 from .route_messages import (
     first_broken_edge as first_broken_edge,

@@ -13,6 +13,7 @@ from hybridnav.graphs.attach import PlacedGraph
 from hybridnav.graphs.gather import MOST_EXAMPLES, Finding, Findings, Point, shown
 from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.lanes import DoorsPassed
+from hybridnav.graphs.one_way import against
 from hybridnav.graphs.waypoint_graph import WaypointGraph, add_components
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
@@ -132,6 +133,7 @@ def check_graph(
     is_beyond = (component >= 0) & space.outside(rooms)[component]
     _add_nodes(findings, graph, placed, grid, component)
     _add_edges(findings, graph, placed, space, is_clear)
+    _add_against(findings, topology, graph, placed, np.flatnonzero(is_clear))
     is_kept = space.kept(None if rooms is None else topology.rooms)
     add_components(findings, graph, component, is_beyond)
     _add_parts(findings, space, is_kept, component)
@@ -219,6 +221,20 @@ def _add_edges(
     is_again = np.ones(len(edges), dtype=np.bool_)
     is_again[first] = False
     add("repeated-edge", np.flatnonzero(is_again & ~is_loop), [])
+
+
+def _add_against(
+    findings: Findings,
+    topology: TopologicalMap,
+    graph: WaypointGraph,
+    placed: PlacedGraph,
+    clear: LongArray,
+) -> None:
+    """Add edges that cross a one-way door or line of the rooms against its direction."""
+    wrong = against(topology, map(placed.line_of, clear.tolist()), placed.free)
+    for edge in clear[wrong].tolist():
+        tail, head = (tuple(graph.points[at].tolist()) for at in graph.edges[edge])
+        findings.add("edge-against", graph.edge_text(edge), tail, head)
 
 
 def _blocked_at(placed: PlacedGraph, space: FreeSpace, which: LongArray) -> list[str]:

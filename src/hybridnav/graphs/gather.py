@@ -67,6 +67,7 @@ KINDS = {
     "alone": "nodes without edges, beside others",
     "components": "components of the graph that no edge connects, though free space does",
     "island": "components of the graph that neither edges nor free space join with the largest",
+    "edge-against": "edges against the direction of a one-way door or line of the rooms",
     "one-way": "nodes that cannot be both reached and left",
     "missing-door": "doors that the robot fits through and no edge passes",
     "missing-room": "rooms that the robot fits in and no node lies in",

@@ -15,6 +15,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.joining import Nodes
 from hybridnav.graphs.judge import RIM_CELLS, FreeSpace
 from hybridnav.graphs.kernels import least_along, least_widths
+from hybridnav.graphs.one_way import against
 from hybridnav.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
@@ -82,9 +83,10 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
     grid = topology.grid
     edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     positions = nodes.positions
+    free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
+    edges = edges[~against(topology, positions[edges], free)]
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
     clearance = rooms.clearance_m if rooms is not None else measured_clearance_m(grid)
-    free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
     clearances, middles = least_along(free, np.ascontiguousarray(clearance), positions, edges)
     occupied = np.ascontiguousarray(grid.measured == CellClass.OCCUPIED)
     tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
@@ -214,7 +216,8 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
     edges, positions = graph.edges, graph.positions
     first, second = _lane(positions, edges, off)
     fits = _fits(space, positions, edges, (first, second), off)
-    fits &= fits[_opposite(edges, graph.n_nodes)]
+    there = _opposite(edges, graph.n_nodes)
+    fits &= (there >= 0) & fits[there]
     lanes = np.flatnonzero(fits)
     # Two lanes may have a node in common.
     new, _, place, _ = unique_rows(np.concatenate([first[lanes], second[lanes]]))
@@ -268,8 +271,8 @@ def _fits(
 
 
 def _opposite(edges: LongArray, n_nodes: int) -> LongArray:
-    """Return the index of each edge's opposite; graphs of maps have one for each."""
-    keys = edges[:, 0] * n_nodes + edges[:, 1]
+    """Return the index of each edge's opposite, -1 for none: for edges that lead one way."""
+    keys, wanted = edges @ np.array([n_nodes, 1]), edges[:, ::-1] @ np.array([n_nodes, 1])
     order = np.argsort(keys, kind="stable")
-    found: LongArray = order[np.searchsorted(keys[order], edges[:, 1] * n_nodes + edges[:, 0])]
-    return found
+    found = order[np.searchsorted(keys[order], wanted).clip(max=max(len(order) - 1, 0))]
+    return np.where(keys[found] == wanted, found, -1)

@@ -9,7 +9,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav._base.rows import unique_rows
-from hybridnav._base.trig import hypots
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_shades, known_view
 from hybridnav.viz.layout import Entry, finish
@@ -28,8 +27,6 @@ _MARKS = "sD^vo<>phP"
 _SMALLEST, _LARGER, _LARGEST = 4.0, 0.8, 9.0
 """Size of the first mark, and how much larger the next are, up to a limit, in line widths: marks at
 one point are all seen."""
-_ARROW_IN = 0.07
-"""Length of the arrow on an edge that leads one way, in inches."""
 _MARGIN_M = 0.5
 _SHADE = 96
 """Opacity of keepout zones, of 255."""
@@ -136,21 +133,8 @@ def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
         return []
     # In the middle of the edge, on polylines of the segment there.
     at = np.array([each[(len(each) - 2) // 2 : (len(each) - 2) // 2 + 2] for each in lines])
-    steps = at[:, 1] - at[:, 0]
-    along = steps / np.maximum(hypots(*steps.T), 1e-9)[:, None]
     look: dict[str, Any] = {"color": style.INK}
-    shape: dict[str, Any] = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
-    shape |= {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}
-    canvas.ax.quiver(
-        *at.mean(axis=1).T,
-        *(along * _ARROW_IN * line).T,
-        angles="xy",
-        pivot="mid",
-        scale=1.0,
-        zorder=3.5,
-        **look,
-        **shape,
-    )
+    canvas.add_arrows(at.mean(axis=1), at[:, 1] - at[:, 0], zorder=3.5, **look)
     mark = Line2D([], [], marker=">", linestyle="none", markersize=5.0 * line, **look)
     return [(mark, "edges that lead one way")]
 

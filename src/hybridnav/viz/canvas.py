@@ -17,6 +17,7 @@ from matplotlib.transforms import Affine2D, Bbox
 from PIL import Image
 
 from hybridnav._base.files import replace_file
+from hybridnav._base.trig import hypots
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.viz import style
@@ -35,6 +36,8 @@ MAX_IMAGE_SIDE = 6000
 MAX_HEIGHT = 1.1
 """Greatest height of the map in a new figure, in figure widths."""
 PAD_IN = 0.04
+ARROW_IN = 0.07
+"""Length of arrows in inches, on a picture of the full width."""
 _MOST_IN = 500
 """Widest figure in inches: matplotlib draws up to 65,536 pixels, a hundred to the inch."""
 
@@ -130,6 +133,16 @@ class Canvas:
     def add_lines(self, lines: Iterable[FloatArray], **look: Any) -> None:
         """Draw lines of points `(x, y)` in metres; `look` is that of a `LineCollection`."""
         self.ax.add_collection(LineCollection(list(lines), **look), autolim=False)
+
+    def add_arrows(self, middles: FloatArray, steps: FloatArray, **look: Any) -> None:
+        """Draw arrows of one length round points `(x, y)` in metres, along steps; `look` is that of
+        a quiver."""
+        length_in = ARROW_IN * self.sizes.line
+        along = steps / np.maximum(hypots(*steps.T), 1e-9)[:, None] * length_in
+        shape: dict[str, Any] = {"headwidth": 6, "headlength": 8, "headaxislength": 8}
+        shape |= {"minlength": 0, "units": "inches", "scale_units": "inches", "scale": 1.0}
+        shape |= {"angles": "xy", "pivot": "mid", "width": length_in / 8}
+        self.ax.quiver(*middles.T, *along.T, **shape, **look)
 
 
 def _show(ax: Axes, view: View) -> None:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav.closures.blocked import as_blocked
+from hybridnav.closures.one_way import directions_on
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_points
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import BoolArray
+    from hybridnav.closures import OneWay
     from hybridnav.closures.blocked import Closable
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
@@ -279,7 +281,34 @@ def draw_query(
         shades[is_closed] = (*style.rgb(_CLOSED)[0].tolist(), _CLOSED_ALPHA)
         draw_shades(canvas, grid, shades, gid="closed")
         entries.append((Patch(fc=_CLOSED), "closed"))
-    return entries
+    given = None if blocked is None else as_blocked(blocked).directions
+    return entries + draw_one_way(canvas, topology, given)
+
+
+def draw_one_way(
+    canvas: Canvas, topology: TopologicalMap, given: OneWay | None = None
+) -> list[Entry]:
+    """Draw what is crossed in one direction only: its sides, and an arrow on each thing.
+
+    `given`: that of a query, beside the rules of the rooms. Result: entries of the legend.
+    """
+    found = directions_on(topology, given)
+    if found is None or not len(found.sides):
+        return []
+    one, other = found.sides[:, :2], found.sides[:, 2:]
+    corners, across = np.maximum(one, other), np.abs(other - one)[:, ::-1]
+    frame, width = topology.grid.frame, 1.2 * canvas.sizes.line
+    lines = np.stack([frame.points_of_grid(each) for each in (corners, corners + across)], axis=1)
+    canvas.add_lines(lines, colors=_CLOSED, linewidths=width, zorder=5, gid="one-way")
+    middles, steps = lines.mean(axis=1), frame.points_of(other) - frame.points_of(one)
+    at = [  # the side in the middle of each thing
+        places[((middles[places] - middles[places].mean(axis=0)) ** 2).sum(axis=1).argmin()]
+        for places in found.parts.values()
+    ]
+    along = np.array([steps[places].mean(axis=0) for places in found.parts.values()])
+    canvas.add_arrows(middles[at], along, color=_CLOSED, zorder=8.5, gid="one-way-arrows")
+    mark = Line2D([], [], color=_CLOSED, lw=width, marker=">", markersize=5 * canvas.sizes.line)
+    return [(mark, "one way")]
 
 
 def _wider(cells: BoolArray, steps: int) -> BoolArray:

@@ -15,7 +15,7 @@ from hybridnav.viz import style
 from hybridnav.viz.canvas import MAX_HEIGHT, Canvas, draw_cells, known_view, new_figure
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.layout import finish_with_axes
-from hybridnav.viz.maps import ground_entries, swatch
+from hybridnav.viz.maps import draw_one_way, ground_entries, swatch
 from hybridnav.viz.places import colour_vertices
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         entries += draw_doors(canvas, doors, f"{n_left_out} left out" if n_left_out else "")
         doors.sort(key=lambda door: (door.is_opening, -door.width_m))
         writer.number_doors(doors)
+    entries += draw_one_way(canvas, rooms) if isinstance(rooms, TopologicalMap) else []
     entries += [*ground_entries(grid), *key]
     finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax

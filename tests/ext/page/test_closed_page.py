@@ -113,6 +113,22 @@ def test_what_is_closed_lasts_and_others_see_it_at_once(people: list[Shown], fol
     assert _journal(folder) == []
 
 
+def test_a_click_turns_a_door_until_it_is_open_both_ways(people: list[Shown], folder: Path) -> None:
+    english, german = people
+    building = hn.ext.fleet.load_building(folder / "house.yaml", robot_radius_m=0)
+    rooms = building.floors[0].planner.topology.rooms.door(2).rooms
+    english.mode("close")
+    english.page.check("#one-way")
+    for room in rooms:
+        english.page.select_option("#close-door", "2")
+        english.wait_text("#closed", f"door 2, only into {room or 'no room'}, floor 0")
+        german.wait_text("#closed", f"Tür 2, nur nach {room or 'kein Raum'}")
+        assert [what for what, _, _ in _journal(folder)] == [f"0:one-way:door:2={room or ''}"]
+    english.page.select_option("#close-door", "2")
+    english.wait("document.querySelector('#closed').textContent === ''")
+    assert _journal(folder) == []
+
+
 def test_of_two_who_close_the_same_the_last_one_counts(people: list[Shown], folder: Path) -> None:
     english, german = people
     english.mode("close")

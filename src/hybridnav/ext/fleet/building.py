@@ -378,7 +378,7 @@ class Building:
         shut = why.shut_of(asked.blocked, asked.closed_links, stairs=asked.stairs)
 
         def is_solved(still: list[why.Shut]) -> bool:
-            given = asked._replace(**why.conditions(still))
+            given = asked._replace(**why.conditions(still, asked.blocked))
             return self._plans(start, goal, given, (1, 1.0))[0].solved
 
         endpoints = (

@@ -137,7 +137,7 @@ def check_closing(item: OutOfOrder, floors: Sequence[Floor], links: Sequence[Lin
         raise InvalidValueError(f"{item.what} needs its floor, as {names[0]}:{item.what}")
     else:
         floor = floors[place_of_name(item.floor, names, "floor")]
-        item.blocked.cells_of(floor.planner.topology)
+        item.check_in(floor.planner.topology)
 
 
 class FloorParts(NamedTuple):

@@ -67,7 +67,7 @@ def plan_over_floors(args: PlanOptions) -> None:
     seconds: dict[str, float] = {}
     building = load_floors(args, seconds)
     waypoints = [_endpoint(text, building) for text in typed]
-    links, blocked = _closures(building, args.blocked or ())
+    links, blocked = _closures(building, args.shut)
     how: dict[str, Any] = {"stairs": not args.no_stairs, "at": at, "profile": args.profile}
     how |= {"closed_links": links, "blocked": blocked}
     routes: BuildingAlternatives | None = None
@@ -110,7 +110,7 @@ def _plan_figures(
         "preset": _preset_of(building, legs[0]),
         "words": [line for leg in legs for line in leg.words(args.language)],
         "query": " via ".join(typed[:-1]) + f" to {typed[-1]}",
-        "blocked": [printable(text) for text in [*(args.blocked or ()), *shut]] or None,
+        "blocked": [printable(text) for text in [*args.shut, *shut]] or None,
     }
 
 

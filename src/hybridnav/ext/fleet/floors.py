@@ -143,6 +143,12 @@ class FloorTable:
         planner = self.floor.planner
         return planner.grid is self._of[0] and planner.costs is self._of[1]
 
+    @property
+    def is_directed(self) -> bool:
+        """Whether a way back may cost more: something is passed in one direction only."""
+        closed = self.floor.planner.closed(self.closed)
+        return closed is not None and closed.one_way is not None
+
     def renewed(self) -> FloorTable:
         """Return the table itself while it is current, else an empty one of the map now."""
         return self if self.is_current else FloorTable(self.floor, self.positions_m)
@@ -182,9 +188,10 @@ class FloorTable:
     def _learn(self, start: int, goal: int, cost: float, bound: float) -> None:
         """Take over the cost and the bound of a plan between two ends.
 
-        The optimum is the same in both directions: planners with headings make no floors.
+        Without one-way rules the optimum is the same in both directions: planners with headings
+        make no floors.
         """
-        for pair in ((start, goal), (goal, start)):
+        for pair in ((start, goal), (goal, start))[: 1 if self.is_directed else 2]:
             self.lower[pair] = max(self.lower[pair], bound)
             if math.isnan(self.cost[pair]):
                 self.expected[pair] = self.lower[pair]

@@ -16,7 +16,7 @@ from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import Entry, add_legend, add_scale_bar, add_title, frame_axes, text_width
-from hybridnav.viz.maps import ground_entries
+from hybridnav.viz.maps import draw_one_way, ground_entries
 from hybridnav.viz.room_map import draw_room_cells, room_entry
 
 if TYPE_CHECKING:
@@ -236,7 +236,8 @@ def _draw_ground(
     writer = RoomWriter(canvas, grid, rooms)
     writer.labels.keep_free(ends, 0.8 * _POINTS * canvas.sizes.line)
     left_out = writer.write_names(set(), lines=list(lines))
-    return [room_entry(left_out, style.PALE), *ground_entries(grid)], writer.labels
+    one_way = draw_one_way(canvas, floor.planner.topology)
+    return [room_entry(left_out, style.PALE), *one_way, *ground_entries(grid)], writer.labels
 
 
 def _mark(link: Link, canvas: Canvas, *, is_taken: bool) -> Line2D:

@@ -240,11 +240,13 @@ class LinkSearch:
         number = part[1] if is_first else part[0]
         others = [other for other in self._network.on_floor[end.floor] if other != number]
         row, rows = (self._network.ends[number].at, [self._network.ends[o].at for o in others])
-        away = np.fmin(table.cost[row, rows], table.cost[rows, row])
+        to, back = table.cost[row, rows], table.cost[rows, row]
+        is_directed = table.is_directed
+        away = (back if is_first else to) if is_directed else np.fmin(to, back)
         least = np.zeros(len(others))
         is_near = away < np.inf
         least[is_near] = found.lower_bound - away[is_near]
-        if found.cost < math.inf:
+        if found.cost < math.inf and not is_directed:
             least = np.maximum(least, table.lower[row, rows] - found.cost)
         lower = (self._first if is_first else self._last).lower
         lower[others] = np.maximum(lower[others], least * ROUNDED)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.closures.blocked import as_blocked
+from hybridnav.closures.blocked import Blocked, as_blocked
 from hybridnav.planning import PlanStatus
 from hybridnav.reasons.why import each_closure, explain
 from hybridnav.reasons.why_words import closure_words
@@ -15,7 +15,6 @@ from hybridnav.reasons.why_words import closure_words
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from hybridnav.closures import Blocked
     from hybridnav.closures.blocked import Closable
     from hybridnav.ext.fleet.floors import Floor
     from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
@@ -84,9 +83,10 @@ def shut_of(
     return found
 
 
-def conditions(shut: Sequence[Shut]) -> dict[str, Any]:
-    """Return the conditions of a query with these things closed."""
-    blocked: dict[str, list[Blocked]] = {}
+def conditions(shut: Sequence[Shut], given: Mapping[str, Closable]) -> dict[str, Any]:
+    """Return the conditions of a query with these things closed, and the directions of `given`."""
+    directed = {floor: as_blocked(one).directions for floor, one in given.items()}
+    blocked = {floor: [Blocked(one_way=one)] for floor, one in directed.items() if one is not None}
     for one in shut:
         if one.floor is not None and one.blocked is not None:
             blocked.setdefault(one.floor, []).append(one.blocked)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from hybridnav.closures import Blocked
+from hybridnav.closures import Blocked, OneWay
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import requests as ask
 from hybridnav.guide import plan_alternatives
 from hybridnav.guide.tour import tour_of
-from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps import CellClass, OccupancyGrid, OneWayRule
 from hybridnav.maps.names import natural_key
 from hybridnav.planning import PlanResult, load_preset, preset_names, under
 from hybridnav.rooms.choices import leading_doors
@@ -110,7 +110,6 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
 
     `listed` tells which of them the page shows unless it is asked for all, `leads` which doors it
     shows to people."""
-    grid = rooms.grid
     shown = {door.number for door in rooms.listed_doors}
     leading = {door.number for door in leading_doors(rooms)}
     found = [
@@ -134,10 +133,11 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
     return {
         "rooms": sorted(found, key=lambda room: natural_key(room["name"])),
         "doors": [
-            _door(door, grid) | {"listed": door.number in shown, "leads": door.number in leading}
+            _door(door, rooms) | {"listed": door.number in shown, "leads": door.number in leading}
             for door in rooms.doors
             if not door.is_gap
         ],
+        "one_way": [str(rule) for rule in rooms.labels.one_way],
     }
 
 
@@ -188,14 +188,19 @@ def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
     return top, min(bottom, inside.shape[0]), left, min(right, inside.shape[1])
 
 
-def _door(door: Door, grid: OccupancyGrid) -> dict[str, Any]:
+def _door(door: Door, rooms: Rooms) -> dict[str, Any]:
+    moves, label_of = rooms.moves_through(door.number), rooms.labels.label_of.ravel()
+    into = -1 if door.rooms[1] is None else rooms.labels.index(door.rooms[1])
+    steps = np.diff(np.stack(np.divmod(moves, rooms.grid.shape[1]), axis=2), axis=1)[:, 0]
+    ahead = np.where(label_of[moves[:, 1:]] == into, steps, -steps).mean(axis=0)
     return {
+        "ahead": np.round(ahead[::-1], 3).tolist(),
         "number": door.number,
         "rooms": list(door.rooms),
         "kind": door.kind,
         "passable": door.passable,
         "width_m": round(door.width_m, 2),
-        "at": ask.in_grid(door.position, grid),
+        "at": ask.in_grid(door.position, rooms.grid),
     }
 
 
@@ -335,7 +340,9 @@ class PagePlanning:
                 raise InvalidValueError(
                     "the drawn area crosses itself: draw its corners in one turn round it"
                 )
-        return Blocked(doors=closed.doors, rooms=closed.rooms, polygons=areas)
+        one_way = OneWay.of(map(OneWayRule.of, closed.one_way)) if closed.one_way else None
+        shut: Any = {"doors": closed.doors, "rooms": closed.rooms, "one_way": one_way}
+        return Blocked(polygons=areas, **shut)
 
     def _facts(self, result: PlanResult) -> dict[str, Any]:
         """Return the figures and the line of a plan."""

@@ -48,18 +48,20 @@ class FloorPoint(_Strict):
 
 
 class FloorClosed(_Strict):
-    """What is closed on a floor: doors by number, rooms by name, polygons in grid units."""
+    """What is closed on a floor: doors by number, rooms by name, polygons in grid units, and rules
+    of what is passed one way."""
 
     floor: FloorNumber
     doors: Annotated[list[int], Field(max_length=10_000)] = []
     rooms: Annotated[list[Name], Field(max_length=10_000)] = []
+    one_way: Annotated[list[Name], Field(max_length=1000)] = []
     polygons: Annotated[
         list[Annotated[list[Point], Field(min_length=3, max_length=1000)]], Field(max_length=100)
     ] = []
 
     def __bool__(self) -> bool:
         """Return whether anything is closed."""
-        return bool(self.doors or self.rooms or self.polygons)
+        return bool(self.doors or self.rooms or self.polygons or self.one_way)
 
 
 class Closed(_Strict):

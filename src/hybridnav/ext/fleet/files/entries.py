@@ -10,6 +10,7 @@ from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import Limits, Marked, read_marked
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.ext.fleet import LinkKind
+from hybridnav.maps import OneWayRule
 from hybridnav.planning import Profile
 
 if TYPE_CHECKING:
@@ -23,7 +24,8 @@ _MOST_LINKS = 1000
 _LIMITS = Limits(max_bytes=2**20, max_values=30_000)
 _FILE_KEYS = ("floors", "links", "speed_m_s", "profiles")
 _MOST_PROFILES = 100
-_FLOOR_KEYS = ("name", "map", "elevation_m", "rooms", "find_rooms")
+_MOST_RULES = 1000
+_FLOOR_KEYS = ("name", "map", "elevation_m", "rooms", "find_rooms", "one_way")
 _LINK_KEYS = ("name", "kind", "ends", "wait_s", "ride_s", "cost_m", "max_radius_m")
 _END_KEYS = ("floor", "at", "room", "door", "yaw_rad")
 _FARTHEST = 1e9
@@ -38,6 +40,7 @@ class FloorEntry:
     elevation_m: float
     rooms_file: str | None
     find_rooms: bool
+    one_way: tuple[OneWayRule, ...]
     at: str
     """Place in the file, with which messages begin."""
 
@@ -153,7 +156,11 @@ def _floor(item: Any, at: str) -> FloorEntry:
     map_file = values.text("map")
     if map_file is None:
         raise MapError(f"{at}: floor {name}: map is missing, expected a map file or a model")
-    return FloorEntry(name or "", map_file, elevation_m or 0.0, rooms_file, find, at)
+    try:
+        rules = tuple(map(OneWayRule.of, values.list_of("one_way", _MOST_RULES)))
+    except InvalidValueError as error:
+        raise MapError(f"{at}: floor {name}: {error}") from None
+    return FloorEntry(name or "", map_file, elevation_m or 0.0, rooms_file, find, rules, at)
 
 
 def _link(marked: Marked, where: str, item: Any, index: int) -> LinkEntry:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,11 +115,11 @@ def load_building(
         )
     entries = read_building_entries(path)
     folder = Path(path).parent
-    planners: dict[tuple[str, str | None, bool], HybridPlanner] = {}
+    planners: dict[object, HybridPlanner] = {}
     floors = []
     for entry in entries.floors:
         # One map on several floors is read once.
-        key = entry.map_file, entry.rooms_file, entry.find_rooms
+        key = entry.map_file, entry.rooms_file, entry.find_rooms, entry.one_way
         if key not in planners:
             planners[key] = _planner(entry, folder, robot_radius_m, preset, max_cells)
         with _at(entry.at):
@@ -165,8 +166,14 @@ def _planner(
             rooms = load_rooms(folder / entry.rooms_file, model.grid)
         elif entry.find_rooms and rooms is None:
             rooms = find_rooms(model.grid)
+        if entry.one_way:
+            if rooms is None:
+                raise InvalidValueError("one_way needs rooms: add rooms, or find_rooms: true")
+            rooms = replace(rooms, one_way=(*rooms.one_way, *entry.one_way))
         fitted = model.fitted(None if preset is None else load_preset(preset))
-        return model.planner(preset, topology=model.grown(fitted.pyramid, rooms))
+        planner = model.planner(preset, topology=model.grown(fitted.pyramid, rooms))
+        planner.closed(None)  # refuses rules of doors that are not there
+        return planner
 
 
 @contextmanager

@@ -3,9 +3,10 @@
 import { element } from "./route.js";
 import { settings, t } from "./texts.js";
 
-const NOTHING = { doors: [], rooms: [], polygons: [] };
+const NOTHING = { doors: [], rooms: [], polygons: [], one_way: [] };
 const SAME = 1.5; // cells within which a door or a room is the one that was there before
-const KEY = /^(?:link:(?<links>.+)|(?:(?<floor>.+?):)?(?:door:(?<doors>\d{1,9})|room:(?<rooms>.+)))$/;
+const KEY = /^(?:link:(?<links>.+)|(?:(?<floor>.+?):)?(?:door:(?<doors>\d{1,9})|room:(?<rooms>.+)|one-way:(?<ways>(?:door|line):.+)))$/;
+const WAY = /^door:(?<number>\d+)=(?<room>.*)$/;
 
 export class Closures {
   list = []; // on this page: { kind, floor, what }; kind is doors, rooms, polygons or links
@@ -39,6 +40,18 @@ export class Closures {
     return [...doors.filter((door) => closed.doors.includes(door.number)), ...rooms.filter((room) => closed.rooms.includes(room.name))].map((each) => each.at);
   }
 
+  // Doors of this floor that are passed one way, with the direction of their arrow.
+  get ways() {
+    const { rooms } = this.page.map;
+    const texts = [...(rooms.one_way ?? []), ...this.#on(this.page.floors.at).one_way];
+    return texts.flatMap((text) => {
+      const { number, room } = text.match(WAY)?.groups ?? {};
+      const door = rooms.doors.find((each) => each.number === Number(number));
+      const sign = door && (door.rooms[1] ?? "") === room ? 1 : -1;
+      return door ? [{ at: door.at, ahead: door.ahead.map((part) => sign * part) }] : [];
+    });
+  }
+
   // What is shaded: drawn areas, and rooms whose outlines are there, each a list of rings.
   get areas() {
     const closed = this.#on(this.page.floors.at);
@@ -58,6 +71,7 @@ export class Closures {
 
   // Close something, or open it again.
   toggle(kind, what) {
+    if (kind === "doors" && this.byId("one-way").checked) return this.#turn(what);
     const floor = kind === "links" ? null : this.page.floors.at;
     const isIt = (each) => each.kind === kind && each.floor === floor && each.what === what;
     if (kind === "rooms") this.page.names.outlined();
@@ -67,6 +81,16 @@ export class Closures {
     const [why, by] = ["why", "by"].map((id) => this.byId(id).value.trim());
     this.byId("why").value = "";
     return this.#keep({ key: this.#keyOf(kind, floor, what), why, by }, true);
+  }
+
+  // Let a door be passed into one of its rooms alone, then into the other, then both ways again.
+  async #turn(number) {
+    const { rooms } = this.page.map.rooms.doors.find((door) => door.number === number);
+    const ways = rooms.map((room) => `door:${number}=${room ?? ""}`);
+    const now = this.all.find((each) => each.kind === "one_way" && each.floor === this.page.floors.at && ways.includes(each.what));
+    const next = ways[ways.indexOf(now?.what) + 1];
+    if (now) await this.open(now);
+    return next ? this.toggle("one_way", next) : null;
   }
 
   open(each) {
@@ -100,13 +124,13 @@ export class Closures {
 
   #keyOf(kind, floor, what) {
     if (kind === "links") return `link:${what}`;
-    return `${this.page.floors.named(floor, (name) => `${name}:`)}${kind === "doors" ? "door" : "room"}:${what}`;
+    return `${this.page.floors.named(floor, (name) => `${name}:`)}${{ doors: "door", rooms: "room", one_way: "one-way" }[kind]}:${what}`;
   }
 
   #read({ what: key, ...facts }) {
-    const { links, floor = "", doors, rooms } = key.match(KEY)?.groups ?? {};
-    const about = { floor: links ? null : this.page.floors.names.indexOf(floor), what: links ?? rooms ?? Number(doors) };
-    return { key, kind: links ? "links" : rooms ? "rooms" : "doors", ...about, ...facts };
+    const { links, floor = "", doors, rooms, ways } = key.match(KEY)?.groups ?? {};
+    const about = { floor: links ? null : this.page.floors.names.indexOf(floor), what: links ?? rooms ?? ways ?? Number(doors) };
+    return { key, kind: links ? "links" : rooms ? "rooms" : ways ? "one_way" : "doors", ...about, ...facts };
   }
 
   #take({ closed }) {
@@ -163,8 +187,17 @@ export class Closures {
   async follow(floor, before, after, isOwn) {
     const key = { doors: "number", rooms: "name" };
     const lost = [];
-    const isHere = (each) => each.floor === floor && each.kind in key;
+    const isHere = (each) => each.floor === floor && (each.kind in key || WAY.test(each.what));
+    const turned = (each) => {
+      const { number, room } = each.what.match(WAY).groups;
+      const side = before.doors.find((door) => door.number === Number(number))?.rooms.indexOf(room || null);
+      const [door] = followed({ kind: "doors", what: Number(number) });
+      const now = door && after.doors.find((one) => one.number === door.what).rooms;
+      const into = now?.includes(room || null) ? room : now?.[side];
+      return now ? [{ ...each, what: `door:${door.what}=${into ?? ""}` }] : [];
+    };
     const followed = (each) => {
+      if (each.kind === "one_way") return turned(each);
       const [name, all] = [key[each.kind], after[each.kind]];
       const old = before[each.kind].find((one) => one[name] === each.what);
       const same = each.kind === "rooms" && all.find((one) => one.name === each.what);
@@ -206,8 +239,13 @@ export class Closures {
 
   #textOf(each) {
     const areas = this.list.filter(({ kind }) => kind === "polygons");
-    const what = { doors: () => t("door-n", each.what), polygons: () => t("area-n", areas.indexOf(each) + 1) }[each.kind]?.() ?? each.what;
+    const what = { doors: () => t("door-n", each.what), polygons: () => t("area-n", areas.indexOf(each) + 1), one_way: () => this.#wayText(each.what) }[each.kind]?.() ?? each.what;
     return (each.floor !== null && this.page.floors.named(each.floor, (name) => t("in-floor", what, name))) || what;
+  }
+
+  #wayText(what) {
+    const { number, room } = what.match(WAY)?.groups ?? {};
+    return number ? t("only-into", t("door-n", number), room || t("no-room")) : what;
   }
 
   // Who closed something for all, when and why; a journal may also be written by hand.

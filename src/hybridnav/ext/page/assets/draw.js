@@ -309,6 +309,29 @@ export function paintClosed(scene, areas, crosses, draft) {
   }
 }
 
+// An arrow on each door that is passed one way.
+export function paintWays(scene, ways) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  for (const { at, ahead } of ways) {
+    const [x, y] = scene.toScreen(at);
+    const [toX, toY] = scene.toScreen([at[0] + ahead[0], at[1] + ahead[1]]);
+    const turn = Math.atan2(toY - y, toX - x);
+    const point = (along, across) => [x + along * Math.cos(turn) - across * Math.sin(turn), y + along * Math.sin(turn) + across * Math.cos(turn)];
+    context.beginPath();
+    context.moveTo(...point(-11, 0));
+    context.lineTo(...point(11, 0));
+    for (const across of [-7, 7]) {
+      context.moveTo(...point(4, across));
+      context.lineTo(...point(11, 0));
+    }
+    for (const [colour, width] of [[inks.halo, 7], [inks.closed, 3.5]]) {
+      Object.assign(context, { strokeStyle: colour, lineWidth: width, lineCap: "round" });
+      context.stroke();
+    }
+  }
+}
+
 // The middle of the map, where the space bar clicks.
 export function paintMiddle(scene) {
   const { context, width, height } = scene;

@@ -1,6 +1,6 @@
 // What the map shows: its colours, the graph and costs over them, marks, names, and the legend.
 
-import { inksOf, linkBoxes, linkOutline, litBoxes, paintClosed, paintDashed, paintDoors, paintEnd, paintGraph, paintLinks, paintLit, paintMiddle, paintNames, paintNumbers, paintOutline, paintRoutes, paintScaleBar } from "./draw.js";
+import { inksOf, linkBoxes, linkOutline, litBoxes, paintClosed, paintDashed, paintDoors, paintEnd, paintGraph, paintLinks, paintLit, paintMiddle, paintNames, paintNumbers, paintOutline, paintRoutes, paintScaleBar, paintWays } from "./draw.js";
 import { element, picture } from "./route.js";
 import { written, settings, t } from "./texts.js";
 
@@ -126,6 +126,7 @@ export class Pictures {
     const ends = floors.ends.filter(({ link }) => [link.name, `${link.name}@${floors.names[floors.at]}`].some((name) => closures.links.includes(name))).map((end) => end.at);
     const crosses = [...closures.marks, ...ends];
     paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
+    paintWays(scene, closures.ways);
     const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
     const taken = [...listed.map((door) => door.at), ...crosses, start, goal].filter(Boolean).map((point) => {
       const [x, y] = scene.toScreen(point);

@@ -1,0 +1,115 @@
+"""Directions of graphs and of maps: edges against one-way boundaries, and rules that edges state.
+Public: `one_way_rules`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._base.rows import unique_rows
+from hybridnav._base.trig import hypots
+from hybridnav.closures.one_way import directions_on
+from hybridnav.graphs.waypoint_graph import WaypointGraph
+from hybridnav.maps import CellClass, OccupancyGrid, OneWayRule
+from hybridnav.maps.checks import checked_type
+from hybridnav.maps.geometry import cells_of_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav._base.typing import BoolArray, FloatArray
+    from hybridnav.topology import TopologicalMap
+
+_STEP = 0.5
+"""Steps in cells by which a line across an edge is led to the walls."""
+
+
+def against(topology: TopologicalMap, lines: Iterable[FloatArray], free: BoolArray) -> BoolArray:
+    """Return which lines, float64 (n, 2) in grid units on free cells, cross a one-way door or line
+    of the rooms of a map against its direction."""
+    directed, each = directions_on(topology), list(lines)
+    if directed is None:
+        return np.zeros(len(each), dtype=np.bool_)
+    found = [directed.meets(cells_of_line(free, line)) for line in each]
+    return np.array(found, dtype=np.bool_)
+
+
+def one_way_rules(graph: WaypointGraph, grid: OccupancyGrid) -> tuple[OneWayRule, ...]:
+    """Return what the edges that lead one way state of a map, as lines for a planner.
+
+    A line runs across the middle of each such edge, from wall to wall. It ends halfway to an edge
+    that leads the other way.
+
+    Parameters
+    ----------
+    graph
+        The graph; an edge leads one way if none joins its nodes the other way round.
+    grid
+        The map. Edges whose middle lies in no free cell, as measured, state nothing.
+
+    Returns
+    -------
+    tuple of OneWayRule
+        For `RoomLabels(one_way=)`, `OneWay.of` and files.
+
+    Examples
+    --------
+    >>> from hybridnav.graphs import WaypointGraph, one_way_rules
+    >>> import networkx as nx
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("in", x=1.0, y=1.5)
+    >>> plain.add_node("out", x=9.0, y=1.5)
+    >>> plain.add_edge("in", "out")
+    >>> grid = hn.OccupancyGrid(np.zeros((3, 10)), robot_radius_m=0)
+    >>> [str(rule) for rule in one_way_rules(WaypointGraph.from_networkx(plain), grid)]
+    ['line:5,0:5,3']
+    """
+    checked_type("graph", graph, WaypointGraph)
+    checked_type("grid", grid, OccupancyGrid)
+    edges = unique_rows(graph.edges).rows.astype(np.int64)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    keys = edges @ np.array([graph.n_nodes, 1])
+    is_single = ~np.isin(edges[:, ::-1] @ np.array([graph.n_nodes, 1]), keys)
+    positions = grid.frame.positions_of(graph.points)
+    free = grid.measured == CellClass.FREE
+    tails, steps = positions[edges[:, 0]], positions[edges[:, 1]] - positions[edges[:, 0]]
+    lengths = hypots(steps[:, 0], steps[:, 1])
+    rules = []
+    for edge in np.flatnonzero(is_single & (lengths > 0)).tolist():
+        along, middle = steps[edge] / lengths[edge], tails[edge] + steps[edge] / 2
+        aside = np.array([along[1], -along[0]])  # rows run upwards: the left of the edge
+        others = np.flatnonzero(steps @ along < 0)
+        met = _met(middle, aside, tails[others], steps[others])
+        reach = [
+            min(
+                _to_wall(free, middle, sign * aside),
+                (sign * met[sign * met > 0]).min(initial=np.inf) / 2,
+            )
+            for sign in (-1, 1)
+        ]
+        if min(reach) > 0:
+            ends = np.stack([middle - reach[0] * aside, middle + reach[1] * aside])
+            points = np.round(grid.frame.points_of_grid(ends), 4).tolist()
+            rules.append(OneWayRule(line=tuple((x, y) for x, y in points)))
+    return tuple(rules)
+
+
+def _to_wall(free: BoolArray, start: FloatArray, aside: FloatArray) -> float:
+    """Return the cells from a position to the first one that is not free, and its depth."""
+    at = start + _STEP * np.arange(int(sum(free.shape) / _STEP))[:, None] * aside
+    cells = np.floor(at).astype(np.int64)
+    inside = np.asarray(((cells >= 0) & (cells < free.shape)).all(axis=1), dtype=np.bool_)
+    inside[inside] = free[tuple(cells[inside].T)]
+    return _STEP * int(np.argmin(inside))  # the line leaves the map
+
+
+def _met(start: FloatArray, aside: FloatArray, tails: FloatArray, steps: FloatArray) -> FloatArray:
+    """Return where a line through a position meets edges, in cells along it."""
+    cross = aside[0] * steps[:, 1] - aside[1] * steps[:, 0]
+    to = tails - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (to[:, 0] * aside[1] - to[:, 1] * aside[0]) / cross
+        at = (to[:, 0] * steps[:, 1] - to[:, 1] * steps[:, 0]) / cross
+    return at[(cross != 0) & (share >= 0) & (share <= 1)]
