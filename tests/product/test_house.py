@@ -47,11 +47,11 @@ BUDGETS = {
     "models": (2100, 6),
     "planning": (6850, 12),
     "pyramid": (4450, 9),
-    "reasons": (1200, 6),
+    "reasons": (1250, 6),
     "refine": (6000, 9),
     "rooms": (5700, 9),
     "route": (1000, 6),
-    "search": (11000, 9),
+    "search": (11750, 9),
     "topology": (720, 6),
     "viz": (4950, 6),
 }

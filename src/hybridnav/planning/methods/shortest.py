@@ -26,6 +26,7 @@ from hybridnav.search.mesh import (
     MeshPath,
     MeshSearch,
     build_mesh,
+    cells_across,
     renew_mesh,
     shortest_paths,
 )
@@ -215,14 +216,17 @@ class OverMesh(Method):
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the hierarchy of corners, or on the graph where it is not contracted;
-        with closed cells of a mesh without them. See `Method`."""
+        with closed cells of a mesh without them; None where directions count. See `Method`."""
         # Loads kernels for tables alone.
         from hybridnav.search.mesh.labels import MeshLabels, ViewLabels  # noqa: PLC0415
 
         search = self._on_mesh()
         if closed is not None:
             # Not the search that plans ask: with its graph it might find another of equal paths.
-            search = MeshSearch(self._round(search, closed).search.mesh)
+            detours = self._round(search, closed)
+            if detours.is_directed:
+                return None
+            search = MeshSearch(detours.search.mesh)
         search.prepare()
         if isinstance(search.graph, CornerHierarchy):
             return MeshLabels(search, search.graph)
@@ -279,7 +283,12 @@ class OverMesh(Method):
             parts.insert(0, np.array([cells[0]]))
         if tuple(passed[-1].tolist()) != cells[1]:
             parts.append(np.array([cells[1]]))
-        return passed if len(parts) == 1 else np.concatenate(parts)
+        passed = passed if len(parts) == 1 else np.concatenate(parts)
+        if query.closed is None or query.one_way is None or not query.one_way.meets(passed):
+            return passed
+        # Along a side, or at a corner, the cell on the other hand is listed.
+        with self._round(self._on_mesh(), query.closed).open_cells() as free:
+            return cells_across(free, query.one_way, path.positions, cells)
 
     def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:
         """Return the cells that a path along sides of closed cells passes, without these."""
@@ -295,7 +304,8 @@ class OverMesh(Method):
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
-            known = search, self._free, closed.flat, self._scratch
+            sides = None if closed.one_way is None else closed.one_way.sides
+            known = search, self._free, closed.flat, self._scratch, sides
             found = self._detours[closed] = DetourSearch(*known)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)

@@ -7,6 +7,7 @@ from .build import (
 )
 from .cut import renew_mesh as renew_mesh
 from .detour import DetourSearch as DetourSearch
+from .slits import cells_across as cells_across
 from .search import MeshPath as MeshPath, MeshSearch as MeshSearch
 
 __all__: list[str]

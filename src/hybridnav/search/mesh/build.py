@@ -88,7 +88,7 @@ class ConvexMesh:
         """The mesh as kernels take it."""
         rows, cols = np.ascontiguousarray(self.corners.T, dtype=np.float64)
         sides = self.begins, self.finishes, self.twins, self.polygon_of
-        return Mesh(cols, rows, self.kinds, self.first, *sides, self.component)
+        return Mesh(cols, rows, self.kinds, self.first, *sides, self.component, self.twins)
 
     @property
     def blocks(self) -> MeshBlocks:

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav.search.mesh.build import ConvexMesh, merge_triangles, select_triangles, triangulate
 from hybridnav.search.mesh.kernels import corners as _corner_kernels
-from hybridnav.search.mesh.kernels.blocks import are_free, blocks_of
+from hybridnav.search.mesh.kernels.blocks import WALL, are_free, blocks_of
 from hybridnav.search.mesh.kernels.corners import MANY, NO_CORNER
 from hybridnav.search.mesh.kernels.state import MeshBlocks
 
@@ -20,7 +20,18 @@ if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 
 
-def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
+class Seams(NamedTuple):
+    """Lines of sides between free cells, which are to be sides of polygons."""
+
+    ends: LongArray
+    """int64 (n, 2), flat lattice points at which each line ends; none passes that of another."""
+    cells: LongArray
+    """int64 (m,), flat cells beside them."""
+
+
+def renew_mesh(
+    mesh: ConvexMesh, free: BoolArray, changed: LongArray, seams: Seams | None = None
+) -> ConvexMesh:
     """Return the mesh of free cells after some of them have changed.
 
     The polygons that share a point with a closed cell, or with a cell beside a freed one, are
@@ -35,6 +46,8 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
         bool (rows, cols), the free cells now.
     changed
         int64 (m,), flat cells that were free and are not, or are free and were not.
+    seams
+        Lines that are to be sides of polygons; None for none.
 
     Returns
     -------
@@ -55,19 +68,20 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     >>> mesh.n_polygons, int((renewed.component >= 0).sum())
     (4, 1)
     """
-    if not len(changed):
+    if not len(changed) and seams is None:
         return mesh
+    seams = seams or Seams(np.empty((0, 2), np.int64), changed[:0])
     freed, beside = _corner_kernels.freed_cells(free, changed)
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
-    looked = np.concatenate([changed[~free.ravel()[changed]], beside])
+    looked = np.concatenate([changed[~free.ravel()[changed]], beside, seams.cells])
     place = mesh.polygon_at, mesh.component
     is_cut, cut = _corner_kernels.touched_polygons(mesh.corners, sides, place, looked)
     hole = _Hole(cut, _corner_kernels.doors_of(sides, is_cut, cut), freed)
     slots = np.concatenate(
         [np.empty(0, np.int64), *(np.arange(*mesh.first[number : number + 2]) for number in cut)]
     )
-    vertices = _vertices_of(mesh, slots, free, changed)
-    anew = _polygons_in(mesh, hole, vertices, free)
+    vertices = _vertices_of(mesh, slots, free, (changed, np.unique(seams.ends)))
+    anew = _polygons_in(mesh, hole, vertices, free, seams.ends)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
     blocks = MeshBlocks(*chain(*blocks_of(polygons[0], *polygons[2:])))
     is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
@@ -103,20 +117,21 @@ class _Vertices:
 
 
 def _vertices_of(
-    mesh: ConvexMesh, slots: LongArray, free: BoolArray, changed: LongArray
+    mesh: ConvexMesh, slots: LongArray, free: BoolArray, changed: tuple[LongArray, LongArray]
 ) -> _Vertices:
-    """Return the corners in a hole: those at which walls turn now, as in a fresh mesh.
+    """Return the corners in a hole: those at which walls turn now, as in a fresh mesh, and those
+    at which lines end; `changed`: flat cells, and these points.
 
     Points at changed cells where walls have begun to run straight on are left out. No other polygon
     has them: all free cells round them belong to the hole.
     """
     wide = free.shape[1] + 1
-    at, kinds_at = _corner_kernels.corners_of_cells(free, changed)
+    at, kinds_at = _corner_kernels.corners_of_cells(free, changed[0])
     turns = kinds_at != NO_CORNER
     old = np.unique(mesh.begins[slots])
     known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
-    is_straight = np.isin(known, at[~turns])
-    made = np.setdiff1d(at[turns], known)
+    is_straight = np.isin(known, np.setdiff1d(at[~turns], changed[1]))
+    made = np.setdiff1d(np.concatenate([at[turns], changed[1]]), known)
     points = np.concatenate([known[~is_straight], made])
     number_of = np.concatenate([old[~is_straight], len(mesh.corners) + np.arange(len(made))])
     order = np.argsort(points, kind="stable")
@@ -129,13 +144,14 @@ def _vertices_of(
 
 
 def _polygons_in(
-    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray
+    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, seams: LongArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Fill a hole; return first slots, corners, twins and polygons of slots of the new polygons."""
     ends = np.stack([mesh.begins[hole.doors], mesh.finishes[hole.doors]], axis=1)
     around = mesh.corners[ends] @ np.array([free.shape[1] + 1, 1], dtype=np.int64)
     doors = np.searchsorted(vertices.points, around)
-    walls = np.concatenate([doors, _corner_kernels.walls_between(free, vertices.points)])
+    seams = np.searchsorted(vertices.points, seams)
+    walls = np.concatenate([doors, _corner_kernels.walls_between(free, vertices.points), seams])
     local = vertices.corners[vertices.number_of]
     triangles, neighbours = triangulate(local, walls)
     kept = are_free(local, triangles, free)
@@ -146,9 +162,33 @@ def _polygons_in(
     middles = triples // 3 @ np.array([free.shape[1], 1])
     kept[kept] = inside | np.isin(middles, hole.freed)
     first, begins, twins, polygon_of = merge_triangles(
-        local, *select_triangles(triangles, neighbours, kept)
+        local, *_parted(seams, *select_triangles(triangles, neighbours, kept))
     )
+    if len(seams):
+        finishes = np.roll(begins, -1)
+        finishes[first[1:] - 1] = begins[first[:-1]]
+        one, other = (_slots_from(begins, finishes, way) for way in (seams, seams[:, ::-1]))
+        twins[one], twins[other] = other, one
     return first, vertices.number_of[begins], twins, polygon_of
+
+
+def _parted(seams: LongArray, triangles: IntArray, across: IntArray) -> tuple[IntArray, IntArray]:
+    """Return triangles and those across their sides, as if seams were walls."""
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)]), axis=0).astype(np.int64)
+    low, high = np.sort(seams, axis=1).T
+    wide = triangles.max(initial=0) + 1
+    is_seam = np.isin(ends[0] * wide + ends[1], low * wide + high)
+    return triangles, np.where(is_seam, WALL, across).astype(np.int32)
+
+
+def _slots_from(begins: IntArray, finishes: IntArray, sides: LongArray) -> LongArray:
+    """Return the slots from some corners to others, (n, 2); each exists."""
+    wide = np.int64(begins.max(initial=0)) + 1
+    keys = begins * wide + finishes
+    order = np.argsort(keys, kind="stable")
+    wanted = np.searchsorted(keys, sides @ np.array([wide, 1]), sorter=order)
+    found: LongArray = order[wanted]
+    return found
 
 
 def _with_hole_filled(

@@ -1,7 +1,10 @@
-"""`DetourSearch`: shortest any-angle paths round closed cells, on a mesh without them."""
+"""`DetourSearch`: shortest any-angle paths round closed cells, and across directed sides in their
+direction, on a mesh that is cut along them.
+"""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,19 +14,24 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import Pool
 from hybridnav.search.mesh.cut import renew_mesh
 from hybridnav.search.mesh.kernels import closures as kernels
+from hybridnav.search.mesh.kernels import slits
 from hybridnav.search.mesh.kernels.state import MeshClosure
 from hybridnav.search.mesh.search import MeshPath, MeshSearch
+from hybridnav.search.mesh.slits import directed_search, slits_of
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, LongArray
+    from collections.abc import Iterator
+
+    from hybridnav._base.typing import BoolArray, IntArray, LongArray
     from hybridnav.search.mesh.batch import MeshPaths
 
 
 @copies_alike
 class DetourSearch:
-    """Exact shortest any-angle paths round closed cells; threads may share it.
+    """Exact shortest any-angle paths round closed cells and across directed sides.
 
-    The first query that needs it cuts the closed cells out of the mesh.
+    Threads may share it. The first query that needs it cuts the mesh. Paths of the map without them
+    are a lower bound.
 
     Parameters
     ----------
@@ -36,17 +44,29 @@ class DetourSearch:
         nothing.
     scratch
         Copies of `free` to close cells in and open them again; None to make one.
+    sides
+        int (n, 4), cells (row, col) from which, and to which, each side may be crossed, and not
+        back; those that are not between two open cells change nothing. None for none.
 
     Examples
     --------
     >>> from hybridnav.search.mesh import DetourSearch, MeshSearch, build_mesh
     >>> free = np.ones((3, 5), dtype=bool)
-    >>> detour = DetourSearch(MeshSearch(build_mesh(free)), free, np.array([2, 7]))
+    >>> opened, closed = MeshSearch(build_mesh(free)), np.array([2, 7])
+    >>> detour = DetourSearch(opened, free, closed)
     >>> detour.search.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
     array([[0.5, 0.5],
            [2. , 2. ],
            [2. , 3. ],
            [0.5, 4.5]])
+    >>> sides = np.array([[0, 2, 0, 1], [1, 2, 1, 1]])
+    >>> search = DetourSearch(opened, free, closed[:0], sides=sides).search
+    >>> search.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
+    array([[0.5, 0.5],
+           [2. , 2. ],
+           [0.5, 4.5]])
+    >>> search.path(((0, 4), (0, 0)), ((0.5, 4.5), (0.5, 0.5))).length_cells
+    4.0
     """
 
     def __init__(
@@ -55,31 +75,51 @@ class DetourSearch:
         free: BoolArray,
         closed: LongArray,
         scratch: Pool[BoolArray] | None = None,
+        sides: IntArray | None = None,
     ) -> None:
         self._open, self._free = opened, free
         self._scratch = Pool(partial(np.copy, free)) if scratch is None else scratch
         self._closed = closed[free.ravel()[closed]]
         self._closure = MeshClosure(*kernels.closure_of(self._closed, free.shape[1]))
         self._search: MeshSearch | None = None
+        self._slits, self._seams = None, None
+        if sides is not None:
+            with self.open_cells() as left:
+                self._slits, self._seams = slits_of(left, sides)
+
+    @contextmanager
+    def open_cells(self) -> Iterator[BoolArray]:
+        """Lend the free cells without the closed ones."""
+        left = self._scratch.take()
+        left.ravel()[self._closed] = False
+        yield left
+        left.ravel()[self._closed] = True
+        self._scratch.give(left)
 
     @property
     def search(self) -> MeshSearch:
-        """The search of the mesh without the closed cells."""
+        """The search of the mesh that is cut."""
         # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
         if self._search is None:
-            left = self._scratch.take()
-            left.ravel()[self._closed] = False
-            made = MeshSearch(renew_mesh(self._open.mesh, left, self._closed))
-            left.ravel()[self._closed] = True
-            self._scratch.give(left)
-            self._search = made
+            with self.open_cells() as left:
+                mesh = renew_mesh(self._open.mesh, left, self._closed, self._seams)
+            if self._slits is None or self._seams is None:
+                self._search = MeshSearch(mesh)
+            else:
+                self._search = directed_search(mesh, self._slits, self._seams.ends)
         return self._search
 
+    @property
+    def is_directed(self) -> bool:
+        """Whether distances there and back may differ."""
+        return self._slits is not None
+
     def is_met_by(self, path: MeshPath) -> bool:
-        """Return whether a shortest path between open cells is illegal with these cells closed.
+        """Return whether a shortest path between open cells is illegal with these cells closed, and
+        sides directed.
 
         The result is also True if the path alone does not decide: if an end of it, or a bend, is a
-        corner of a closed cell.
+        corner of a closed cell, or if it runs along directed sides or ends at one.
 
         Parameters
         ----------
@@ -88,9 +128,13 @@ class DetourSearch:
         """
         if path.positions is None:
             return False
+        if self._slits is not None and slits.path_is_barred(self._slits, path.positions):
+            return True
         return bool(kernels.path_crosses(self._closure, self._free, path.positions))
 
     def are_met_by(self, paths: MeshPaths) -> BoolArray:
-        """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
+        """Return which of many shortest paths are, or may be, illegal, bool (n,); see
+        `is_met_by`."""
         along = paths.positions, paths.path_start
-        return kernels.paths_cross(self._closure, self._free, *along)
+        met: BoolArray = kernels.paths_cross(self._closure, self._free, *along)
+        return met if self._slits is None else met | slits.paths_are_barred(self._slits, *along)

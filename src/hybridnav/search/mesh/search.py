@@ -16,6 +16,7 @@ from hybridnav._base.moves import FAR
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
 from hybridnav.search.mesh.build import MANY_CORNERS, add_landmarks, contract_corners, find_edges
+from hybridnav.search.mesh.kernels.intervals import DIRECTED
 from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, N_COUNTS, WORK_FULL
 from hybridnav.search.mesh.kernels.queries import answer
 from hybridnav.search.mesh.kernels.state import (
@@ -76,6 +77,8 @@ def _work_for(mesh: ConvexMesh, graph: Graph) -> Work:
     heap = Heap(np.empty(_ROOM), np.empty(_ROOM, np.int32))
     counts, bounds = np.zeros(N_COUNTS, np.int64), np.zeros(2)
     every = np.empty(n_polygons, np.int32), np.empty(n_polygons, np.int32), counts, bounds
+    if (mesh.kinds >= DIRECTED).any():
+        n += len(mesh.begins)
     touched = np.empty(n, np.int32)
     if isinstance(graph, MeshBlocks):
         is_open, marked = np.zeros(len(graph.head), np.bool_), np.empty(len(graph.head), np.int32)

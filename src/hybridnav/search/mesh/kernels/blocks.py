@@ -213,12 +213,14 @@ def merge_across(corners, tail, sides, order):
 
 @njit(cache=True, nogil=True)
 def _is_left(corners, tail, incoming, outgoing):
-    """Return whether the path along two consecutive sides turns left or goes straight on."""
+    """Return whether the path along two consecutive sides turns left or goes straight on, not
+    back."""
     a, b, c = tail[incoming], tail[outgoing], _head(tail, outgoing)
     rows = np.int64(corners[b, 0]) - corners[a, 0]
     cols = np.int64(corners[b, 1]) - corners[a, 1]
     down, across = np.int64(corners[c, 0]) - corners[b, 0], np.int64(corners[c, 1]) - corners[b, 1]
-    return incoming >= 0 and cols * down >= rows * across
+    turn, ahead = cols * down - rows * across, rows * down + cols * across
+    return incoming >= 0 and (turn > 0 or (turn == 0 and ahead > 0))
 
 
 @njit(cache=True, nogil=True)

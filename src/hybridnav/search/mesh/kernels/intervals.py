@@ -11,7 +11,10 @@ import math
 from hybridnav._base.jit import njit
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav._base.trig import hypot
+from hybridnav.search.mesh.kernels.state import Mesh
 
+DIRECTED, LEFTWARD, RIGHTWARD = 8, 1, 2
+"""Bits of the kind of a corner of directed sides: a path may bend to the left, to the right."""
 # Columns of a node's whole numbers.
 SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3
 # Bits of ENDS: the interval ends at the left, at the right corner of its side. Below zero the root
@@ -27,10 +30,10 @@ def turns(kind, dx, dy, hand):
     """Return whether a path may bend round a corner to a hand, 1 for the left.
 
     The path arrives in the direction (dx, dy); the one blocked cell of the corner must lie on that
-    hand.
+    hand. Corners of directed sides allow hands.
     """
     if kind >= 4:
-        return False
+        return kind & (DIRECTED | (LEFTWARD if hand > 0 else RIGHTWARD)) > DIRECTED
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
     return dx * ey * hand >= 0.0 and -dy * ex * hand >= 0.0
@@ -131,6 +134,31 @@ def put(nodes, n, slot, root, parent, marks, g, lx, ly, rx, ry):
 def _put_goal(nodes, n, root, parent, length):
     """Write a node for the goal, reached from a root."""
     return put(nodes, n, -1, root, parent, 0, length, 0.0, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def root_behind(mesh, slot, root):
+    """Return the root of a node as the polygon behind its side has it: a corner of directed sides
+    occurs once for each part of its surroundings."""
+    if root >= 0 and mesh.kinds[root] >= DIRECTED:
+        for end in (mesh.begins[slot], mesh.finishes[slot]):
+            if mesh.x[end] == mesh.x[root] and mesh.y[end] == mesh.y[root]:
+                return end
+    return root
+
+
+@njit(cache=True, nogil=True)
+def place_round(mesh, slot, root):
+    """Return a number of the polygon behind a side and its corner, if that is the root and one of
+    directed sides, else -1: round such a corner one may walk for ever."""
+    if mesh.kinds[root] >= DIRECTED:
+        if mesh.begins[slot] == root:
+            return len(mesh.x) + slot
+        if mesh.finishes[slot] == root:
+            polygon = mesh.polygon_of[slot]
+            is_last = slot + 1 == mesh.first[polygon + 1]
+            return len(mesh.x) + (mesh.first[polygon] if is_last else slot + 1)
+    return -1
 
 
 @njit(cache=True, nogil=True)
@@ -332,12 +360,21 @@ def polygons_of_endpoints(mesh, cells, endpoints, starts, goals):
     if mesh.component[inner] != mesh.component[last]:
         return APART, 0, 0
     n_starts = polygons_with(mesh, inner, cells.row, cells.col, sx, sy, starts)
-    n_goals = polygons_with(mesh, last, cells.to_row, cells.to_col, tx, ty, goals)
+    n_goals = polygons_with(_backward(mesh), last, cells.to_row, cells.to_col, tx, ty, goals)
     for k in range(n_starts):
         for m in range(n_goals):
             if starts[k] == goals[m]:
                 return MET, n_starts, n_goals
     return SPLIT, n_starts, n_goals
+
+
+@njit(cache=True, nogil=True)
+def _backward(mesh):
+    """Return the mesh with its directed sides reversed."""
+    ways = mesh.begins, mesh.finishes, mesh.backs
+    return Mesh(
+        mesh.x, mesh.y, mesh.kinds, mesh.first, *ways, mesh.polygon_of, mesh.component, mesh.twins
+    )
 
 
 @njit(cache=True, nogil=True)

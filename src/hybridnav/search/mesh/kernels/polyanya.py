@@ -20,8 +20,10 @@ from hybridnav.search.mesh.kernels.intervals import (
     G,
     along,
     estimate_of,
+    place_round,
     polygons_of_endpoints,
     put,
+    root_behind,
     successors,
     turns,
 )
@@ -141,6 +143,7 @@ def seed(mesh, blocks, endpoints, starts, work):
                 if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = hypot(x - sx, y - sy)
+            root = root_behind(mesh, twins[slot], root)
             put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
             key = g + estimate_of(mesh, endpoints, whole, real, n)
             if key < bounds[UPPER]:
@@ -205,7 +208,7 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
             made = counts[N]
             n = successors(mesh, blocks, endpoints, is_goal, (whole, real), top, made)
             counts[EXPANDED] += 1
-            top = _keep(work, made, n)
+            top = _keep(mesh, work, made, n)
             if top >= 0:
                 continue
             # Several: they wait for their turn, by their estimates.
@@ -222,13 +225,24 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
 
 
 @njit(cache=True, nogil=True)
-def _keep(work, made, n):
+def _note(work, place, g):
+    """Note the best cost of a place, -1 for none."""
+    best, counts = work.best, work.counts
+    if place >= 0 and g < best[place]:
+        if best[place] == np.inf:
+            work.touched[counts[TOUCHED]] = place
+            counts[TOUCHED] += 1
+        best[place] = g
+
+
+@njit(cache=True, nogil=True)
+def _keep(mesh, work, made, n):
     """Keep the new nodes that no cheaper path to their root rules out, and the goal if its path is
     best.
 
     Return the only node to expand, -1 for none or several.
     """
-    whole, real, best, touched = work.whole, work.real, work.best, work.touched
+    whole, real, best = work.whole, work.real, work.best
     counts, bounds = work.counts, work.bounds
     kept = made
     n_open = 0
@@ -241,14 +255,15 @@ def _keep(work, made, n):
             bounds[UPPER] = g
             counts[LAST] = kept
         else:
+            root = whole[new, ROOT] = root_behind(mesh, whole[new, SLOT], root)
             if root >= 0:
                 if g > best[root] + _SAME:
                     continue
-                if g < best[root]:
-                    if best[root] == np.inf:
-                        touched[counts[TOUCHED]] = root
-                        counts[TOUCHED] += 1
-                    best[root] = g
+                at = place_round(mesh, whole[new, SLOT], root)
+                if at >= 0 and g >= best[at]:
+                    continue
+                _note(work, at, g)
+                _note(work, np.int64(root), g)
             only = kept
             n_open += 1
         if kept < new:
@@ -299,7 +314,9 @@ def put_corner(path, n, x, y):
     """
     if n + 1 < len(path):
         (by, bx), (cy, cx) = path[n], path[n + 1]
-        if turn_of(x, y, bx, by, cx, cy) == 0:
+        # Round the end of directed sides a path may turn back.
+        is_ahead = (bx - x) * (cx - bx) + (by - y) * (cy - by) >= 0.0
+        if is_ahead and turn_of(x, y, bx, by, cx, cy) == 0:
             n += 1
     path[n - 1, 0], path[n - 1, 1] = y, x
     return n - 1

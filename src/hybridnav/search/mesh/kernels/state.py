@@ -1,5 +1,5 @@
 """State of the mesh's kernels: `Mesh`; what is searched, `MeshBlocks`, `Corners` or `Hierarchy`;
-their work arrays; rooms and targets of views; `MeshClosure`.
+their work arrays; rooms and targets of views; `MeshClosure`, `Slits`.
 
 Points are x = column, y = row in grid units: corners are whole numbers. Kernels that exist for each
 kind of graph, or of target, are chosen by the class of the tuple.
@@ -36,6 +36,8 @@ class Mesh(NamedTuple):
     """The polygon of each side."""
     component: np.ndarray
     """The part of free space of each polygon."""
+    backs: np.ndarray
+    """int32 (s,), the slot whose twin each slot is, -1 for none: `twins` without directed sides."""
 
 
 class Ends(NamedTuple):
@@ -161,9 +163,10 @@ class IntervalWork(NamedTuple):
     heap: Heap
     """Nodes that wait, by their estimates."""
     best: np.ndarray
-    """float64 (n,), best cost of each corner, infinite."""
+    """float64 (n,), best cost of each corner, infinite; with directed sides float64 (n + s,), also
+    that of a corner of these in the polygon whose slot begins there."""
     touched: np.ndarray
-    """int32 (n,), corners whose cost is set."""
+    """int32, places in `best` that are set."""
 
 
 class CornerWork(NamedTuple):
@@ -243,3 +246,21 @@ class MeshClosure(NamedTuple):
     """int64, offsets of the cells of each of these rows."""
     cols: np.ndarray
     """int64, their columns."""
+
+
+class Slits(NamedTuple):
+    """Directed sides as straight lines, and the points at which these end."""
+
+    lines: np.ndarray
+    """float64 (n, 4), x and y of the lower end of each line, and of the other one."""
+    ways: np.ndarray
+    """uint8 (n,), the ways in which each may be crossed, `UP` and `DOWN`."""
+    points: np.ndarray
+    """int64 (k,), the ends as flat lattice points, sorted, each once."""
+    reach: np.ndarray
+    """bool (k, 4, 4), which cells round a point are reached round it from each of them, counter-
+    clockwise from the one with the higher row and column; blocked ones from none."""
+    kinds: np.ndarray
+    """uint8 (k, 4), the kind of the point as each of these cells has it."""
+    wide: int
+    """Lattice points in a row."""

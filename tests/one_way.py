@@ -1,0 +1,164 @@
+"""Random maps with directed lines, and presets attacked with them.
+
+`python -m tests.one_way --maps 20000 --presets shortest octile` plans on so many maps, each with
+one to six lines, and holds every answer against `tests.oracle.one_way`: its cost to 1e-9, its bound
+at most its cost, no wrong side on its path. It exits with 1 if anything is wrong.
+"""
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hybridnav as hn
+from tests.oracle.one_way import Exact, OneWayPlane
+from tests.strategies import occupancy_grid
+
+PRESETS = ("shortest", "octile", "grid-astar", "paper", "robot")
+CELLS = ("octile", "grid-astar", "paper")
+"""Presets whose paths go from cell to cell."""
+_PARTS = 8
+"""Parts of a cell to whose multiples ends are placed."""
+End = tuple[tuple[int, int], Exact]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A map with directed sides, and ends in its free cells."""
+
+    free: NDArray[np.bool_]
+    sides: NDArray[np.int32]
+    """int (n, 4), from where to where each may be crossed."""
+    ends: list[End]
+
+    @property
+    def plane(self) -> OneWayPlane:
+        """The map as the oracle takes it."""
+        return OneWayPlane(self.free, self.sides)
+
+
+def random_scene(seed: int, *, side: int = 7, n_ends: int = 3) -> Scene | None:
+    """A map of at most `side` x `side` cells with one to six lines: straight, bent, collinear with
+    others, touching corners; or None if no cell is free."""
+    rng = np.random.default_rng(seed)
+    rows, cols = rng.integers(1, side + 1, 2).tolist()
+    free = rng.random((rows, cols)) > rng.choice([0, 0.05, 0.15, 0.3])
+    if not free.any():
+        return None
+    sides: list[tuple[int, ...]] = []
+    for _ in range(rng.integers(1, 7)):
+        sides += _line(rng, rows, cols)
+    cells = np.argwhere(free)
+    ends = []
+    for row, col in cells[rng.integers(len(cells), size=n_ends)].tolist():
+        up, across = rng.choice([0, 4, 4, 8, int(rng.integers(0, _PARTS + 1))], 2).tolist()
+        point = Fraction(row * _PARTS + up, _PARTS), Fraction(col * _PARTS + across, _PARTS)
+        ends.append(((row, col), point))
+    return Scene(free, np.array(sides, np.int32).reshape(-1, 4), ends)
+
+
+def _line(rng: np.random.Generator, rows: int, cols: int) -> list[tuple[int, ...]]:
+    """Sides along a chain of corners of cells, crossed from its left to its right."""
+    row, col = int(rng.integers(rows + 1)), int(rng.integers(cols + 1))
+    sides: list[tuple[int, ...]] = []
+    for _ in range(rng.integers(1, 4)):
+        up, right = [(0, 1), (1, 0), (0, -1), (-1, 0)][rng.integers(4)]
+        for _ in range(rng.integers(1, 5)):
+            low, across = min(row, row + up), min(col, col + right)
+            left = low - (right < 0), across - (up > 0)
+            other = low - (right > 0), across - (up < 0)
+            if all(0 <= r < rows and 0 <= c < cols for r, c in (left, other)):
+                sides.append((*left, *other))
+            row, col = row + up, col + right
+            if not (0 <= row <= rows and 0 <= col <= cols):
+                return sides
+    return sides
+
+
+def planner_of(scene: Scene, preset: str) -> hn.HybridPlanner:
+    """A planner on the map, whose cells measure a metre."""
+    grid = occupancy_grid(scene.free.astype(np.uint8))
+    return hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
+
+
+def faults(scene: Scene, preset: str) -> Iterator[str]:
+    """What is wrong with the plans of a preset between the ends of a scene, in both directions."""
+    planner, plane = planner_of(scene, preset), scene.plane
+    one_way = hn.OneWay(sides=scene.sides)
+    # A planner looks for the cell of a point, so an end on a side is in the cell above it.
+    ends = [((int(point[0]), int(point[1])), point) for _, point in scene.ends]
+    ends = [(cell, p) for cell, p in ends if _is_free(scene.free, cell)]
+    lengths = plane.lengths(ends, ends) if ends else np.empty((0, 0))
+    for i, start in enumerate(ends):
+        for j, goal in enumerate(ends):
+            line = lengths[i, j]
+            cells = plane.cells_length(start[0], goal[0]) if preset in CELLS else line
+            given = [tuple(map(float, end[1][::-1])) for end in (start, goal)]
+            result = planner.plan(*given, one_way=one_way)
+            for fault in _faults_of(plane, result, (start, goal), (cells, preset)):
+                yield f"{preset} from {start} to {goal}: {fault}"
+
+
+def _is_free(free: NDArray[np.bool_], cell: tuple[int, int]) -> bool:
+    return cell[0] < free.shape[0] and cell[1] < free.shape[1] and bool(free[cell])
+
+
+def _faults_of(
+    plane: OneWayPlane, result: Any, ends: tuple[End, End], known: tuple[float, str]
+) -> Iterator[str]:
+    best, preset = known
+    if result.path is None:
+        if best < math.inf:
+            yield f"no path, expected {best}"
+        return
+    if best == math.inf:
+        yield f"a path of {result.cost}, expected none"
+    elif preset in {"shortest", *CELLS} and abs(result.cost - best) > 1e-9:
+        yield f"costs {result.cost}, expected {best}"
+    if result.cost < best - 1e-9 or not result.lower_bound <= result.cost + 1e-9:
+        yield f"cost {result.cost} or bound {result.lower_bound}, best {best}"
+    cells = [tuple(cell) for cell in result.path.cells.tolist()]
+    if not plane.allows_moves(cells, strict=preset in CELLS):
+        yield f"cells pass a side the wrong way: {cells}"
+    if preset not in CELLS:
+        points = [(_exact(y), _exact(x)) for x, y in result.path.points[:, :2].tolist()]
+        if not plane.allows((ends[0][0], ends[1][0]), points):
+            yield f"line passes a side the wrong way: {points}"
+
+
+def _exact(at: float) -> Fraction:
+    """A coordinate, on a line between cells if it is next to one."""
+    return Fraction(round(at)) if abs(at - round(at)) < 1e-9 else Fraction(at)
+
+
+def main() -> int:
+    """Attack presets; return 1 if anything is wrong."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--maps", type=int, default=20_000)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first map")
+    parser.add_argument("--presets", nargs="+", default=PRESETS)
+    given = parser.parse_args()
+    found, began = 0, time.process_time()
+    for seed in range(given.first, given.first + given.maps):
+        scene = random_scene(seed)
+        for preset in given.presets if scene else ():
+            for fault in faults(scene, preset):  # type: ignore[arg-type]
+                found += 1
+                sys.stdout.write(f"map {seed}: {fault}\n")
+        if seed % 500 == 499:
+            seconds = time.process_time() - began
+            sys.stdout.write(f"{seed + 1} maps, {found} wrong, {seconds:.0f} s\n")
+            sys.stdout.flush()
+    sys.stdout.write(f"{found} wrong of {given.maps} maps\n")
+    return int(found > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

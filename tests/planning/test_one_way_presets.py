@@ -1,0 +1,48 @@
+"""Every preset obeys directions, as an oracle knows that has no code of it; see `tests.one_way`."""
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from tests.one_way import Scene, faults, planner_of, random_scene
+from tests.strategies import examples
+
+ATTACKED = ("shortest",)
+
+
+@pytest.mark.parametrize("preset", ATTACKED)
+def test_plans_on_random_maps_are_legal_and_as_good_as_the_oracle_s(preset):
+    for seed in range(examples(300, 3_000)):
+        scene = random_scene(seed)
+        assert scene is None or not list(faults(scene, preset)), seed
+
+
+def test_shortest_answers_many_pairs_and_tables_as_it_answers_each():
+    scene = random_scene(24, n_ends=7)
+    assert scene is not None
+    planner, one_way = planner_of(scene, "shortest"), hn.OneWay(sides=scene.sides)
+    points = np.array([[float(p[1]), float(p[0])] for _, p in scene.ends])
+    inside = points[(points.T[::-1] < np.array(scene.free.shape)[:, None]).all(axis=0)]
+    cells = np.floor(inside[:, ::-1]).astype(int)
+    points = inside[scene.free[tuple(cells.T)]]
+    pairs = [(a, b) for a in points for b in points]
+    alone = [planner.plan(a, b, one_way=one_way) for a, b in pairs]
+    many = planner.plan_many(*zip(*pairs, strict=True), one_way=one_way)
+    assert many.cost.tolist() == [result.cost for result in alone]
+    assert many.lower_bound.tolist() == [result.lower_bound for result in alone]
+    table = np.asarray(planner.distances(points, points, one_way=one_way))
+    assert table.ravel() == pytest.approx([result.cost for result in alone], abs=1e-9)
+    assert (table != table.T).any()
+
+
+def test_sides_between_blocked_cells_change_nothing():
+    free = np.ones((6, 8), bool)
+    free[2, 1:7] = free[3, 1:7] = False
+    sides = np.array([(2, c, 3, c) for c in range(1, 7)])
+    planner = planner_of(Scene(free, sides, []), "shortest")
+    plain = planner.plan((4.5, 0.5), (4.5, 5.5))
+    directed = planner.plan((4.5, 0.5), (4.5, 5.5), one_way=hn.OneWay(sides=sides))
+    assert plain.path is not None
+    assert directed.path is not None
+    assert directed.path.points.tolist() == plain.path.points.tolist()
+    assert (directed.cost, directed.lower_bound) == (plain.cost, plain.lower_bound)
