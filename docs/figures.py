@@ -177,9 +177,9 @@ def draw_potential(file: Path) -> None:
     walls = np.pad(~grid.enterable(), 1, constant_values=True)
     factors = np.full(walls.shape, check_proof.ONE)
     path = check_proof.walk(*proof["path"])
-    p, tree = check_proof.check_cells(
-        walls, factors, proof, path[[0, -1]], proof["bound"] / grid.resolution_m * (1 - 1e-9)
-    )
+    bound = proof["bound"] / grid.resolution_m * (1 - 1e-9)
+    bars = check_proof.bars_of(walls.shape, proof)
+    p, tree = check_proof.check_cells(walls, factors, proof, path[[0, -1]], bound, bars)
     top, left = proof["box"][:2]
     outside = tree == 9  # noqa: PLR2004 - the mark of cells that the tree leaves out
     metres = np.where(outside, np.nan, p / check_proof.UNIT * grid.resolution_m)
@@ -197,14 +197,13 @@ def draw_potential(file: Path) -> None:
 
 
 def draw_cut(file: Path) -> None:
-    """Draw the chain of walls that proves that there is no path, and the two ends."""
+    """Draw the chain of walls that leaves no path, and the two ends."""
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     shut = hn.Blocked(polygons=[BARRIER])
-    proof = hn.prove(hn.HybridPlanner(topology).plan(START, GOAL, blocked=shut))
-    chain = grid.frame.points_of(check_proof.walk(*proof["chain"]) - 1)
+    chain = hn.explain(hn.HybridPlanner(topology), START, GOAL, blocked=shut).cut
     ax = plot_map(grid, title="A closed chain of walls round the goal")
-    ax.plot(*chain.T, color="crimson", linewidth=1.2)
+    ax.plot(*np.asarray(chain).T, color="crimson", linewidth=1.2)
     for (x, y), name in ((START, "start"), (GOAL, "goal")):
         ax.plot(x, y, "o", color="black")
         ax.annotate(name, (x, y), textcoords="offset points", xytext=(-12, -14))

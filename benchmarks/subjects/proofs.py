@@ -19,9 +19,11 @@ largest connected part, and for `no path` from two parts. Rows are presets; colu
 
 from __future__ import annotations
 
+import base64
 import copy
 import hashlib
 import json
+import zlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -100,9 +102,11 @@ def false_proofs(
         dropped = [run for run in proof["closed"] if run != proof["closed"][0]]
         yield "closure", {**proof, "closed": dropped}, measured
     if proof["kind"] == "no path":
-        (row, col), moves = proof["chain"]
-        at = int(rng.integers(len(moves)))
-        yield "chain", {**proof, "chain": [[row, col], moves[:at] + moves[at + 1 :]]}, measured
+        region = check_proof.unpacked(proof["region"], measured.shape).copy()
+        if len(inside := np.flatnonzero(region)) > 1:
+            region.flat[rng.choice(inside)] = 0
+            text = base64.b85encode(zlib.compress(region.tobytes())).decode()
+            yield "region", {**proof, "region": text}, measured
         yield "end", {**proof, "goal": proof["start"]}, measured
         return
     more = MORE * max(proof["cost"], proof["side_m"])

@@ -127,6 +127,23 @@ def walls_of(measured, proof, side):
     return np.pad(~free, 1, constant_values=True)
 
 
+def bars_of(shape, proof):
+    """Return which of the MOVES out of each cell, bool (8, rows, cols), cross a one-way line from
+    its right to its left, diagonal ones on both ways round their middle."""
+    bars = np.zeros((8, *shape), bool)
+    for first, last in np.array(proof.get("one_way", []), int).reshape(-1, 2, 2) + 1:
+        step = np.sign(last - first)
+        back = step[::-1] * (1, -1)
+        right = first + np.arange(abs(last - first).sum())[:, None] * step + (step - back) // 2
+        is_inside = (right > 0).all() and (right + 1 < shape).all()
+        need(abs(step).sum() == 1 and is_inside, "a one-way line along no sides of the map")
+        bars[(back == MOVES).all(axis=1), right[:, 0], right[:, 1]] = True
+    for k in range(1, 8, 2) if bars.any() else ():
+        turn = (k - 1, (k + 1) % 8), ((k + 1) % 8, k - 1)
+        bars[k] = np.all([bars[a] | np.roll(bars[b], -MOVES[a], (0, 1)) for a, b in turn], axis=0)
+    return bars
+
+
 def factors_of(measured, costs, side):
     """Return the factor of each cell in units: that of Nav2's inflation by clearance, or 1."""
     if costs is None:
@@ -154,15 +171,20 @@ def near(points):
     return np.floor(points + 1e-7 * MOVES[1::2, None]).astype(int).transpose(2, 0, 1)
 
 
+def cuts_of(first, last):
+    """Return the shares of a line, from 0 to 1, at which it enters other cells."""
+    cuts = [np.arange(math.ceil(min(p)), max(p)) for p in zip(first, last, strict=True)]
+    parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
+    return np.sort(np.concatenate([[0.0, 1.0], *parts]))
+
+
 def cost_of(walls, factors, line, is_strict):
     """Return the cost of a chain of lines, infinite where it meets a wall. Cut where it enters
     another cell, each part lies in a free cell, or beside one; cells in a row share a side, or a
     corner and one free cell at it; two if it is strict."""
     cost, middles = 0.0, [line[:1]]
     for first, last in itertools.pairwise(line):
-        cuts = [np.arange(math.ceil(min(p)), max(p)) for p in zip(first, last, strict=True)]
-        parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
-        parts = np.sort(np.concatenate([[0.0, 1.0], *parts]))
+        parts = cuts_of(first, last)
         lengths = np.diff(parts) * math.dist(first, last)
         middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
         cost += (factors[tuple(near(middle))].max(axis=0) * lengths).sum() / ONE
@@ -174,23 +196,30 @@ def cost_of(walls, factors, line, is_strict):
     return cost if (free & free[:, before] & by).any(axis=0).all() else math.inf
 
 
-# NO PATH. A closed chain of walls, each beside the next by a side or a corner, goes round one end
-# and not round the other. Draw a line through the centres of its cells. A robot that goes from a
-# free cell to the next one crosses a side between them, and the line from centre to centre meets no
-# line between two walls; between two that meet at a corner it may not pass. So it never crosses the
-# line. But a ray from one end crosses the line an odd number of times, and from the other an even
-# one: one lies inside and one outside, and no path joins them.
+def follows(walls, bars, line):
+    """Return whether a chain of lines crosses no one-way line the wrong way. The cells that it may
+    be in are followed: at each point it may go round it to another."""
+    cells = before = {(row, col) for row, col in near(line[:1])[..., 0].T if not walls[row, col]}
+    for first, last in itertools.pairwise(line):
+        parts = cuts_of(first, last)
+        parts = np.sort(np.concatenate([parts, (parts[1:] + parts[:-1]) / 2]))
+        for at in near(first + (last - first) * parts[:, None]).transpose(2, 1, 0):
+            there = {(row, col) for row, col in at if not walls[row, col]}
+            for k in [0, 2, 4, 6] * 3:
+                cells = cells | {(*(MOVES[k] + c),) for c in cells if not bars[k][c]} & before
+            cells, before = cells & there, there
+    return len(cells) > 0
 
 
-def check_chain(walls, proof, ends):
-    """Check that a chain of walls parts the ends."""
-    chain = walk(*proof["chain"])
-    need((chain >= 0).all() and (chain < walls.shape).all(), "the chain leaves the rim of the map")
-    need(walls[tuple(chain.T)].all() and (chain[0] == chain[-1]).all(), "no closed chain of walls")
-    lower = np.where(chain[:-1, :1] < chain[1:, :1], chain[:-1], chain[1:])
-    lower = lower[chain[:-1, 0] != chain[1:, 0]]
-    right = [((lower == row)[:, 0] & (lower > col)[:, 1]).sum() for row, col in (ends + 1e-9) // 1]
-    need(sum(right) % 2 == 1, "the chain does not part start and goal")
+def check_region(walls, bars, proof, ends):
+    """Check that a set of cells, bytes that are 1, has the start and not the goal, and no straight
+    move leads out. Then no path does: they cross sides of cells, or go round their corners."""
+    inside = np.pad(unpacked(proof["region"], np.subtract(walls.shape, 2)) == 1, 1) & ~walls
+    start, goal = map(tuple, (ends + 1e-9).astype(int))
+    need(inside[start] and not inside[goal], "the region has not the start, or has the goal")
+    for k in range(0, 8, 2):
+        beyond = np.roll(inside | walls, -MOVES[k], (0, 1))
+        need((beyond | bars[k])[inside].all(), "a way leads out of the region")
 
 
 # A POTENTIAL is a number p for each node of a graph, so that no move raises p by more than it
@@ -200,7 +229,7 @@ def check_chain(walls, proof, ends):
 # cost from there to the goal on an empty map), and the same holds outside of the box of the tree.
 
 
-def check_moves(costs, ahead, proof, ends, bound):
+def check_moves(costs, ahead, proof, ends, bound, bars=None):
     """Check a potential on the box of a tree with its rim, from the costs of four of the MOVES, 0
     where there is none, and the costs of moves on an empty map; return it, and the tree."""
     shape = costs.shape[1:]
@@ -221,10 +250,12 @@ def check_moves(costs, ahead, proof, ends, bound):
     down, across = (abs(np.arange(n) - at) for n, at in zip(shape, goal, strict=True))
     least = np.maximum(down[:, None], across) * ahead[0]
     least += np.minimum(down[:, None], across) * (ahead[1] - ahead[0])
+    bars = np.zeros((8, *shape), bool) if bars is None else bars
     p = np.where(tree == 9, bound - 2 * ONE * least, back.reshape(shape))
-    for cost, step in zip(costs, MOVES, strict=False):
-        rise = abs(p - np.roll(p, -step, (0, 1)))
-        need((rise <= cost)[cost > 0].all(), "a move raises p by more than it costs")
+    for k, cost in enumerate(costs):
+        after, back = (np.roll(array, -MOVES[k], (0, 1)) for array in (p, bars[k + 4]))
+        is_held = ((after - p <= cost) | bars[k]) & ((p - after <= cost) | back)
+        need(is_held[cost > 0].all(), "a move raises p by more than it costs")
     need(p[start] <= 0 and p[goal] >= bound, "p does not rise by the bound")
     return p, tree
 
@@ -240,7 +271,7 @@ def boxed(array, proof):
     """Return the part of an array over nodes that the box of a tree has, with a rim."""
     top, left, rows, cols = proof["box"]
     need(min(proof["box"]) >= 0, "a wrong box")
-    return array[top : top + rows + 2, left : left + cols + 2]
+    return array[..., top : top + rows + 2, left : left + cols + 2]
 
 
 def costs_of_cells(walls, factors):
@@ -254,11 +285,11 @@ def costs_of_cells(walls, factors):
     return costs
 
 
-def check_cells(walls, factors, proof, ends, bound):
+def check_cells(walls, factors, proof, ends, bound, bars):
     """Check a potential that bounds all paths of cells; return it, and the tree."""
     costs = costs_of_cells(boxed(walls, proof), boxed(factors, proof))
     cells = np.floor(ends).astype(int) - proof["box"][:2]
-    return check_moves(costs, PLAIN, proof, cells, math.floor(bound * UNIT))
+    return check_moves(costs, PLAIN, proof, cells, math.floor(bound * UNIT), boxed(bars, proof))
 
 
 # A KING. By costs, take numbers a, b in each cell, the cosine and sine of a tilt times its factor.
@@ -420,11 +451,12 @@ def check(measured, frame, proof):
         ends = [complex(u - x, v - y) * turn for u, v in (proof["start"], proof["goal"])]
         ends = np.array([(end.imag, end.real) for end in ends]) + 1
         need((ends > 1 - 1e-6).all() and (ends < walls.shape).all(), "ends outside the map")
+        bars = bars_of(walls.shape, proof)
         if kind == "no path":
-            check_chain(walls, proof, ends)
+            check_region(walls, bars, proof, ends)
         else:
             need(kind in {"cells", "line"}, "another kind of proof")
-            check_path(walls, factors_of(measured, costs, side), proof, ends)
+            check_path(walls, factors_of(measured, costs, side), bars, proof, ends)
     except Rejected:
         raise
     except Exception as error:  # whatever else a file may hold
@@ -432,6 +464,7 @@ def check(measured, frame, proof):
     ends = "from {start} to {goal}, radius {radius_m} m".format(**proof)
     closed = sum(end - first for first, end in proof["closed"])
     ends += f", {closed} cells closed" * (closed > 0) + f", {proof['costs']}" * bool(proof["costs"])
+    ends += f", {len(proof.get('one_way', []))} one-way lines" * bool(proof.get("one_way"))
     ends += ", unexplored cells too" * (proof["allow_unexplored"] is True)
     if kind == "no path":
         return f"{kind} {ends}"
@@ -441,7 +474,7 @@ def check(measured, frame, proof):
     return f"path {ends}: costs {cost:.6f} m, none less than {min(bound, cost):.6f} m"
 
 
-def check_path(walls, factors, proof, ends):
+def check_path(walls, factors, bars, proof, ends):
     """Check a path, its cost, and the bound on all others."""
     is_cells, bound = proof["kind"] == "cells", proof["bound"] / proof["side_m"] * (1 - 1e-9)
     if is_cells:
@@ -458,11 +491,12 @@ def check_path(walls, factors, proof, ends):
     need(within, "the ends are not start and goal")
     cost = cost_of(walls, factors, line, is_cells) * proof["side_m"]
     need(cost < math.inf, "the path meets a wall")
+    need(not bars.any() or follows(walls, bars, line), "the path crosses a side the wrong way")
     spare = 1e-9 * cost + 1e-7 * proof["side_m"]
     need(abs(cost - proof["cost"]) <= spare, f"the path costs {cost:.9f} m")
     need(0 <= proof["bound"] <= cost + spare, "the bound is above the cost")
     if is_cells:
-        check_cells(walls, factors, proof, line[[0, -1]], bound)
+        check_cells(walls, factors, proof, line[[0, -1]], bound, bars)
     elif bound > math.dist(*line[[0, -1]]):  # as no factor is below 1
         if proof["costs"] is None:
             need(cost_of(walls, factors, line[[0, -1]], False) == math.inf, "a line is shorter")

@@ -18,11 +18,13 @@ from hybridnav.check_proof import ONE, UNIT, cost_of, joins_of
 from hybridnav.errors import PlanError
 from hybridnav.maps.cells import CellClass
 from hybridnav.maps.clearance import within_radius
+from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
+from hybridnav.search.mesh.slits import lines_of
 from hybridnav.search.proofs import (
     grid_near,
     moves_of_cells,
     moves_of_king,
-    parting_chain,
+    region_of,
     strings_near,
 )
 
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning import PlanResult
     from hybridnav.planning.costs import PlannerCosts
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.found import ClosedCells
 
 _RATIO = math.sqrt(4 - math.sqrt(8))
@@ -124,6 +127,11 @@ class _Problem:
         return free
 
     @property
+    def one_way(self) -> DirectedSides | None:
+        """The directed sides; None for none."""
+        return None if self.closed is None else self.closed.one_way
+
+    @property
     def units(self) -> IntArray | None:
         """int32 (rows, cols), the factors in units; None for lengths."""
         return None if self.costs.layer is None else self.costs.layer.units
@@ -151,6 +159,7 @@ class _Problem:
         near = within_radius(grid.measured == CellClass.OCCUPIED, radius_cells=radius_cells)
         shut = np.isin(grid.measured, kinds) & ~near & ~self.free
         edges = np.flatnonzero(np.diff(shut.ravel(), prepend=False, append=False))
+        one_way = [] if self.one_way is None else lines_of(self.free, self.one_way.sides)
         return {
             "thresholds": [grid.free_threshold, grid.occupied_threshold],
             "map_sha256": hashlib.sha256(grid.measured.tobytes()).hexdigest(),
@@ -159,6 +168,7 @@ class _Problem:
             "radius_m": grid.robot_radius_m,
             "allow_unexplored": self.allow_unexplored,
             "closed": edges.reshape(-1, 2).tolist(),
+            "one_way": one_way,
             "free_sha256": hashlib.sha256(np.packbits(self.free).tobytes()).hexdigest(),
             "costs": costs,
             "start": list(self.result.start or ())[:2],
@@ -167,18 +177,16 @@ class _Problem:
 
 
 def _no_path(problem: _Problem) -> dict[str, Any]:
-    start, goal = np.floor(problem.ends + 1e-9).astype(np.int64).tolist()
-    chain = parting_chain(problem.free, start, goal)
-    if chain is None:
-        raise PlanError("the two ends are connected: there is no proof that there is no path")
-    return {"kind": "no path", "chain": _walk(chain)}
+    start = tuple(np.floor(problem.ends[0] + 1e-9).astype(np.int64).tolist())
+    return {"kind": "no path", "region": region_of(problem.free, problem.one_way, start)}
 
 
 def _cells(problem: _Problem) -> dict[str, Any]:
     result, per_cell = problem.result, problem.grid.resolution_m
     assert result.path is not None  # noqa: S101 - it is solved
     cells = result.path.cells
-    grid = grid_near(problem.free, problem.units, cells[[0, -1]], result.cost / per_cell)
+    ends, length = cells[[0, -1]], result.cost / per_cell
+    grid = grid_near(problem.free, problem.units, ends, length, problem.one_way)
     limit = math.floor(result.lower_bound / per_cell * (1 - 1e-9) * UNIT)
     return {
         "kind": "cells",
@@ -227,13 +235,20 @@ def _line(problem: _Problem) -> dict[str, Any]:
     result = problem.result
     assert result.path is not None  # noqa: S101 - it is solved
     line = _distinct(problem.grid.frame.positions_of(result.path.points))
-    bound = result.lower_bound / problem.grid.resolution_m * (1 - 1e-9)
+    bound = result.lower_bound
+    if problem.one_way is not None:
+        # The bound of the map without directions, which holds with them too.
+        cells = result.path.cells[:1], result.path.cells[-1:]
+        search = MeshSearch(build_mesh(problem.free))
+        least = shortest_paths(search, cells, (line[:1], line[-1:]))
+        bound = min(bound, float(least.lower_bound_cells[0]) * problem.grid.resolution_m)
+    near = bound / problem.grid.resolution_m * (1 - 1e-9)
     return {
         "kind": "line",
         "cost": result.cost,
-        "bound": result.lower_bound,
+        "bound": bound,
         "line": line.tolist(),
-        "heights": strings_near(problem.free, line[[0, -1]], bound),
+        "heights": strings_near(problem.free, line[[0, -1]], near),
     }
 
 

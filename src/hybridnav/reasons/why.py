@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning import HybridPlanner
     from hybridnav.planning.planning import Planning
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.topology import TopologicalMap
 
 
@@ -74,11 +75,17 @@ class Explanation:
     """float64 (n, 2), `(x, y)` in metres, map frame: a closed chain of cells that cannot be
     entered, each beside the next one. It goes round one of the ends; beyond the map it is its rim.
     None where the ends are joined, an end is blocked, or corners may be cut."""
+    against: tuple[Closure, ...] = ()
+    """Where directions alone part the ends: what leads out of all that is reached from the start,
+    or into all from which the goal is reached, but may only be crossed the other way."""
+    parts_start: bool = False
+    """Whether those are the ways away from the start, else the ways to the goal."""
 
     @property
     def has_path(self) -> bool:
         """Whether there is a path of this radius, with the closures."""
-        return not self.blocked_ends and self.radius_m < self.closed.radius_m
+        is_wide = self.radius_m < self.closed.radius_m
+        return is_wide and not self.blocked_ends and not self.against
 
     @property
     def widest_m(self) -> float:
@@ -119,6 +126,7 @@ class Explanation:
             "tight": None if tight is None else list(tight.point),
             "door": None if tight is None or tight.door is None else tight.door.number,
             "to_open": [list(one) for one in self.to_open],
+            "against": [list(one) for one in self.against],
             "through_unexplored": self.through_unexplored,
             "reached_m2": list(self.reached_m2),
         }
@@ -137,6 +145,8 @@ class Case:
     costs: ClosedCells | None
     """What the planner's costs close."""
     allow_unexplored: bool
+    one_way: DirectedSides | None = None
+    """Sides that may be crossed in one direction only."""
 
     def explained(self) -> Explanation:
         """Find the explanation."""
@@ -154,6 +164,9 @@ class Case:
                 unexplored = not self.allow_unexplored and self._is_joined(
                     self.grid.enterable(allow_unexplored=True) & ~self._shut
                 )
+        against: tuple[tuple[Closure, ...], bool] = (), False
+        if not ends and self.one_way is not None and closed.radius_m > self.grid.robot_radius_m:
+            against = self._against(self.one_way)
         at = closed.cell or opened.cell
         return Explanation(
             radius_m=self.grid.robot_radius_m,
@@ -165,7 +178,16 @@ class Case:
             through_unexplored=unexplored,
             reached_m2=self._reached_m2(),
             cut=None if ends else self._cut(),
+            against=against[0],
+            parts_start=against[1],
         )
+
+    def _against(self, one_way: DirectedSides) -> tuple[tuple[Closure, ...], bool]:
+        """Return what has a direction that parts the ends, and whether it is round the start."""
+        from hybridnav.search.proofs import parting_sides  # noqa: PLC0415 - loads kernels
+
+        found = parting_sides(self._open, one_way, self._cells)
+        return ((), False) if found is None else (tuple(map(_directed, found[0])), found[1])
 
     def _cut(self) -> FloatArray | None:
         """Return the chain of walls that parts the two ends."""
@@ -347,6 +369,14 @@ def each_closure(blocked: Blocked) -> Iterator[tuple[Closure, Blocked]]:
             yield Closure(one.name, which), Blocked(**alone)
 
 
+def _directed(name: str) -> Closure:
+    """Return what `DirectedSides` calls `door 5`, `line 1` or by another name."""
+    kind, _, number = name.partition(" ")
+    if kind in {"door", "opening", "arc", "line"} and number.isdecimal():
+        return Closure(f"{kind}s", int(number))
+    return Closure("sides", None) if name == "sides" else Closure("named", name)
+
+
 def _number_of(door: int | Door) -> int:
     """Return the number of a door, or a number that is given."""
     return door.number if isinstance(door, Door) else door
@@ -420,6 +450,7 @@ def reasons_of(
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):
         blocked = as_blocked(blocked)
+    closed = now.closed(blocked)
     unfit = None
     if now.ompl is not None and radius_m is None:
         query = now.read(ends[0], ends[1], blocked, "point")
@@ -432,6 +463,7 @@ def reasons_of(
         blocked=blocked,
         costs=now.costs.closed,
         allow_unexplored=now.preset.planner.allow_unexplored,
+        one_way=None if closed is None else closed.one_way,
     )
     return replace(case.explained(), unfit_end="" if unfit is None else unfit.split()[0])
 

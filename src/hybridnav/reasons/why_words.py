@@ -27,7 +27,8 @@ class Closure(NamedTuple):
     """
 
     kind: str
-    """The name of an attribute of `Blocked`, or `"costs"`."""
+    """The name of an attribute of `Blocked`, `"costs"`, or of what has a direction: `"doors"`,
+    `"openings"`, `"arcs"`, `"lines"`, `"sides"` or `"named"`."""
     which: Any
     """Its number or name; of areas and keepout the place in the sequence, from 0; None for cells
     and costs."""
@@ -108,11 +109,18 @@ _TABLES = {
         "places": "place {which}",
         "polygons": "area {order}",
         "keepout": "keep-out area {order}",
+        "openings": "opening {which}",
+        "lines": "line {which}",
+        "sides": "the given sides of cells",
+        "away": "Only {closures} {leads} away from the start, and may be crossed only towards it.",
+        "towards": "Only {closures} {leads} to the goal, and may be crossed only away from it.",
         "cells": "the given set of cells",
         "named": "{which}",
         "costs": "the keep-out of the costs",
         "is": "is",
         "are": "are",
+        "leads": "leads",
+        "lead": "lead",
     },
     "de": {
         "start": "der Start",
@@ -151,11 +159,18 @@ _TABLES = {
         "places": "Ort {which}",
         "polygons": "Fläche {order}",
         "keepout": "Sperrfläche {order}",
+        "openings": "Durchgang {which}",
+        "lines": "Linie {which}",
+        "sides": "die angegebenen Zellseiten",
+        "away": "Vom Start weg {leads} nur {closures}, erlaubt allein in Richtung Start.",
+        "towards": "Zum Ziel {leads} nur {closures}, erlaubt allein vom Ziel weg.",
         "cells": "die angegebene Zellmenge",
         "named": "{which}",
         "costs": "der Sperrbereich der Kosten",
         "is": "ist",
         "are": "sind",
+        "leads": "führt",
+        "lead": "führen",
     },
 }
 
@@ -185,8 +200,8 @@ def sentences(why: Any, language: str) -> list[str]:
     lines = [writer.say("unfit", end=writer.table[end]) for end in unfit]
     if why.has_path:
         return [*lines, writer.say("path"), *writer.tight("path_tight", why.widest_m, why.tight)]
-    if why.to_open:
-        lines.append(writer.opening(why.to_open))
+    if why.against or why.to_open:
+        lines.append(writer.against(why) if why.against else writer.opening(why.to_open))
     elif why.opened.radius_m > why.radius_m:
         lines.append(writer.say("cut_off"))
     elif why.closed.radius_m > 0:
@@ -259,6 +274,12 @@ class _Writer:
         if len(names) < 2:  # noqa: PLR2004
             return "".join(names)
         return f"{', '.join(names[:-1])} {self.table['and']} {names[-1]}"
+
+    def against(self, why: Any) -> str:
+        """Say what may only be crossed the other way."""
+        verb = self.table["leads" if len(why.against) == 1 else "lead"]
+        key = "away" if why.parts_start else "towards"
+        return self.say(key, closures=self.listed(why.against), leads=verb)
 
     def opening(self, closures: Sequence[Closure]) -> str:
         """Say which closures have to open."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._base.moves import FAR
 from hybridnav.check_proof import (
     COS,
     LEVEL,
@@ -19,6 +21,7 @@ from hybridnav.check_proof import (
     costs_of_cells,
     costs_of_corners,
 )
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
 
@@ -43,16 +46,23 @@ class Grid(NamedTuple):
     """int64 (2,), what rows and columns of the map have more."""
     ends: LongArray
     """int64 (2, 2), the nodes (row, col) here."""
+    barred: ByteArray
+    """uint8, bit k for a move in direction k that directions forbid."""
 
 
 def grid_near(
-    free: BoolArray, units: IntArray | None, ends: LongArray, length_cells: float
+    free: BoolArray,
+    units: IntArray | None,
+    ends: LongArray,
+    length_cells: float,
+    one_way: DirectedSides | None = None,
 ) -> Grid:
     """Return the part of a map where a path between two nodes may be shorter than a length.
 
     `free`: bool (rows, cols), cells that may be entered; `units`: int32 (rows, cols), the factors
     of the cells in units of 2^-14; None for 1; `ends`: int64 (2, 2), the nodes (row, col), cells or
-    corners of cells; `length_cells`: length that no path of interest has.
+    corners of cells; `length_cells`: length that no path of interest has; `one_way`: directed
+    sides, None for none.
     """
     low, high = _box_of(free, (ends[0], ends[1]), length_cells)
     part = np.s_[low[0] : high[0], low[1] : high[1]]
@@ -61,14 +71,17 @@ def grid_near(
     factors = np.full(walls.shape, ONE)
     if units is not None:
         factors[1:-2, 1:-2] = units[part]
-    return Grid(walls, factors, low - 1, ends - low + 1)
+    barred = np.zeros(walls.shape, np.uint8)
+    if one_way is not None:
+        barred[1:-2, 1:-2] = one_way.moves[part]
+    return Grid(walls, factors, low - 1, ends - low + 1, barred)
 
 
 def moves_of_cells(grid: Grid, limit: int) -> dict[str, Any]:
     """Return the proof that no path of cells costs less than a limit, in units."""
     costs = costs_of_cells(grid.walls, grid.factors)
     start, goal = map(tuple, grid.ends.tolist())
-    tree, _ = tree_of(costs, start, goal, limit, PLAIN)
+    tree, _ = tree_of(costs, grid.barred, start, goal, limit, PLAIN)
     return _stated(grid, tree)
 
 
@@ -93,7 +106,7 @@ def moves_of_king(grid: Grid, limit: int, known: tuple[Any, ...]) -> tuple[dict[
     tilts[tuple((cells - grid.low).T)] = found
     while True:
         costs = costs_of_corners(grid.walls, grid.factors, tilts)
-        tree, cost = tree_of(costs, start, goal, limit, least_moves)
+        tree, cost = tree_of(costs, grid.barred, start, goal, limit, least_moves)
         bound = int(cost[goal])
         outside = cost + ahead >= bound
         out = np.zeros(shape, np.bool_)
@@ -135,6 +148,51 @@ def _box_of(
     spare = np.maximum(length_cells - (high - low), 0) / 2 + 3
     first = np.maximum(low - spare, 0).astype(np.int64)
     return first, np.minimum(high + spare, free.shape).astype(np.int64)
+
+
+def reached_from(
+    free: BoolArray, one_way: DirectedSides | None, cell: tuple[int, int]
+) -> BoolArray:
+    """Return the cells that are reached from a free cell, bool (rows, cols)."""
+    if one_way is None:
+        labels, _ = ndimage.label(free)
+        together: BoolArray = labels == labels[cell]
+        return together
+    grid = grid_near(free, None, np.array([cell, cell]), math.inf, one_way)
+    start, costs = tuple(grid.ends[0].tolist()), costs_of_cells(grid.walls, grid.factors)
+    tree, _ = tree_of(costs, grid.barred, start, start, FAR, PLAIN)
+    reached: BoolArray = (tree != OUTSIDE)[1:-2, 1:-2]
+    return reached
+
+
+def region_of(free: BoolArray, one_way: DirectedSides | None, start: tuple[int, int]) -> str:
+    """Return the cells that are reached from a cell, as a proof states them."""
+    return _packed(reached_from(free, one_way, start).astype(np.uint8))
+
+
+def parting_sides(
+    free: BoolArray, one_way: DirectedSides, ends: tuple[tuple[int, int], tuple[int, int]]
+) -> tuple[tuple[str, ...], bool] | None:
+    """Return what alone leads out of all that is reached from a start, or into all from which a
+    goal is reached, but in the other direction only: the fewer names, and whether they are those
+    round the start. None if the goal is reached.
+
+    `free`: bool (rows, cols); `ends`: free cells (row, col) of start and goal, joined without
+    directions.
+    """
+    reached = reached_from(free, one_way, ends[0])
+    if reached[ends[1]]:
+        return None
+    back = DirectedSides.of([("", one_way.sides[:, [2, 3, 0, 1]])], free.shape)
+    behind = reached_from(free, back, ends[1])
+    one, two = tuple(one_way.sides[:, :2].T), tuple(one_way.sides[:, 2:].T)
+    both = free[one] & free[two]
+    leaves, enters = both & reached[two] & ~reached[one], both & behind[one] & ~behind[two]
+    names = [
+        tuple(name for name, places in one_way.parts.items() if which[places].any())
+        for which in (leaves, enters)
+    ]
+    return (names[0], True) if len(names[0]) <= len(names[1]) else (names[1], False)
 
 
 def parting_chain(

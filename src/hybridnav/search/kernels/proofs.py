@@ -34,14 +34,15 @@ def _cost_of(costs, row, col, k):
 
 @guarded
 @njit(cache=True, nogil=True)
-def tree_of(costs, start, goal, limit, moves):
+def tree_of(costs, barred, start, goal, limit, moves):
     """Return the tree of cheapest paths from a node of a grid.
 
     It covers the nodes over which a path to the goal may be cheaper than a limit, as far as the way
     on an empty grid tells.
 
     `costs`: int64 (4, rows, cols), the costs of moves in the first four directions, 0 where there
-    is none. Moves stay in the grid. `start`, `goal`: (row, col); `limit`: cost of a path that is
+    is none. Moves stay in the grid. `barred`: uint8 (rows, cols), bit k for a move in direction k
+    that directions forbid. `start`, `goal`: (row, col); `limit`: cost of a path that is
     not of interest; `moves`: the least cost of a straight move and of a diagonal one, in halves of
     `ONE`. Returns uint8 (rows, cols), the direction from each node to the one before it, `ROOT` at
     the start and `OUTSIDE` elsewhere; and int64 (rows, cols), the least cost of each node of the
@@ -70,6 +71,8 @@ def tree_of(costs, start, goal, limit, moves):
             step = _cost_of(costs, row, col, k)
             to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
             if step == 0 or cost[row, col] + step >= cost[to_row, to_col]:
+                continue
+            if barred[row, col] >> k & 1:
                 continue
             cost[to_row, to_col] = cost[row, col] + step
             back[to_row, to_col] = (k + 4) & 7
